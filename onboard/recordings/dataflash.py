@@ -1,0 +1,197 @@
+"""DataFlash logs (.BIN) of ArduPilot, from version 3.1 on, as recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.samples import Sample
+from onboard.errors import RecordingError
+from onboard.recordings.dataflash_index import MAGIC, DataflashIndex, index_dataflash
+from onboard.recordings.dataflash_records import (
+    CONVERTERS,
+    GPS_NAMES,
+    IMU_NAMES,
+    NEEDED,
+    Batch,
+    Context,
+    Floats,
+    receiver_of,
+    record_times,
+)
+from onboard.recordings.recording import Recording, elapsed_s
+
+BLOCK = 16384
+"""Records converted at a time: bounds the memory, whatever the length of the log."""
+WANTED = frozenset(CONVERTERS) | {"GPA"}
+EKF2 = 2
+
+
+def is_dataflash(head: bytes) -> bool:
+    """Whether a file that begins so is a DataFlash log: a record header followed by FMT."""
+    at = head.find(MAGIC + b"\x80")
+    return 0 <= at < len(head) - 3
+
+
+def open_dataflash(path: Path) -> Recording:
+    """Index a log.
+
+    Raises:
+        RecordingError: it holds no inertial record with a time.
+    """
+    with path.open("rb") as file:
+        data = mmap(file.fileno(), 0, access=ACCESS_READ)
+    index = index_dataflash(data, WANTED)
+    usable = _usable_slots(index)
+    imu_slots = [k for k in usable if index.formats[k].name in IMU_NAMES]
+    if not np.isin(index.slots, imu_slots).any():
+        raise RecordingError(
+            f"{path}: a DataFlash log without inertial records (IMU) that have a time"
+        )
+    t = _times(index, imu_slots)
+    context = _context(index, float(t[0]))
+
+    def read() -> Iterator[Sample]:
+        return _samples(index, usable, context)
+
+    return Recording(
+        path=path,
+        kind="dataflash",
+        autopilot="ardupilot",
+        duration_s=elapsed_s(t),
+        counts=index.counts(),
+        read=read,
+        damage=_damage(index),
+    )
+
+
+def _usable_slots(index: DataflashIndex) -> frozenset[int]:
+    """Formats that have the fields we need, and for measurements a time of their own."""
+    usable = set()
+    for slot, form in enumerate(index.formats):
+        timed = form.has("TimeUS") or form.has("T" if form.name in GPS_NAMES else "TimeMS")
+        complete = form.name in CONVERTERS and form.has(*NEEDED.get(form.name, ()))
+        if complete and (timed or form.name in {"PARM", "EV"}):
+            usable.add(slot)
+    return frozenset(usable)
+
+
+def _times(index: DataflashIndex, slots: list[int]) -> Floats:
+    """Times of the records of some formats in the order of the file, s."""
+    offsets = index.offsets[np.isin(index.slots, slots)]
+    kinds = index.slots[np.isin(index.slots, slots)]
+    t = np.full(len(offsets), np.nan)
+    for slot in slots:
+        places = np.flatnonzero(kinds == slot)
+        for start in range(0, len(places), BLOCK):
+            rows = places[start : start + BLOCK]
+            times = record_times(index.formats[slot], index.gather(slot, offsets[rows]))
+            if times is not None:
+                t[rows] = times
+    return t
+
+
+def _damage(index: DataflashIndex) -> tuple[str, ...]:
+    notes = []
+    if index.damaged_places:
+        places = "place" if index.damaged_places == 1 else "places"
+        notes.append(
+            f"{index.damaged_places} damaged {places}, {index.skipped_bytes} bytes skipped"
+        )
+    if index.cut_off:
+        notes.append("cut off: the end of the log is missing")
+    return tuple(notes)
+
+
+def _context(index: DataflashIndex, first_time: float) -> Context:
+    accuracy: dict[int, list[tuple[Floats, Floats]]] = {}
+    vertical: dict[int, bool] = {}
+    denied: set[int] = set()
+    for form, records in index.all_of("GPA"):
+        if not form.has("SAcc", "TimeUS"):
+            continue
+        receivers = np.array(receiver_of(form, records))
+        t, sigma = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "SAcc")
+        for receiver in np.unique(receivers).tolist():
+            mine = receivers == receiver
+            accuracy.setdefault(receiver, []).append((t[mine], sigma[mine]))
+            if form.has("VV") and not records["VV"][mine].any():
+                denied.add(receiver)
+    for name in GPS_NAMES:
+        for form, records in index.all_of(name):
+            if not form.has("VZ"):
+                continue
+            receivers = np.array(receiver_of(form, records))
+            for receiver in np.unique(receivers).tolist():
+                seen = bool(records["VZ"][receivers == receiver].any())
+                vertical[receiver] = vertical.get(receiver, False) or seen
+    ekf = ekf_in_use(index)
+    return Context(
+        speed_accuracy={k: _sorted_series(parts) for k, parts in accuracy.items()},
+        vertical_speed={k: v and k not in denied for k, v in vertical.items()},
+        ekf_status_from=ekf,
+        first_time=first_time,
+    )
+
+
+def _sorted_series(parts: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    t = np.concatenate([p[0] for p in parts])
+    values = np.concatenate([p[1] for p in parts])
+    order = np.argsort(t, kind="stable")
+    return t[order], values[order]
+
+
+def ekf_in_use(index: DataflashIndex) -> str:
+    """XKF4 or NKF4: the record of the EKF that AHRS_EKF_TYPE chooses, or that there is."""
+    counts = index.counts()
+    for form, records in index.all_of("PARM"):
+        if form.has("Name", "Value"):
+            chosen = records["Value"][records["Name"] == b"AHRS_EKF_TYPE"]
+            if len(chosen):
+                return "NKF4" if int(chosen[-1]) == EKF2 else "XKF4"
+    return "XKF4" if counts.get("XKF4") else "NKF4"
+
+
+def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Sample]:
+    last = context.first_time
+    keep = np.isin(index.slots, list(usable))
+    offsets, slots = index.offsets[keep], index.slots[keep]
+    for start in range(0, len(offsets), BLOCK):
+        block = offsets[start : start + BLOCK], slots[start : start + BLOCK]
+        rows, last = _convert_block(index, block, context, last)
+        for row in rows:
+            yield from row
+
+
+def _convert_block(
+    index: DataflashIndex,
+    block: tuple[NDArray[np.int64], NDArray[np.uint16]],
+    context: Context,
+    last: float,
+) -> tuple[list[list[Sample]], float]:
+    """Samples of a block, one list per record, and the time of its last record."""
+    offsets, slots = block
+    groups = [(slot, np.flatnonzero(slots == slot)) for slot in np.unique(slots).tolist()]
+    records = {slot: index.gather(slot, offsets[rows]) for slot, rows in groups}
+    t = np.full(len(offsets) + 1, np.nan)
+    t[0] = last
+    for slot, rows in groups:
+        times = record_times(index.formats[slot], records[slot])
+        if times is not None:
+            t[rows + 1] = times
+    # A record without a time of its own takes that of the one before it.
+    known = np.where(np.isfinite(t), np.arange(len(t)), 0)
+    t = t[np.maximum.accumulate(known)]
+    placed: list[list[Sample]] = [[] for _ in range(len(offsets))]
+    for slot, rows in groups:
+        form = index.formats[slot]
+        batch = Batch(form, records[slot], t[rows + 1])
+        for convert in CONVERTERS[form.name]:
+            for row, sample in zip(rows.tolist(), convert(batch, context), strict=True):
+                if sample is not None:
+                    placed[row].append(sample)
+    return placed, float(t[-1])

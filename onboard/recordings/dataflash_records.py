@@ -1,0 +1,330 @@
+"""DataFlash records to samples: one converter per type of record, old layouts and new.
+
+Angles are degrees in the log and radians in samples; the clock is the autopilot's
+boot clock (``TimeUS``; ``TimeMS`` before ArduPilot 3.3; in those logs the GPS record has
+GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.samples import (
+    AirData,
+    AttitudeSample,
+    Battery,
+    EkfBias,
+    EkfHealth,
+    GpsFix,
+    ImuSample,
+    ParameterValue,
+    Sample,
+    Throttle,
+    VehicleState,
+    Vibration,
+)
+from onboard.recordings.dataflash_index import Format, Records
+
+Floats = NDArray[np.float64]
+
+SECONDS_PER_WEEK = 604800.0
+SAME_FIX_S = 2e-3
+"""GPA is written right after the GPS record that it belongs to."""
+HDOP_UNKNOWN = 99.0
+STATUS_BITS = 0x3FF
+"""The low ten bits of the EKF's nav_filter_status are those of EKF_STATUS_REPORT."""
+STATUS_GPS_GLITCHING, REPORT_GPS_GLITCHING = 1 << 14, 1 << 15
+EVENTS: dict[int, tuple[bool | None, bool | None]] = {
+    10: (True, None),
+    11: (False, None),
+    17: (None, True),
+    18: (None, True),
+    28: (None, False),
+}
+"""EV record: event number to (armed, landed)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a converter must know of the rest of the log.
+
+    ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
+    follow the GPS record that they belong to; ``vertical_speed`` says per receiver whether it
+    measures one; ``ekf_status_from`` names the record of the EKF that flies; ``first_time`` (s) is
+    given to records without a time that stand before all others.
+    """
+
+    speed_accuracy: Mapping[int, tuple[Floats, Floats]]
+    vertical_speed: Mapping[int, bool]
+    ekf_status_from: str
+    first_time: float
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Some records of one format and their times (n,), s, NaN where not known."""
+
+    form: Format
+    records: Records
+    t: Floats
+
+    def floats(self, *columns: str) -> list[list[float]]:
+        """Columns as lists of Python floats."""
+        return [self.form.numbers(self.records, column).tolist() for column in columns]
+
+    def integers(self, column: str, default: int = 0) -> list[int]:
+        """An integer column, or a default where the layout has none."""
+        if not self.form.has(column):
+            return [default] * len(self.records)
+        return [int(value) for value in self.records[column]]
+
+
+Converted = Iterable[Sample | None]
+Converter = Callable[[Batch, Context], Converted]
+
+
+def record_times(form: Format, records: Records) -> Floats | None:
+    """(n,) boot time of records, s; None where the layout has no time of its own."""
+    if form.has("TimeUS"):
+        return form.numbers(records, "TimeUS") / 1e6
+    if form.name.startswith("GPS"):
+        return form.numbers(records, "T") / 1e3 if form.has("T") else None
+    return form.numbers(records, "TimeMS") / 1e3 if form.has("TimeMS") else None
+
+
+def receiver_of(form: Format, records: Records) -> list[int]:
+    """(n,) number of the GPS receiver, from 0."""
+    if form.has("I"):
+        return [int(i) for i in records["I"]]
+    return [1 if form.name.endswith("2") else 0] * len(records)
+
+
+def imu(batch: Batch, _context: Context) -> Converted:
+    """IMU (with or without instance), IMU2, IMU3."""
+    first = int(batch.form.name[3:] or 1)
+    numbers = [i + first for i in batch.integers("I")]
+    t = batch.t.tolist()
+    gx, gy, gz = batch.floats("GyrX", "GyrY", "GyrZ")
+    ax, ay, az = batch.floats("AccX", "AccY", "AccZ")
+    named = next((c for c in ("T", "Temp") if batch.form.has(c)), None)
+    heat: list[float] | list[None] = batch.floats(named)[0] if named else [None] * len(t)
+    return [
+        ImuSample(t[k], numbers[k], (ax[k], ay[k], az[k]), (gx[k], gy[k], gz[k]), heat[k])
+        for k in range(len(t))
+    ]
+
+
+def attitude(batch: Batch, _context: Context) -> Converted:
+    """ATT."""
+    angles = [np.radians(batch.form.numbers(batch.records, c)) for c in ("Roll", "Pitch", "Yaw")]
+    return map(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
+
+
+def gps(batch: Batch, context: Context) -> Converted:
+    """GPS, GPS2; the speed accuracy comes from GPA, the receiver's time from GMS and GWk."""
+    form, records = batch.form, batch.records
+    speed = form.numbers(records, "Spd")
+    course = np.radians(form.numbers(records, "GCrs"))
+    v_n, v_e = (speed * np.cos(course)).tolist(), (speed * np.sin(course)).tolist()
+    lat, lng, alt = batch.floats("Lat", "Lng", "Alt")
+    down = batch.floats("VZ")[0] if form.has("VZ") else None
+    milliseconds, weeks = ("GMS", "GWk") if form.has("GMS") else ("TimeMS", "Week")
+    week, ms = batch.integers(weeks), batch.integers(milliseconds)
+    hdop = batch.floats("HDop")[0] if form.has("HDop") else None
+    status, satellites = batch.integers("Status"), batch.integers("NSats", -1)
+    fixes = []
+    for k, receiver in enumerate(receiver_of(form, records)):
+        t = float(batch.t[k])
+        vertical = down is not None and context.vertical_speed.get(receiver, False)
+        fixes.append(
+            GpsFix(
+                t=t,
+                receiver=receiver,
+                fix_type=status[k],
+                latitude=lat[k],
+                longitude=lng[k],
+                altitude=alt[k],
+                v_n=v_n[k],
+                v_e=v_e[k],
+                v_d=down[k] if vertical and down is not None else None,
+                t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if ms[k] else None,
+                satellites=satellites[k] if satellites[k] >= 0 else None,
+                hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
+                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), t),
+            )
+        )
+    return fixes
+
+
+def _nearest(series: tuple[Floats, Floats] | None, t: float) -> float | None:
+    """The value of the record written with, or last before, the one of time ``t``."""
+    if series is None:
+        return None
+    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
+    if k < 0 or t - series[0][k] > 2.0 or not series[1][k] > 0.0:
+        return None
+    return float(series[1][k])
+
+
+def vibration(batch: Batch, _context: Context) -> Converted:
+    """VIBE: one record per IMU, before ArduPilot 4.1 one with three clip counters."""
+    t = batch.t.tolist()
+    x, y, z = batch.floats("VibeX", "VibeY", "VibeZ")
+    clips = [batch.integers(c) for c in ("Clip", "Clip0", "Clip1", "Clip2") if batch.form.has(c)]
+    numbers = batch.integers("IMU") if batch.form.has("IMU") else None
+    return [
+        Vibration(
+            t[k],
+            (x[k], y[k], z[k]),
+            tuple(c[k] for c in clips),
+            None if numbers is None else numbers[k] + 1,
+        )
+        for k in range(len(t))
+    ]
+
+
+def throttle(batch: Batch, _context: Context) -> Converted:
+    """CTUN: ThO is 0 ... 1 on a copter and percent on a plane; old copters had 0 ... 1000."""
+    column = next((c for c in ("ThO", "ThrOut") if batch.form.has(c)), None)
+    if column is None:
+        return [None] * len(batch.t)
+    full = 100.0 if batch.form.has("NavRoll") else 1.0 if column == "ThO" else 1000.0
+    values = batch.form.numbers(batch.records, column) / full
+    return map(Throttle, batch.t.tolist(), values.tolist())
+
+
+def airspeed(batch: Batch, _context: Context) -> Converted:
+    """ARSP of the first sensor."""
+    values, sensor = batch.floats("Airspeed")[0], batch.integers("I")
+    return [
+        AirData(t, airspeed=v) if i == 0 else None
+        for t, v, i in zip(batch.t.tolist(), values, sensor, strict=True)
+    ]
+
+
+def ekf_bias(batch: Batch, _context: Context) -> Converted:
+    """XKF2: accelerometer bias of each EKF3 core, steps of 0.01 m/s^2."""
+    if not batch.form.has("AX", "AY", "AZ"):
+        return [None] * len(batch.t)
+    x, y, z = batch.floats("AX", "AY", "AZ")
+    core = batch.integers("C")
+    return [EkfBias(t, core[k], (x[k], y[k], z[k])) for k, t in enumerate(batch.t.tolist())]
+
+
+def wind(batch: Batch, _context: Context) -> Converted:
+    """XKF2: wind estimate of the first core."""
+    north, east = batch.floats("VWN", "VWE")
+    core = batch.integers("C")
+    return [
+        AirData(t, wind_n=north[k], wind_e=east[k]) if core[k] == 0 else None
+        for k, t in enumerate(batch.t.tolist())
+    ]
+
+
+def ekf_status(batch: Batch, context: Context) -> Converted:
+    """XKF4 (EKF3) or NKF4 (EKF2), the primary core: solution status as EKF_STATUS_REPORT flags."""
+    if batch.form.name != context.ekf_status_from:
+        return [None] * len(batch.t)
+    core, primary, status = batch.integers("C"), batch.integers("PI"), batch.integers("SS")
+    lanes = batch.form.has("C")
+    return [
+        None
+        if lanes and core[k] != primary[k]
+        else EkfHealth(
+            t,
+            (status[k] & STATUS_BITS)
+            | (REPORT_GPS_GLITCHING if status[k] & STATUS_GPS_GLITCHING else 0),
+        )
+        for k, t in enumerate(batch.t.tolist())
+    ]
+
+
+def battery(batch: Batch, _context: Context) -> Converted:
+    """BAT of the first battery, or CURR; integer fields of old logs are hundredths."""
+    if not batch.form.has("Volt", "Curr"):
+        return [None] * len(batch.t)
+    scale = 0.01 if batch.form.letter("Volt") in "hH" else 1.0
+    volts, amperes = batch.floats("Volt", "Curr")
+    number = batch.integers("Inst") if batch.form.has("Inst") else batch.integers("I")
+    return [
+        Battery(t, volts[k] * scale, amperes[k] * scale) if number[k] == 0 else None
+        for k, t in enumerate(batch.t.tolist())
+    ]
+
+
+def parameter(batch: Batch, _context: Context) -> Converted:
+    """PARM."""
+    values = batch.floats("Value")[0]
+    timed = batch.form.has("TimeUS") or batch.form.has("TimeMS")
+    return [
+        ParameterValue(
+            bytes(name).decode("ascii", errors="replace"),
+            value,
+            t if timed and np.isfinite(t) else None,
+        )
+        for name, value, t in zip(batch.records["Name"], values, batch.t.tolist(), strict=True)
+    ]
+
+
+def event(batch: Batch, _context: Context) -> Converted:
+    """EV: arming and landing events of copters."""
+    return [
+        VehicleState(t, *EVENTS[number]) if number in EVENTS else None
+        for t, number in zip(batch.t.tolist(), batch.integers("Id"), strict=True)
+    ]
+
+
+def arming(batch: Batch, _context: Context) -> Converted:
+    """ARM."""
+    states = batch.integers("ArmState")
+    return [VehicleState(t, armed=bool(s)) for t, s in zip(batch.t.tolist(), states, strict=True)]
+
+
+def flying(batch: Batch, _context: Context) -> Converted:
+    """STAT of planes: whether it flies, and in old logs whether it is armed."""
+    fly, has_armed = batch.integers("isFlying"), batch.form.has("Armed")
+    armed = batch.integers("Armed")
+    return [
+        VehicleState(t, armed=bool(armed[k]) if has_armed else None, landed=not fly[k])
+        for k, t in enumerate(batch.t.tolist())
+    ]
+
+
+IMU_NAMES = ("IMU", "IMU2", "IMU3")
+GPS_NAMES = ("GPS", "GPS2")
+CONVERTERS: dict[str, tuple[Converter, ...]] = {
+    **dict.fromkeys(IMU_NAMES, (imu,)),
+    **dict.fromkeys(GPS_NAMES, (gps,)),
+    "ATT": (attitude,),
+    "VIBE": (vibration,),
+    "CTUN": (throttle,),
+    "ARSP": (airspeed,),
+    "XKF2": (ekf_bias, wind),
+    "XKF4": (ekf_status,),
+    "NKF4": (ekf_status,),
+    "BAT": (battery,),
+    "CURR": (battery,),
+    "PARM": (parameter,),
+    "EV": (event,),
+    "ARM": (arming,),
+    "STAT": (flying,),
+}
+NEEDED: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(IMU_NAMES, ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")),
+    **dict.fromkeys(GPS_NAMES, ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")),
+    "ATT": ("Roll", "Pitch", "Yaw"),
+    "VIBE": ("VibeX", "VibeY", "VibeZ"),
+    "ARSP": ("Airspeed",),
+    "XKF2": ("VWN", "VWE"),
+    "XKF4": ("SS",),
+    "NKF4": ("SS",),
+    "PARM": ("Name", "Value"),
+    "EV": ("Id",),
+    "ARM": ("ArmState",),
+    "STAT": ("isFlying",),
+}
+"""Fields without which a record of that name is another thing, and is not read."""

@@ -1,0 +1,36 @@
+"""Opening a recording: the kind is found from the content, not from the name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from onboard.errors import RecordingError
+from onboard.recordings.dataflash import is_dataflash, open_dataflash
+from onboard.recordings.recording import Recording
+
+HEAD_LENGTH = 65536
+
+
+def open_recording(path: str | Path) -> Recording:
+    """Open a .tlog, DataFlash .BIN or .ulg file.
+
+    A log that is damaged or cut off is read as far as it goes; its ``damage`` says so.
+
+    Raises:
+        RecordingError: no such file, not a file, not a log, or nothing in it that can be used.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_LENGTH)
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise RecordingError(f"{path}: is a directory, not a recording") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
+    if not head:
+        raise RecordingError(f"{path}: is empty")
+    if is_dataflash(head):
+        return open_dataflash(path)
+    raise RecordingError(f"{path}: not a .tlog, DataFlash .BIN or .ulg recording")

@@ -1,0 +1,45 @@
+"""What every reader returns: a recording that can be read as samples, once or again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.samples import Sample
+
+LONGEST_GAP_S = 3600.0
+"""A step of the clock longer than this is a damaged time stamp, not a pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One opened file.
+
+    ``kind`` is ``tlog``, ``dataflash`` or ``ulog``; ``autopilot`` is ``ardupilot``, ``px4`` or
+    ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples, restarts
+    excluded; ``counts`` has the number of messages that are read, by their name in the file;
+    ``damage`` says in plain words what was skipped and ``notes`` what was chosen.
+    """
+
+    path: Path
+    kind: str
+    autopilot: str
+    duration_s: float
+    counts: dict[str, int]
+    read: Callable[[], Iterator[Sample]] = field(repr=False)
+    damage: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def samples(self) -> Iterator[Sample]:
+        """Every sample in the order of the file; each call starts from the beginning."""
+        return self.read()
+
+
+def elapsed_s(t: NDArray[np.float64]) -> float:
+    """Time that a clock ``t`` (n,) counted, s: restarts and impossible steps add nothing."""
+    steps = np.diff(t)
+    return float(steps[(steps > 0.0) & (steps < LONGEST_GAP_S)].sum())

@@ -1,0 +1,18 @@
+"""Fixtures that every part may use."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of shared recordings: ONBOARD_RECORDINGS, or beside the project; else skip."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "recordings"
+    folder = Path(os.environ.get("ONBOARD_RECORDINGS", beside))
+    if not folder.is_dir():
+        pytest.skip("no shared recordings beside the project, and ONBOARD_RECORDINGS is not set")
+    return folder

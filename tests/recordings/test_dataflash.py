@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dataflash_writer import DataflashWriter, modern_log, old_log
+from pymavlink.DFReader import DFReader_binary
+
+from onboard.core.samples import (
+    AttitudeSample,
+    Battery,
+    GpsFix,
+    ImuSample,
+    ParameterValue,
+    Throttle,
+    VehicleState,
+)
+from onboard.errors import RecordingError
+from onboard.recordings.dataflash import WANTED
+from onboard.recordings.dataflash_index import index_dataflash
+from onboard.recordings.opening import open_recording
+
+
+def saved(tmp_path: Path, data: object) -> Path:
+    path = tmp_path / "log.BIN"
+    path.write_bytes(bytes(data))
+    return path
+
+
+def of_type(path: Path, kind: type) -> list:
+    return [s for s in open_recording(path).samples() if isinstance(s, kind)]
+
+
+def check_against_oracle(path: Path) -> int:
+    """Every field of every record that we read is what pymavlink's recv_msg gives."""
+    index = index_dataflash(path.read_bytes(), WANTED)
+    oracle: dict[str, list] = {}
+    reader = DFReader_binary(str(path))
+    try:
+        while (message := reader.recv_msg()) is not None:
+            oracle.setdefault(message.get_type(), []).append(message)
+    finally:
+        reader.close()
+    compared = 0
+    assert index.counts() == {name: len(m) for name, m in oracle.items() if name in WANTED}
+    for slot, form in enumerate(index.formats):
+        messages = oracle.get(form.name, [])
+        places = index.offsets[index.slots == slot]
+        records = index.gather(slot, places)
+        for column, letter in zip(form.columns, form.letters, strict=True):
+            expected = [getattr(m, column) for m in messages]
+            if letter in "nNZ":
+                assert [bytes(x).decode() for x in records[column]] == expected
+            elif letter != "M":
+                np.testing.assert_array_equal(form.numbers(records, column), expected)
+            compared += len(expected)
+    return compared
+
+
+@pytest.mark.parametrize("log", [modern_log, old_log])
+def test_records_equal_those_of_recv_msg(tmp_path, log):
+    assert check_against_oracle(saved(tmp_path, log())) > 1000
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    "name", ["sitl/c01.BIN", "real/real-quad-08.BIN", "real/real-quad-14-crash.BIN"]
+)
+def test_real_records_equal_those_of_recv_msg(recordings, name):
+    assert check_against_oracle(recordings / name) > 10_000
+
+
+def test_modern_log_in_si_units(tmp_path):
+    path = saved(tmp_path, modern_log())
+    recording = open_recording(path)
+    assert (recording.kind, recording.autopilot, recording.damage) == ("dataflash", "ardupilot", ())
+    assert recording.duration_s == pytest.approx(3.96)
+    imu = of_type(path, ImuSample)
+    assert [s.imu for s in imu[:4]] == [1, 2, 1, 2]
+    assert imu[1].f_b == pytest.approx((0.1, -0.2, -8.8), abs=1e-6)
+    assert imu[1].w_b == pytest.approx((0.01, -0.02, 0.03))
+    assert (imu[0].t, imu[2].t, imu[0].temperature) == (5.0, 5.04, 31.5)
+    attitude = of_type(path, AttitudeSample)[0]
+    assert math.degrees(attitude.yaw) == pytest.approx(350.0)
+    assert math.degrees(attitude.pitch) == pytest.approx(-2.5)
+    fix = of_type(path, GpsFix)[1]
+    assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx((0.0, 10.0, -1.25), abs=1e-6)
+    assert fix.t == pytest.approx(5.2001)
+    assert fix.t_receiver == pytest.approx(2300 * 604800 + 1.2)
+    assert (fix.hdop, fix.speed_accuracy, fix.satellites) == (0.71, 0.25, 12)
+    assert (fix.latitude, fix.altitude) == (-35.3632621, 584.05)
+    named = {p.name: p.value for p in of_type(path, ParameterValue)}
+    assert named["INS_ACCSCAL_X"] == pytest.approx(0.15)
+    assert of_type(path, VehicleState)[0].armed is True
+
+
+def test_old_log_takes_the_boot_clock_of_gps_from_t(tmp_path):
+    path = saved(tmp_path, old_log())
+    fix = of_type(path, GpsFix)[0]
+    assert fix.t == pytest.approx(300.003)
+    assert fix.t_receiver == pytest.approx(1800 * 604800 + 400_000.0)
+    assert (fix.v_n, fix.v_d) == pytest.approx((-5.0, 0.5))
+    assert fix.altitude == 297.88
+    assert {s.imu for s in of_type(path, ImuSample)} == {1, 2}
+    assert of_type(path, Battery)[0].voltage == pytest.approx(16.4)
+    assert of_type(path, Throttle)[0].throttle == pytest.approx(0.55)
+    armed, disarmed = of_type(path, VehicleState)
+    assert (armed.t, armed.armed, disarmed.armed) == (300.0, True, False)
+    assert disarmed.t == pytest.approx(303.96, abs=0.2)
+
+
+def test_samples_keep_the_order_of_the_file(tmp_path):
+    t = [s.t for s in open_recording(saved(tmp_path, modern_log())).samples()]
+    assert t == sorted(t)
+
+
+def test_no_vertical_speed_where_the_receiver_has_none(tmp_path):
+    log = modern_log()
+    without = bytes(log).replace(
+        b"\x00\x00\xa0\xbf",
+        b"\x00\x00\x00\x00",  # VZ of -1.25
+    )
+    assert {f.v_d for f in of_type(saved(tmp_path, without), GpsFix)} == {None}
+
+
+def test_format_with_unknown_letter_is_stepped_over(tmp_path):
+    log = DataflashWriter()
+    log.format(60, "NEW", "Q?", "TimeUS,Odd", length=12)
+    log.data += b"\xa3\x95\x3c" + bytes(9)
+    whole = bytes(log) + bytes(modern_log())
+    recording = open_recording(saved(tmp_path, whole))
+    assert recording.damage == ()
+    assert recording.counts["IMU"] == 200
+
+
+def test_torn_record_costs_itself_only(tmp_path):
+    clean = bytes(modern_log())
+    index = index_dataflash(clean, WANTED)
+    imu = [k for k, f in enumerate(index.formats) if f.name == "IMU"]
+    place = int(index.offsets[np.isin(index.slots, imu)][50])
+    torn = clean[: place + 20] + clean[place + 40 :]
+    recording = open_recording(saved(tmp_path, torn))
+    assert recording.counts["IMU"] == 199
+    assert "damaged" in recording.damage[0]
+    assert all(abs(s.f_b[1] + 0.2) < 1e-6 for s in recording.samples() if isinstance(s, ImuSample))
+
+
+def test_garbage_in_the_middle_and_a_cut_end(tmp_path):
+    clean = bytes(modern_log())
+    middle = len(clean) // 2
+    index = index_dataflash(clean, WANTED)
+    place = int(index.offsets[index.offsets > middle][0])
+    dirty = clean[:place] + bytes(range(256)) * 7 + clean[place:-10]
+    recording = open_recording(saved(tmp_path, dirty))
+    assert recording.counts["IMU"] >= 199
+    assert len(recording.damage) == 2
+    assert "cut off" in recording.damage[1]
+
+
+def test_unused_end_of_a_flash_page_is_no_damage(tmp_path):
+    assert open_recording(saved(tmp_path, bytes(modern_log()) + b"\xff" * 300)).damage == ()
+
+
+def test_log_without_inertial_records_is_refused(tmp_path):
+    log = DataflashWriter()
+    log.format(14, "PARM", "QNff", "TimeUS,Name,Value,Default")
+    log.add("PARM", 5, "INS_ACCOFFS_X", 0.0, 0.0)
+    with pytest.raises(RecordingError, match="IMU"):
+        open_recording(saved(tmp_path, log))
