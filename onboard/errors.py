@@ -37,3 +37,9 @@ class StateError(OnboardError):
     """Saved state (sums, journal) that cannot be read: damaged or of another version."""
 
     exit_status = 2
+
+
+class RefusedError(OnboardError):
+    """What a person asked of the running service cannot be done now; says why."""
+
+    exit_status = 2

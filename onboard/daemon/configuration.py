@@ -1,0 +1,261 @@
+"""Configuration: one TOML file, one frozen record per section, defaults that work.
+
+Every value is checked when it is read, so that a mistake is one line that names file, section
+and key, and never a surprise in flight.  Unknown keys are mistakes too.
+"""
+
+from __future__ import annotations
+
+import difflib
+import ipaddress
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from onboard.errors import ConfigurationError
+
+Positive = Annotated[float, Meta(gt=0.0)]
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Rate = Annotated[float, Meta(ge=0.0, le=1000.0)]
+Port = Annotated[int, Meta(ge=0, le=65535)]
+SystemId = Annotated[int, Meta(ge=1, le=255)]
+ImuNumber = Annotated[int, Meta(ge=1, le=5)]
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of all sections."""
+
+
+class RatesSettings(Section, frozen=True, kw_only=True):
+    """Message rates to ask for (Hz); 0 leaves a stream as it is."""
+
+    imu: Rate = 50.0
+    attitude: Rate = 50.0
+    gps: Rate = 10.0
+    status: Rate = 2.0
+    regime: Rate = 4.0
+
+
+class LinkSettings(Section, frozen=True, kw_only=True):
+    """Where the autopilot is and how to speak to it.
+
+    ``endpoints`` are used side by side; a message is taken from whichever brings it first.
+    ``system_id`` 0 takes the first autopilot that is heard.
+    """
+
+    endpoints: Annotated[tuple[Text, ...], Meta(min_length=1)] = ("udpin:127.0.0.1:14550",)
+    system_id: Annotated[int, Meta(ge=0, le=255)] = 0
+    signing_key_file: Text | None = None
+    heartbeat_limit_s: Positive = 30.0
+    rates: RatesSettings = RatesSettings()
+
+
+class PushSettings(Section, frozen=True, kw_only=True):
+    """When the estimates may be written into the autopilot, and how far they may go.
+
+    The bounds only ever narrow what the autopilot documents (scale 0.8 ... 1.2, offset
+    3.5 m/s^2); the sigma limits are what an estimate must beat to be called good enough.
+    """
+
+    policy: Literal["never", "landed", "in_flight"] = "landed"
+    approval: bool = False
+    imus: tuple[ImuNumber, ...] = ()
+    disarmed_s: NotNegative = 5.0
+    scale_min: Annotated[float, Meta(ge=0.8, lt=1.0)] = 0.8
+    scale_max: Annotated[float, Meta(gt=1.0, le=1.2)] = 1.2
+    offset_max: Annotated[float, Meta(gt=0.0, le=3.5)] = 3.5
+    scale_sigma_max: Positive = 0.005
+    offset_sigma_max: Positive = 0.03
+    improvement: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.97
+    in_flight_scale_step: Annotated[float, Meta(gt=0.0, le=0.05)] = 0.005
+    in_flight_offset_step: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.05
+
+
+class EstimatorSettings(Section, frozen=True, kw_only=True):
+    """What the estimator is told beforehand; the rest it finds in the data."""
+
+    minimum_trusted_s: NotNegative = 60.0
+    save_every_s: Positive = 60.0
+
+
+class StateSettings(Section, frozen=True, kw_only=True):
+    """Where sums and journal live.
+
+    Without ``directory``: ``$STATE_DIRECTORY`` (set by systemd), else the user's state directory.
+    """
+
+    directory: Text | None = None
+
+    def path(self) -> Path:
+        """The directory in force."""
+        given = self.directory or os.environ.get("STATE_DIRECTORY", "").split(":")[0]
+        if given:
+            return Path(given).expanduser()
+        base = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
+        return Path(base).expanduser() / "onboard"
+
+
+class RecordingSettings(Section, frozen=True, kw_only=True):
+    """Whether to keep what the link brought, as .tlog files that ``onboard replay`` reads."""
+
+    enabled: bool = False
+    directory: Text | None = None
+    keep_files: Annotated[int, Meta(ge=1)] = 20
+    file_size_mb: Positive = 100.0
+
+
+class HttpSettings(Section, frozen=True, kw_only=True):
+    """Status page and local control API; port 0 takes a free one."""
+
+    enabled: bool = True
+    address: Text = "127.0.0.1"
+    port: Port = 8191
+    token: Text | None = None
+    token_file: Text | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what would leave the autopilot's parameters open to a network."""
+        if self.token is not None and self.token_file is not None:
+            raise ValueError("token and token_file exclude each other")
+        if self.enabled and not self.loopback and self.token is None and self.token_file is None:
+            raise ValueError(
+                f"address {self.address} is not loopback: give a token or a token_file, "
+                "it is asked for whatever changes state"
+            )
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only programs of this machine can connect."""
+        if self.address == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.address).is_loopback
+        except ValueError:
+            return False
+
+
+class MqttSettings(Section, frozen=True, kw_only=True):
+    """Broker to publish to; off by default."""
+
+    enabled: bool = False
+    host: Text = "127.0.0.1"
+    port: Port = 1883
+    prefix: Text | None = None
+    commands: bool = False
+    client_id: Text | None = None
+    username: Text | None = None
+    password_file: Text | None = None
+    tls: bool = False
+    ca_file: Text | None = None
+    certificate_file: Text | None = None
+    key_file: Text | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse contradictions."""
+        if (self.certificate_file is None) != (self.key_file is None):
+            raise ValueError("certificate_file and key_file belong together")
+        if not self.tls and (self.ca_file is not None or self.certificate_file is not None):
+            raise ValueError("ca_file and certificate_file need tls = true")
+
+
+class Configuration(Section, frozen=True, kw_only=True):
+    """The whole file; every section may be left out."""
+
+    link: LinkSettings = LinkSettings()
+    push: PushSettings = PushSettings()
+    estimator: EstimatorSettings = EstimatorSettings()
+    state: StateSettings = StateSettings()
+    recording: RecordingSettings = RecordingSettings()
+    http: HttpSettings = HttpSettings()
+    mqtt: MqttSettings = MqttSettings()
+
+
+def load(path: Path) -> Configuration:
+    """Read and check a configuration file.
+
+    Raises:
+        ConfigurationError: it cannot be read, is not TOML, or has a wrong key or value.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{path}: not UTF-8 text at byte {error.start}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(f"{path}: not TOML: {error}") from None
+    return from_mapping(document, source=str(path))
+
+
+def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:
+    """Check an already parsed document; ``source`` names it in errors.
+
+    Raises:
+        ConfigurationError: a wrong key or value, named by its path.
+    """
+    try:
+        return msgspec.convert(document, Configuration)
+    except msgspec.ValidationError as error:
+        raise ConfigurationError(f"{source}: {_explain(str(error))}") from None
+
+
+def read_secret(path: str, *, key: str) -> str:
+    """First line of a secret's own file.
+
+    Raises:
+        ConfigurationError: it cannot be read or is empty; ``key`` is named.
+    """
+    try:
+        lines = Path(path).expanduser().read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise ConfigurationError(f"{path} ({key}): {reason}") from None
+    if not lines or not lines[0].strip():
+        raise ConfigurationError(f"{path} ({key}): empty")
+    return lines[0].strip()
+
+
+def _explain(message: str) -> str:
+    """Msgspec's message turned into '[section] key: what is wrong'."""
+    what, _, where = message.partition(" - at `$")
+    names = [name for name in where.rstrip("`").replace("[", ".[").split(".") if name]
+    prefix = "Object contains unknown field `"
+    if what.startswith(prefix):
+        unknown = what[len(prefix) :].rstrip("`")
+        kind = "key" if names else "section"
+        return f"{_place([*names, unknown])}: unknown {kind}; {_suggestion(names, unknown)}"
+    if what.startswith("Invalid enum value"):
+        choices = ", ".join(str(value) for value in get_args(_kind(names)))
+        return f"{_place(names)}: {what[len('Invalid enum value ') :]} is not one of {choices}"
+    what = what.replace("`object`", "a table").replace("`array`", "a list")
+    return f"{_place(names)}: {what[:1].lower()}{what[1:]}"
+
+
+def _place(names: list[str]) -> str:
+    """TOML's way of naming a place: [table] key, list items as key[2]."""
+    items = "".join(name for name in names if name.startswith("["))
+    plain = [name for name in names if not name.startswith("[")]
+    if len(plain) == 1:
+        return f"[{plain[0]}]"
+    return f"[{'.'.join(plain[:-1])}] {plain[-1]}{items}"
+
+
+def _kind(names: list[str]) -> object:
+    """The declared type of the field at a path."""
+    kind: Any = Configuration
+    for name in names:
+        kind = get_type_hints(kind)[name]
+    return kind
+
+
+def _suggestion(names: list[str], unknown: str) -> str:
+    """The nearest key that exists there, if one is near, else all of them."""
+    table: Any = _kind(names)
+    known = [field.name for field in msgspec.structs.fields(table)]
+    near = difflib.get_close_matches(unknown, known, n=1)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"

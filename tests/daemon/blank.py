@@ -1,0 +1,43 @@
+"""A snapshot of a service that has heard nothing yet, for tests that only need some snapshot."""
+
+from onboard.daemon.snapshot import LinkView, PushView, Snapshot, TrustView
+
+
+def blank_snapshot(*, uptime_s: float = 0.0) -> Snapshot:
+    return Snapshot(
+        version="0",
+        time=0.0,
+        uptime_s=uptime_s,
+        phase="connecting",
+        mode="active",
+        mode_reason="",
+        link=LinkView(
+            state="connecting",
+            endpoints=("udpin:127.0.0.1:14550",),
+            signed=False,
+            heartbeat_age_s=None,
+            system_id=None,
+            component_id=None,
+            autopilot=None,
+            vehicle=None,
+            armed=None,
+            landed=None,
+            messages={},
+            counters={},
+        ),
+        trust=TrustView(open=False, reasons=(), windows=0, trusted_s=0.0, rejected={}),
+        imus=(),
+        push=PushView(
+            policy="landed",
+            approval_required=False,
+            approval_needed=False,
+            state="idle",
+            active_imu=None,
+            proposals=(),
+            last_outcome=None,
+            can_roll_back=(),
+        ),
+        parameters={},
+        journal=(),
+        counters={},
+    )

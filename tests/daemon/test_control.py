@@ -1,0 +1,234 @@
+"""The control API over real sockets on loopback."""
+
+import asyncio
+from contextlib import asynccontextmanager
+
+import aiohttp
+import pytest
+from blank import blank_snapshot
+
+from onboard.daemon.control import VIEWERS_MAX, ControlServer
+from onboard.daemon.snapshot import Snapshot
+from onboard.errors import ConfigurationError, RefusedError
+
+TOKEN = "open"
+CHANGES = ("approve", "reject", "rollback", "reset")
+
+
+class Recorded:
+    """Actions that only write down what was asked."""
+
+    def __init__(self):
+        self.asked = []
+        self.ticks = 0
+        self.failure = None
+
+    def snapshot(self):
+        self.ticks += 1
+        return blank_snapshot(uptime_s=float(self.ticks))
+
+    async def _ask(self, what, imus):
+        if self.failure is not None:
+            raise self.failure
+        self.asked.append((what, imus))
+        return f"{what} done"
+
+    async def approve(self, imus):
+        return await self._ask("approve", imus)
+
+    async def reject(self, imus):
+        return await self._ask("reject", imus)
+
+    async def rollback(self, imus):
+        return await self._ask("rollback", imus)
+
+    async def reset(self, imus):
+        return await self._ask("reset", imus)
+
+
+@asynccontextmanager
+async def serving(*, token=None, pages=()):
+    actions = Recorded()
+    server = ControlServer(actions, address="127.0.0.1", port=0, token=token, pages=pages)
+    await server.start()
+    try:
+        async with aiohttp.ClientSession(server.url) as client:
+            yield server, actions, client
+    finally:
+        await server.stop()
+
+
+async def error_of(response):
+    return (await response.json())["error"]
+
+
+async def test_the_snapshot_is_one_json_object_that_reads_back():
+    async with serving() as (_, _, client), client.get("/api/snapshot") as response:
+        assert response.status == 200
+        assert response.content_type == "application/json"
+        assert Snapshot.from_json(await response.read()) == blank_snapshot(uptime_s=1.0)
+
+
+@pytest.mark.parametrize("action", CHANGES)
+async def test_actions_reach_the_service_with_their_accelerometers(action):
+    async with serving() as (_, actions, client):
+        async with client.post(f"/api/{action}", json={"imus": [2, 1]}) as response:
+            assert (response.status, await response.json()) == (200, {"done": f"{action} done"})
+        async with client.post(f"/api/{action}", json={}) as response:
+            assert response.status == 200
+        assert actions.asked == [(action, (2, 1)), (action, ())]
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ('{"imu": [1]}', "imu"),
+        ('{"imus": [9]}', "imus[0]"),
+        ('{"imus": "all"}', "imus"),
+        ("[1]", None),
+        ("{", None),
+        ("\xff", None),
+    ],
+)
+async def test_a_wrong_body_is_400_and_names_the_field(body, field):
+    async with serving() as (_, actions, client):
+        headers = {"Content-Type": "application/json"}
+        async with client.post("/api/approve", data=body, headers=headers) as response:
+            error = await error_of(response)
+            assert (response.status, error["status"]) == (400, 400)
+            assert error.get("field") == field
+            assert error["message"]
+        assert actions.asked == []
+
+
+async def test_what_cannot_be_done_now_is_409_with_the_reason():
+    async with serving() as (_, actions, client):
+        actions.failure = RefusedError("nothing waits for approval")
+        async with client.post("/api/approve", json={}) as response:
+            assert response.status == 409
+            assert (await error_of(response))["message"] == "nothing waits for approval"
+
+
+async def test_a_failure_of_ours_is_500_json_and_keeps_its_details_to_the_log(caplog):
+    async with serving() as (_, actions, client):
+        actions.failure = ZeroDivisionError("secret")
+        async with client.post("/api/approve", json={}) as response:
+            assert response.status == 500
+            assert "secret" not in await response.text()
+        assert "secret" in caplog.text
+
+
+@pytest.mark.parametrize("action", CHANGES)
+@pytest.mark.parametrize("authorization", [None, "Bearer wrong", "Basic open", "Bearer"])
+async def test_a_wrong_token_is_401_and_changes_nothing(action, authorization):
+    headers = {} if authorization is None else {"Authorization": authorization}
+    async with serving(token=TOKEN) as (_, actions, client):
+        async with client.post(f"/api/{action}", json={}, headers=headers) as response:
+            assert response.status == 401
+            assert (await error_of(response))["status"] == 401
+        assert actions.asked == []
+
+
+async def test_the_right_token_acts_and_reading_needs_none():
+    async with serving(token=TOKEN) as (_, actions, client):
+        headers = {"Authorization": "Bearer open"}
+        async with client.post("/api/approve", json={}, headers=headers) as response:
+            assert response.status == 200
+        async with client.get("/api/snapshot") as response:
+            assert response.status == 200
+        assert actions.asked == [("approve", ())]
+
+
+async def test_a_foreign_page_in_the_operators_browser_can_do_nothing():
+    async with serving() as (server, actions, client):
+        for headers in ({"Origin": "http://evil.example"}, {"Host": "rebound.example"}):
+            async with client.post("/api/approve", json={}, headers=headers) as response:
+                assert response.status == 403
+            with pytest.raises(aiohttp.WSServerHandshakeError):
+                await client.ws_connect("/api/live", headers=headers)
+        # a form needs no preflight, so it must not be understood
+        async with client.post("/api/approve", data={"imus": "1"}) as response:
+            assert response.status == 415
+        async with client.post("/api/approve", json={}, headers={"Origin": server.url}) as response:
+            assert response.status == 200
+        assert actions.asked == [("approve", ())]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [("GET", "/api/nothing", 404), ("GET", "/api/approve", 405), ("POST", "/api/snapshot", 405)],
+)
+async def test_other_mistakes_are_json_too(method, path, status):
+    async with serving() as (_, _, client), client.request(method, path, json={}) as response:
+        assert response.status == status
+        assert (await error_of(response))["status"] == status
+
+
+async def test_live_sends_one_at_once_then_one_per_publication_to_every_viewer():
+    async with serving() as (server, _, client):
+        viewers = [await client.ws_connect("/api/live") for _ in range(2)]
+        first = [Snapshot.from_json((await v.receive_str()).encode()) for v in viewers]
+        assert {snapshot.uptime_s for snapshot in first} == {1.0, 2.0}
+        for expected in (3.0, 4.0):
+            server.publish()
+            for viewer in viewers:
+                snapshot = Snapshot.from_json((await viewer.receive_str()).encode())
+                assert snapshot.uptime_s == expected
+        for viewer in viewers:
+            await viewer.close()
+
+
+async def test_without_viewers_no_snapshot_is_built():
+    async with serving() as (server, actions, _):
+        server.publish()
+        assert actions.ticks == 0
+
+
+async def test_viewers_are_bounded_and_leaving_makes_room():
+    async with serving() as (_, _, client):
+        viewers = [await client.ws_connect("/api/live") for _ in range(VIEWERS_MAX)]
+        with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+            await client.ws_connect("/api/live")
+        assert refused.value.status == 503
+        await viewers.pop().close()
+        async with asyncio.timeout(20):
+            while (viewer := await _viewer(client)) is None:
+                pass
+        await viewer.close()
+
+
+async def _viewer(client):
+    try:
+        return await client.ws_connect("/api/live")
+    except aiohttp.WSServerHandshakeError:
+        return None
+
+
+async def test_stopping_says_goodbye_to_viewers():
+    async with serving() as (server, _, client):
+        viewer = await client.ws_connect("/api/live")
+        await viewer.receive_str()
+        stopping = asyncio.create_task(server.stop())
+        message = await viewer.receive()
+        assert message.type == aiohttp.WSMsgType.CLOSE
+        assert viewer.close_code == aiohttp.WSCloseCode.GOING_AWAY
+        await stopping
+
+
+async def test_a_taken_port_is_one_line():
+    async with serving() as (server, actions, _):
+        port = int(server.url.rsplit(":", 1)[1])
+        other = ControlServer(actions, address="127.0.0.1", port=port)
+        with pytest.raises(ConfigurationError, match=rf"\[http\] 127.0.0.1:{port}: .*in use"):
+            await other.start()
+
+
+async def test_pages_are_added_as_handlers():
+    def page(application):
+        async def hello(_request):
+            return aiohttp.web.Response(text="hello")
+
+        application.router.add_get("/", hello)
+
+    async with serving(pages=[page]) as (_, _, client), client.get("/") as response:
+        assert await response.text() == "hello"

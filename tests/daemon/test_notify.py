@@ -1,0 +1,57 @@
+"""What the service manager hears, on a real datagram socket."""
+
+import os
+import socket
+
+import pytest
+
+from onboard.daemon.notify import Notifier, watchdog_interval
+
+
+@pytest.fixture
+def manager(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(str(tmp_path / "notify"))
+        receiver.settimeout(5.0)
+        yield receiver
+
+
+def test_fields_arrive_in_one_datagram(manager, monkeypatch):
+    monkeypatch.setenv("NOTIFY_SOCKET", manager.getsockname())
+    Notifier.from_environment().send(READY="1", STATUS="calibrating")
+    assert manager.recv(4096) == b"READY=1\nSTATUS=calibrating"
+
+
+def test_abstract_sockets_are_understood():
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(f"\0onboard-test-{os.getpid()}")
+        receiver.settimeout(5.0)
+        Notifier(f"@onboard-test-{os.getpid()}").send(WATCHDOG="1")
+        assert receiver.recv(4096) == b"WATCHDOG=1"
+
+
+@pytest.mark.parametrize("address", [None, "", "nowhere/at/all"])
+def test_without_a_manager_nothing_happens(address):
+    Notifier(address).send(READY="1")
+
+
+@pytest.mark.parametrize(
+    ("usec", "pid", "expected"),
+    [
+        ("30000000", None, 30.0),
+        ("30000000", "own", 30.0),
+        ("30000000", "1", None),
+        ("0", None, None),
+        ("soon", None, None),
+        (None, None, None),
+    ],
+)
+def test_the_watchdog_interval_is_the_managers_and_for_this_process(
+    monkeypatch, usec, pid, expected
+):
+    for name, value in (("WATCHDOG_USEC", usec), ("WATCHDOG_PID", pid)):
+        if value is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, str(os.getpid()) if value == "own" else value)
+    assert watchdog_interval() == expected
