@@ -7,6 +7,7 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
@@ -97,10 +98,10 @@ def record_times(form: Format, records: Records) -> Floats | None:
 
 
 def receiver_of(form: Format, records: Records) -> list[int]:
-    """(n,) number of the GPS receiver, from 0."""
+    """(n,) number of the GPS receiver, from 1."""
     if form.has("I"):
-        return [int(i) for i in records["I"]]
-    return [1 if form.name.endswith("2") else 0] * len(records)
+        return [int(i) + 1 for i in records["I"]]
+    return [2 if form.name.endswith("2") else 1] * len(records)
 
 
 def imu(batch: Batch, _context: Context) -> Converted:
@@ -145,8 +146,8 @@ def gps(batch: Batch, context: Context) -> Converted:
                 t=t,
                 receiver=receiver,
                 fix_type=status[k],
-                latitude=lat[k],
-                longitude=lng[k],
+                latitude=math.radians(lat[k]),
+                longitude=math.radians(lng[k]),
                 altitude=alt[k],
                 v_n=v_n[k],
                 v_e=v_e[k],

@@ -7,6 +7,7 @@ from pathlib import Path
 from onboard.errors import RecordingError
 from onboard.recordings.dataflash import is_dataflash, open_dataflash
 from onboard.recordings.recording import Recording
+from onboard.recordings.ulog import is_ulog, open_ulog
 
 HEAD_LENGTH = 65536
 
@@ -31,6 +32,8 @@ def open_recording(path: str | Path) -> Recording:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
     if not head:
         raise RecordingError(f"{path}: is empty")
+    if is_ulog(head):
+        return open_ulog(path)
     if is_dataflash(head):
         return open_dataflash(path)
     raise RecordingError(f"{path}: not a .tlog, DataFlash .BIN or .ulg recording")

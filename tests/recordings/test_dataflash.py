@@ -90,7 +90,7 @@ def test_modern_log_in_si_units(tmp_path):
     assert fix.t == pytest.approx(5.2001)
     assert fix.t_receiver == pytest.approx(2300 * 604800 + 1.2)
     assert (fix.hdop, fix.speed_accuracy, fix.satellites) == (0.71, 0.25, 12)
-    assert (fix.latitude, fix.altitude) == (-35.3632621, 584.05)
+    assert (fix.latitude, fix.altitude) == (math.radians(-35.3632621), 584.05)
     named = {p.name: p.value for p in of_type(path, ParameterValue)}
     assert named["INS_ACCSCAL_X"] == pytest.approx(0.15)
     assert of_type(path, VehicleState)[0].armed is True
