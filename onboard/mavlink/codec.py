@@ -1,0 +1,246 @@
+"""MAVLink as a sans-IO codec: bytes to frames and messages, messages to bytes.
+
+Frames are found and verified here; pymavlink builds and packs the message objects.  Its own
+parser is not used because after a false start it throws the whole supposed frame away, up
+to 280 bytes and several good messages with it, where this one resumes one byte later; and
+because messages that nobody wants need never become objects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.mavlink.dialect import COMPONENT, Message, mavlink
+from onboard.mavlink.signing import Signing
+
+MAGIC_V1 = 0xFE
+MAGIC_V2 = 0xFD
+FLAG_SIGNED = 0x01
+SIGNATURE_LENGTH = 13
+SHORTEST_FRAME = 8
+REORDERING = 16
+"""A sequence number at most this far behind is a late packet; further back, packets were lost."""
+
+
+class Frame(NamedTuple):
+    """One verified packet.  ``message`` is None where nobody wants it or the dialect lacks it."""
+
+    raw: bytes
+    message_id: int
+    system: int
+    component: int
+    message: Message | None
+
+
+@dataclass(slots=True)
+class SourceStatistics:
+    """Packets of one system and component, by sequence number."""
+
+    received: int = 0
+    lost: int = 0
+    late: int = 0
+    duplicated: int = 0
+    last: int = -1
+
+    def count(self, sequence: int) -> None:
+        """Take note of the next packet's sequence number (0 ... 255)."""
+        self.received += 1
+        if self.last < 0:
+            self.last = sequence
+            return
+        gap = (sequence - self.last - 1) & 0xFF
+        if gap == 0xFF:
+            self.duplicated += 1
+        elif gap >= 0x100 - REORDERING:
+            self.late += 1
+            self.lost = max(0, self.lost - 1)
+        else:
+            self.lost += gap
+            self.last = sequence
+
+
+@dataclass(slots=True)
+class CodecStatistics:
+    """What one codec has seen.  ``bad_bytes`` belonged to no valid frame."""
+
+    bytes_received: int = 0
+    frames: int = 0
+    bad_bytes: int = 0
+    bad_frames: int = 0
+    bad_signatures: int = 0
+    unknown: int = 0
+    sent: int = 0
+    sources: dict[tuple[int, int], SourceStatistics] = field(default_factory=dict)
+
+
+class Codec:
+    """Framing, verification and packing for one connection.
+
+    Args:
+        system: our system id; may be changed later (it is to be the vehicle's).
+        component: our component id.
+        wanted: message numbers worth building objects for; None for all.
+        signing: verify what comes and sign what goes; None for plain MAVLink 2.
+        link_id: this connection's id within signatures.
+    """
+
+    def __init__(
+        self,
+        *,
+        system: int = 1,
+        component: int = COMPONENT,
+        wanted: frozenset[int] | None = None,
+        signing: Signing | None = None,
+        link_id: int = 0,
+    ) -> None:
+        self.wanted = wanted
+        self.statistics = CodecStatistics()
+        self._buffer = bytearray()
+        self._signing = signing
+        self._decoder = mavlink.MAVLink(None)
+        self._encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+        if signing is not None:
+            self._encoder.signing.secret_key = signing.key
+            self._encoder.signing.link_id = link_id
+            self._encoder.signing.sign_outgoing = True
+
+    @property
+    def system(self) -> int:
+        """Our system id."""
+        return int(self._encoder.srcSystem)
+
+    @system.setter
+    def system(self, system: int) -> None:
+        self._encoder.srcSystem = system
+
+    def encode(self, message: Message) -> bytes:
+        """Pack a message as MAVLink 2 under our ids and the next sequence number."""
+        encoder = self._encoder
+        if self._signing is not None:
+            encoder.signing.timestamp = self._signing.next_timestamp()
+        frame = bytes(message.pack(encoder))
+        encoder.seq = (encoder.seq + 1) & 0xFF
+        self.statistics.sent += 1
+        return frame
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take bytes as they come; return the frames that they complete.  Never raises on data."""
+        statistics = self.statistics
+        statistics.bytes_received += len(data)
+        buffer = self._buffer
+        buffer += data
+        end = len(buffer)
+        frames: list[Frame] = []
+        position = 0
+        while end - position >= SHORTEST_FRAME:
+            length = _frame_length(buffer, position)
+            if length == 0:
+                start = _next_magic(buffer, position + 1)
+                statistics.bad_bytes += start - position
+                position = start
+                continue
+            if position + length > end:
+                break
+            frame = self._open(buffer, position, length)
+            if frame is None:
+                statistics.bad_bytes += 1
+                position += 1
+                continue
+            position += length
+            if frame.message_id >= 0:
+                self._count(frame)
+                frames.append(frame)
+        del buffer[:position]
+        return frames
+
+    def _open(self, buffer: bytearray, start: int, length: int) -> Frame | None:
+        """Verify one supposed frame.  None: not a frame; message id -1: refused."""
+        raw = bytes(buffer[start : start + length])
+        statistics = self.statistics
+        if raw[0] == MAGIC_V2:
+            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
+            system, component = raw[5], raw[6]
+            signed = raw[2] & FLAG_SIGNED
+        else:
+            message_id, system, component, signed = raw[5], raw[3], raw[4], 0
+        kind = mavlink.mavlink_map.get(message_id)
+        if kind is None:
+            if not _is_credible(buffer, start, length):
+                return None
+            statistics.unknown += 1
+            return Frame(raw, message_id, system, component, None)
+        if not _checksum_holds(raw, kind.crc_extra, signed=bool(signed)):
+            statistics.bad_frames += 1
+            return None
+        signing = self._signing
+        if signing is not None and not (
+            signing.verify(raw) if signed else signing.accepts_unsigned(message_id)
+        ):
+            statistics.bad_signatures += 1
+            return Frame(raw, -1, system, component, None)
+        message = None
+        if self.wanted is None or message_id in self.wanted:
+            try:
+                message = self._decoder.decode(bytearray(raw))
+            except mavlink.MAVError:
+                # The checksum held, so the sender meant it: a payload that our dialect's
+                # definition cannot hold.  Pass it on as a frame without a message.
+                statistics.unknown += 1
+        return Frame(raw, message_id, system, component, message)
+
+    def _count(self, frame: Frame) -> None:
+        statistics = self.statistics
+        statistics.frames += 1
+        key = (frame.system, frame.component)
+        source = statistics.sources.get(key)
+        if source is None:
+            source = statistics.sources[key] = SourceStatistics()
+        raw = frame.raw
+        source.count(raw[4] if raw[0] == MAGIC_V2 else raw[2])
+
+
+def _frame_length(buffer: bytearray, start: int) -> int:
+    """Length of the frame that would start here (at least 3 bytes are there), 0 if none can."""
+    magic = buffer[start]
+    if magic == MAGIC_V2:
+        flags = buffer[start + 2]
+        if flags & ~FLAG_SIGNED:
+            return 0
+        return buffer[start + 1] + (12 + SIGNATURE_LENGTH if flags else 12)
+    return buffer[start + 1] + 8 if magic == MAGIC_V1 else 0
+
+
+def _next_magic(buffer: bytearray, start: int) -> int:
+    """Where the next byte is that may start a frame, or the end of the buffer."""
+    places = [i for i in (buffer.find(MAGIC_V2, start), buffer.find(MAGIC_V1, start)) if i >= 0]
+    return min(places, default=len(buffer))
+
+
+def _checksum_holds(raw: bytes, crc_extra: int, *, signed: bool) -> bool:
+    end = len(raw) - (2 + SIGNATURE_LENGTH if signed else 2)
+    crc = mavlink.x25crc(raw[1:end] + bytes((crc_extra,))).crc
+    return bool(crc == raw[end] | raw[end + 1] << 8)
+
+
+def _is_credible(buffer: bytearray, start: int, length: int) -> bool:
+    """Whether a message that the dialect lacks, hence of unknown checksum, really is a frame.
+
+    It is taken for one when another frame or the end of what has come follows it, and no
+    frame that can be verified starts inside it.
+    """
+    end = start + length
+    if end < len(buffer) and buffer[end] not in (MAGIC_V1, MAGIC_V2):
+        return False
+    inner = _next_magic(buffer, start + 1)
+    while inner < end and len(buffer) - inner >= SHORTEST_FRAME:
+        span = _frame_length(buffer, inner)
+        raw = bytes(buffer[inner : inner + span])
+        if span and len(raw) == span:
+            number = raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else raw[5]
+            kind = mavlink.mavlink_map.get(number)
+            signed = raw[0] == MAGIC_V2 and bool(raw[2] & FLAG_SIGNED)
+            if kind is not None and _checksum_holds(raw, kind.crc_extra, signed=signed):
+                return False
+        inner = _next_magic(buffer, inner + 1)
+    return True

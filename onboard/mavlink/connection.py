@@ -1,0 +1,187 @@
+"""One endpoint kept open: reconnection as an explicit state machine with full-jitter back-off."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Callable
+from enum import Enum
+
+from onboard.mavlink.codec import Codec
+from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.transport import DEFAULT_LINGER_S, Transport, open_transport
+
+BACKOFF_BASE_S = 0.5
+BACKOFF_CAP_S = 15.0
+"""A USB autopilot is back some seconds after a reboot; waiting longer than this loses flight."""
+STABLE_S = 10.0
+"""A connection that held this long starts the back-off from the beginning."""
+SILENCE_S = 15.0
+"""A TCP or serial line without one byte for so long is dead, whatever the system says."""
+
+
+class ConnectionState(Enum):
+    """Where a connection is in its life."""
+
+    IDLE = "idle"
+    CONNECTING = "connecting"
+    UP = "up"
+    WAITING = "waiting"
+    CLOSED = "closed"
+
+
+_S = ConnectionState
+TRANSITIONS: dict[ConnectionState, frozenset[ConnectionState]] = {
+    _S.IDLE: frozenset({_S.CONNECTING, _S.CLOSED}),
+    _S.CONNECTING: frozenset({_S.UP, _S.WAITING, _S.CLOSED}),
+    _S.UP: frozenset({_S.WAITING, _S.CLOSED}),
+    _S.WAITING: frozenset({_S.CONNECTING, _S.CLOSED}),
+    _S.CLOSED: frozenset(),
+}
+
+
+class Backoff:
+    """Full jitter: the n-th wait is uniform between 0 and ``min(cap, base 2^n)``."""
+
+    def __init__(
+        self, rng: random.Random, base: float = BACKOFF_BASE_S, cap: float = BACKOFF_CAP_S
+    ) -> None:
+        self._rng = rng
+        self._base = base
+        self._cap = cap
+        self._attempt = 0
+
+    def next(self) -> float:
+        """How long to wait now, s."""
+        ceiling = min(self._cap, self._base * 2.0 ** min(self._attempt, 30))
+        self._attempt += 1
+        return self._rng.uniform(0.0, ceiling)
+
+    def reset(self) -> None:
+        """Start again from the base."""
+        self._attempt = 0
+
+
+class Connection:
+    """Keeps one endpoint open for as long as :meth:`run` runs.
+
+    Args:
+        endpoint: where to.
+        codec: framing for this connection.
+        receive: called with (connection, bytes).
+        changed: called with (connection, reason) after each change of state.
+        clock: monotonic time, s.
+        rng: source of the jitter.
+        linger: see :mod:`onboard.mavlink.transport`.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        codec: Codec,
+        *,
+        receive: Callable[[Connection, bytes], None],
+        changed: Callable[[Connection, str], None],
+        clock: Callable[[], float],
+        rng: random.Random,
+        linger: float = DEFAULT_LINGER_S,
+    ) -> None:
+        self.endpoint = endpoint
+        self.codec = codec
+        self.state = ConnectionState.IDLE
+        self.last_error = ""
+        self.connects = 0
+        self.dropped = 0
+        self.last_received: float | None = None
+        self._receive = receive
+        self._changed = changed
+        self._clock = clock
+        self._linger = linger
+        self._backoff = Backoff(rng)
+        self._transport: Transport | None = None
+        self._broken: asyncio.Future[str] | None = None
+
+    @property
+    def is_up(self) -> bool:
+        """Whether bytes can flow."""
+        return self.state is ConnectionState.UP
+
+    def write(self, data: bytes) -> None:
+        """Send if the connection is up; count the loss if not."""
+        if self._transport is None:
+            self.dropped += 1
+        else:
+            self._transport.write(data)
+
+    def check(self, now: float) -> None:
+        """Break a TCP or serial line that has been silent for too long."""
+        if (
+            self.endpoint.kind in (EndpointKind.TCP, EndpointKind.SERIAL)
+            and self.last_received is not None
+            and self.is_up
+            and now - self.last_received > SILENCE_S
+        ):
+            self._lost(f"nothing received for {SILENCE_S:.0f} s")
+
+    async def run(self) -> None:
+        """Connect, and connect again, until cancelled.
+
+        Raises:
+            EndpointError: the endpoint cannot be opened at all (not once it has been up).
+        """
+        try:
+            while True:
+                reason = await self._connect_once()
+                self.last_error = reason
+                self._enter(ConnectionState.WAITING, reason)
+                await asyncio.sleep(self._backoff.next())
+        finally:
+            self._drop_transport()
+            self._enter(ConnectionState.CLOSED, "")
+
+    async def _connect_once(self) -> str:
+        """One connection from opening to its end; the reason of the end."""
+        self._enter(ConnectionState.CONNECTING, "")
+        broken = self._broken = asyncio.get_running_loop().create_future()
+        try:
+            self._transport = await open_transport(
+                self.endpoint, self._received, self._lost, linger=self._linger
+            )
+        except EndpointError as error:
+            if not self.connects:
+                raise
+            return str(error)
+        except TimeoutError:
+            return "timed out"
+        except OSError as error:
+            return error.strerror or str(error)
+        self.connects += 1
+        since = self.last_received = self._clock()
+        self._enter(ConnectionState.UP, "")
+        try:
+            reason: str = await broken
+        finally:
+            self._drop_transport()
+        if self._clock() - since >= STABLE_S:
+            self._backoff.reset()
+        return reason
+
+    def _received(self, data: bytes) -> None:
+        self.last_received = self._clock()
+        self._receive(self, data)
+
+    def _lost(self, reason: str) -> None:
+        if self._broken is not None and not self._broken.done():
+            self._broken.set_result(reason)
+
+    def _drop_transport(self) -> None:
+        if self._transport is not None:
+            self.dropped += self._transport.dropped
+            self._transport.close()
+            self._transport = None
+
+    def _enter(self, state: ConnectionState, reason: str) -> None:
+        if state not in TRANSITIONS[self.state]:
+            raise RuntimeError(f"{self.endpoint}: no way from {self.state} to {state}")
+        self.state = state
+        self._changed(self, reason)

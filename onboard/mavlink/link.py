@@ -1,0 +1,366 @@
+"""The link: several endpoints, one autopilot, messages handed to whoever asked for them."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import TypeAlias
+
+from onboard.errors import LinkError
+from onboard.mavlink.autopilot import (
+    Autopilot,
+    AutopilotFound,
+    AutopilotRebooted,
+    AutopilotReturned,
+    AutopilotSilent,
+    AutopilotState,
+    ConnectionChanged,
+    LinkEvent,
+    Participant,
+)
+from onboard.mavlink.bootclock import BootClock
+from onboard.mavlink.codec import Codec, Frame
+from onboard.mavlink.connection import Connection
+from onboard.mavlink.decode import is_autopilot
+from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink, message_ids
+from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.signing import Signing
+from onboard.mavlink.transport import DEFAULT_LINGER_S
+
+Handler: TypeAlias = Callable[[float, Message], None]
+EventHandler: TypeAlias = Callable[[float, LinkEvent], None]
+
+TICK_S = 0.1
+HEARTBEAT_INTERVAL_S = 1.0
+HEARTBEAT_TIMEOUT_S = 5.0
+"""Five heartbeats missed; ArduPilot's own measure for losing a ground station."""
+FAILOVER_S = 1.5
+"""Silence on the endpoint in use after which another one that hears the autopilot takes over."""
+ITERATOR_LIMIT = 10_000
+_HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+_CLOCK_NAMES = ("SYSTEM_TIME", "ATTITUDE", "RAW_IMU")
+"""Messages that the link itself reads boot time from, to notice a reboot."""
+
+
+class Link:
+    """MAVLink over any number of endpoints.
+
+    Handlers run in the loop's reader callback, so they must be quick and must not block; an
+    exception in one ends :meth:`run` with it.  Where the autopilot is heard on several
+    endpoints, one is in use and the others stand by.
+
+    Args:
+        endpoints: where to listen and connect.
+        system: the vehicle's system id if only that one is to be used; None takes the first
+            autopilot heard, and its system id becomes ours.
+        signing: sign and verify; None for plain MAVLink 2.
+        recorder: gets every frame handed on and every frame sent.
+        clock: monotonic time, s; what handlers and participants get as ``now``.
+        wall_clock: unix time, s, for the recording.
+        rng: jitter of the back-off.
+        linger: longest delay of a message for the sake of fewer wake-ups, s.
+    """
+
+    def __init__(
+        self,
+        endpoints: Sequence[Endpoint],
+        *,
+        system: int | None = None,
+        signing: Signing | None = None,
+        recorder: Recorder | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        wall_clock: Callable[[], float] = time.time,
+        rng: random.Random | None = None,
+        linger: float = DEFAULT_LINGER_S,
+    ) -> None:
+        self.autopilot: Autopilot | None = None
+        self.state = AutopilotState.SEARCHING
+        self.boot_clock = BootClock()
+        self.echoed = 0
+        self.standby = 0
+        self.iterator_dropped = 0
+        self._expected_system = system
+        self._recorder = recorder
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._wanted = frozenset((_HEARTBEAT,))
+        jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
+        self.connections = tuple(
+            Connection(
+                endpoint,
+                Codec(system=system or 1, wanted=self._wanted, signing=signing, link_id=number),
+                receive=self._received,
+                changed=self._connection_changed,
+                clock=clock,
+                rng=jitter,
+                linger=linger,
+            )
+            for number, endpoint in enumerate(endpoints)
+        )
+        self._handlers: dict[int, tuple[Handler, ...]] = {}
+        self._event_handlers: list[EventHandler] = []
+        self._participants: list[Participant] = []
+        self._routes: dict[tuple[int, int], Connection] = {}
+        self._source: tuple[int, int] | None = None
+        self._own = (system or 1, COMPONENT)
+        self._active: Connection | None = None
+        self._heard = 0.0
+        self._heartbeat_at = 0.0
+        self._next_beat = 0.0
+        self._found = asyncio.Event()
+        self._stopped: asyncio.Future[None] | None = None
+        self._closed = False
+        self.subscribe(self._watch_boot_clock, _CLOCK_NAMES)
+
+    # Who gets what
+
+    def subscribe(self, handler: Handler, names: Iterable[str]) -> None:
+        """Have ``handler(now, message)`` called for each of these messages, in order of arrival.
+
+        Raises:
+            ValueError: the dialect has no such message.
+        """
+        for number in message_ids(names):
+            self._handlers[number] = (*self._handlers.get(number, ()), handler)
+            self._wanted |= {number}
+        for connection in self.connections:
+            connection.codec.wanted = self._wanted
+
+    def subscribe_events(self, handler: EventHandler) -> None:
+        """Have ``handler(now, event)`` called for what happens to autopilot and connections."""
+        self._event_handlers.append(handler)
+
+    def attach(self, participant: Participant) -> None:
+        """Drive a sans-IO protocol: feed it, poll it, send what it returns."""
+        self._participants.append(participant)
+
+        def feed(now: float, message: Message) -> None:
+            for answer in participant.feed(message, now):
+                self.send(answer)
+
+        self.subscribe(feed, participant.names)
+        if self.autopilot is not None:
+            participant.start(self.autopilot.system, self.autopilot.component, self._clock())
+
+    async def messages(self, names: Iterable[str]) -> AsyncIterator[tuple[float, Message]]:
+        """Iterate over (receive time, message); the oldest are dropped when nobody keeps up."""
+        queue: deque[tuple[float, Message]] = deque(maxlen=ITERATOR_LIMIT)
+        ready = asyncio.Event()
+
+        def put(now: float, message: Message) -> None:
+            if len(queue) == ITERATOR_LIMIT:
+                self.iterator_dropped += 1
+            queue.append((now, message))
+            ready.set()
+
+        self.subscribe(put, names)
+        try:
+            while True:
+                await ready.wait()
+                while queue:
+                    yield queue.popleft()
+                ready.clear()
+        finally:
+            self._unsubscribe(put)
+
+    def _unsubscribe(self, handler: Handler) -> None:
+        for number, handlers in self._handlers.items():
+            self._handlers[number] = tuple(h for h in handlers if h is not handler)
+
+    # Life
+
+    async def run(self) -> None:
+        """Keep the link until :meth:`close` or cancellation.
+
+        Raises:
+            EndpointError: an endpoint cannot be opened at all (port in use, no permission).
+            Exception: whatever a handler raised.
+        """
+        self._stopped = asyncio.get_running_loop().create_future()
+        if self._closed:
+            self._stopped.set_result(None)
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [
+                    group.create_task(connection.run(), name=f"link {connection.endpoint}")
+                    for connection in self.connections
+                ]
+                tasks.append(group.create_task(self._tick_forever(), name="link tick"))
+                if self._recorder is not None:
+                    recording = self._recorder.run()
+                    tasks.append(group.create_task(recording, name="link recorder"))
+                await self._stopped
+                for task in tasks:
+                    task.cancel()
+        except BaseExceptionGroup as failures:
+            raise failures.exceptions[0] from None
+
+    def close(self) -> None:
+        """Let :meth:`run` end: connections close, the recording is written out."""
+        self._closed = True
+        if self._stopped is not None and not self._stopped.done():
+            self._stopped.set_result(None)
+
+    async def wait_autopilot(self, timeout: float) -> Autopilot:  # noqa: ASYNC109 - the error names every endpoint's state
+        """The autopilot, once it is heard.
+
+        Raises:
+            LinkError: no HEARTBEAT of an autopilot within ``timeout`` seconds.
+        """
+        try:
+            async with asyncio.timeout(timeout):
+                await self._found.wait()
+        except TimeoutError:
+            where = "; ".join(
+                f"{connection.endpoint} ({connection.last_error or connection.state.value})"
+                for connection in self.connections
+            )
+            raise LinkError(f"no heartbeat from an autopilot in {timeout:g} s: {where}") from None
+        if self.autopilot is None:
+            raise LinkError("the link was closed before an autopilot was heard")
+        return self.autopilot
+
+    # Sending
+
+    def send(self, message: Message) -> None:
+        """Send a message under our ids: to where its target was heard, else everywhere."""
+        target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
+        if target == self._source and self._active is not None:
+            route: Connection | None = self._active
+        else:
+            route = self._routes.get(target)
+        chosen = (route,) if route is not None and route.is_up else self.connections
+        recorder = self._recorder
+        for connection in chosen:
+            if connection.is_up:
+                frame = connection.codec.encode(message)
+                connection.write(frame)
+                if recorder is not None:
+                    recorder.write(self._wall_clock(), frame)
+                    recorder = None
+
+    # Receiving
+
+    def _received(self, connection: Connection, data: bytes) -> None:
+        try:
+            self._hand_on(connection, connection.codec.feed(data))
+        except Exception as error:  # noqa: BLE001 - handlers are others' code: their failure must end run(), not vanish in the loop
+            if self._stopped is not None and not self._stopped.done():
+                self._stopped.set_exception(error)
+
+    def _hand_on(self, connection: Connection, frames: list[Frame]) -> None:
+        now = self._clock()
+        wall = self._wall_clock()
+        recorder = self._recorder
+        for frame in frames:
+            source = (frame.system, frame.component)
+            if source == self._source:
+                if connection is not self._active:
+                    if now - self._heard <= FAILOVER_S:
+                        self.standby += 1
+                        continue
+                    self._active = connection
+                self._heard = now
+            elif source == self._own:
+                self.echoed += 1
+                continue
+            self._routes[source] = connection
+            if recorder is not None:
+                recorder.write(wall, frame.raw)
+            if frame.message is None:
+                continue
+            if frame.message_id == _HEARTBEAT:
+                self._heartbeat(connection, source, frame.message, now)
+            for handler in self._handlers.get(frame.message_id, ()):
+                handler(now, frame.message)
+
+    def _heartbeat(
+        self, connection: Connection, source: tuple[int, int], message: Message, now: float
+    ) -> None:
+        if self._source is None:
+            if not is_autopilot(message) or self._expected_system not in (None, source[0]):
+                return
+            self._source = source
+            self._active = connection
+            self._own = (source[0], COMPONENT)
+            for other in self.connections:
+                other.codec.system = source[0]
+            self.autopilot = Autopilot(*source, message.type, message.autopilot)
+            self.state = AutopilotState.PRESENT
+            self._heard = self._heartbeat_at = now
+            self._found.set()
+            self._emit(now, AutopilotFound(self.autopilot))
+            self._restart_participants(now)
+        elif source == self._source:
+            self._heartbeat_at = now
+            if self.state is AutopilotState.SILENT:
+                self.state = AutopilotState.PRESENT
+                self._emit(now, AutopilotReturned())
+                self._restart_participants(now)
+
+    def _watch_boot_clock(self, now: float, message: Message) -> None:
+        if (message.get_srcSystem(), message.get_srcComponent()) != self._source:
+            return
+        before = self.boot_clock.reboots
+        if message.get_msgId() == MESSAGE_IDS["RAW_IMU"]:
+            self.boot_clock.from_us(message.time_usec)
+        else:
+            self.boot_clock.from_ms(message.time_boot_ms)
+        if self.boot_clock.reboots != before:
+            self._emit(now, AutopilotRebooted(self.boot_clock.reboots))
+            self._restart_participants(now)
+
+    # Time
+
+    async def _tick_forever(self) -> None:
+        while True:
+            self._tick(self._clock())
+            await asyncio.sleep(TICK_S)
+
+    def _tick(self, now: float) -> None:
+        if now >= self._next_beat:
+            self._next_beat = now + HEARTBEAT_INTERVAL_S
+            self._beat()
+        for connection in self.connections:
+            connection.check(now)
+        if self.autopilot is None:
+            return
+        silence = now - self._heartbeat_at
+        if self.state is AutopilotState.PRESENT and silence > HEARTBEAT_TIMEOUT_S:
+            self.state = AutopilotState.SILENT
+            self._emit(now, AutopilotSilent(silence))
+        if self.state is AutopilotState.PRESENT:
+            for participant in self._participants:
+                for message in participant.poll(now):
+                    self.send(message)
+
+    def _beat(self) -> None:
+        """Our HEARTBEAT, on every endpoint: over UDP it also tells the peer where we are."""
+        self.send(
+            mavlink.MAVLink_heartbeat_message(
+                mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+                mavlink.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                mavlink.MAV_STATE_ACTIVE,
+                3,
+            )
+        )
+
+    def _restart_participants(self, now: float) -> None:
+        if self._source is not None:
+            for participant in self._participants:
+                participant.start(*self._source, now)
+
+    def _connection_changed(self, connection: Connection, reason: str) -> None:
+        if connection.is_up:
+            self._next_beat = self._clock()
+        self._emit(self._clock(), ConnectionChanged(connection.endpoint, connection.state, reason))
+
+    def _emit(self, now: float, event: LinkEvent) -> None:
+        for handler in self._event_handlers:
+            handler(now, event)

@@ -1,0 +1,371 @@
+"""Negotiation of message rates with the autopilot; sans-IO.
+
+MAV_CMD_SET_MESSAGE_INTERVAL is asked for one message at a time, because its COMMAND_ACK does
+not say which message it is about.  ArduPilot denies an interval that is too short for its
+loop rate and an unknown message in the same words, hence the probe with a slow interval
+after a first denial, and then bisection for the fastest interval that is granted.  An
+answer is a promise only: rates are measured, and asked for again when they do not come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
+
+LADDER_MS = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000)
+"""Intervals tried, whole ms.  Few, for ArduPilot keeps ten buckets of equal interval."""
+ACK_TIMEOUT_S = 1.0
+ASKS = 4
+"""Tries of one question before the autopilot counts as mute on it."""
+MUTE_MESSAGES = 2
+"""So many mute questions, while nothing was ever answered, mean firmware without the command."""
+WINDOW_S = 4.0
+SHORTFALL = 0.5
+"""Measured below this share of what was granted: ask again."""
+AGAIN_S = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
+"""Waits before asking again; ArduPilot slows streams itself while parameters are fetched."""
+LEGACY_GROUPS: dict[str, int] = {
+    "RAW_IMU": 1,
+    "SCALED_IMU": 1,
+    "SCALED_IMU2": 1,
+    "SCALED_IMU3": 1,
+    "GPS_RAW_INT": 2,
+    "GPS2_RAW": 2,
+    "SYS_STATUS": 2,
+    "ATTITUDE": 10,
+    "VFR_HUD": 11,
+    "VIBRATION": 12,
+    "EKF_STATUS_REPORT": 12,
+    "BATTERY_STATUS": 12,
+    "SYSTEM_TIME": 12,
+    "WIND": 12,
+}
+"""MAV_DATA_STREAM that carries each message on firmware which has only REQUEST_DATA_STREAM."""
+
+
+class StreamState(Enum):
+    """Where one message is in the negotiation, for people to read."""
+
+    WAITING = "waiting"
+    ASKED = "asked"
+    GRANTED = "granted"
+    FLOWING = "flowing"
+    SLOW = "slow"
+    SILENT = "silent"
+    UNSUPPORTED = "unsupported"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamRequest:
+    """A message that is wanted at a rate (Hz)."""
+
+    name: str
+    rate: float
+
+    @property
+    def interval_ms(self) -> int:
+        """The interval to ask for, whole ms."""
+        return max(1, round(1000.0 / self.rate))
+
+
+@dataclass(frozen=True, slots=True)
+class StreamStatus:
+    """One line of the status page; rates in Hz, None where not known."""
+
+    name: str
+    state: StreamState
+    asked: float
+    granted: float | None
+    measured: float | None
+
+
+DEFAULT_STREAMS = (
+    StreamRequest("RAW_IMU", 50.0),
+    StreamRequest("HIGHRES_IMU", 50.0),
+    StreamRequest("SCALED_IMU2", 50.0),
+    StreamRequest("SCALED_IMU3", 50.0),
+    StreamRequest("ATTITUDE", 50.0),
+    StreamRequest("GPS_RAW_INT", 10.0),
+    StreamRequest("GPS2_RAW", 10.0),
+    StreamRequest("VIBRATION", 2.0),
+    StreamRequest("EKF_STATUS_REPORT", 2.0),
+    StreamRequest("EXTENDED_SYS_STATE", 2.0),
+    StreamRequest("VFR_HUD", 5.0),
+    StreamRequest("WIND", 1.0),
+    StreamRequest("BATTERY_STATUS", 1.0),
+    StreamRequest("SYSTEM_TIME", 1.0),
+)
+
+
+class _Stream:
+    """The negotiation of one message: which intervals were denied, which one was granted.
+
+    ``ladder`` holds the intervals to choose from, fastest first; all up to ``denied`` are
+    known to be too fast, and ``granted`` is the fastest one accepted, which is also the one
+    in force, since a denial changes nothing.
+    """
+
+    def __init__(self, request: StreamRequest) -> None:
+        self.request = request
+        self.number = MESSAGE_IDS[request.name]
+        wanted = request.interval_ms
+        self.ladder = (wanted, *(step for step in LADDER_MS if step > wanted))
+        self.restart(0.0)
+
+    def restart(self, now: float) -> None:
+        """Forget what was agreed: the autopilot has."""
+        self.state = StreamState.WAITING
+        self.denied = -1
+        self.granted: int | None = None
+        self.rung = 0
+        self.due: float | None = now
+        self.measured: float | None = None
+        self.again = 0
+        self._since = now
+        self._count = 0
+
+    @property
+    def granted_ms(self) -> int | None:
+        """The interval in force, ms."""
+        return None if self.granted is None else self.ladder[self.granted]
+
+    def choose(self, too_fast: int) -> int | None:
+        """The rung of the ladder to ask for next, None when there is nothing left to ask.
+
+        ``too_fast`` is an interval (ms) that the autopilot denied for another message that
+        it does know: the limit is its loop rate, the same for all.
+        """
+        last = len(self.ladder) - 1
+        if self.granted is not None:
+            between = (self.denied + self.granted) // 2
+            return between if between > self.denied else None
+        if self.denied < 0:
+            fast = [rung for rung, step in enumerate(self.ladder) if step <= too_fast]
+            self.denied = min(fast[-1], last - 1) if fast else -1
+            return self.denied + 1
+        return last if self.denied < last else None
+
+    def count(self) -> None:
+        """One message came."""
+        self._count += 1
+
+    def measure(self, now: float) -> None:
+        """When the window of measurement is over: take the rate and judge it."""
+        elapsed = now - self._since
+        expected = 1e3 / (self.granted_ms or self.request.interval_ms)
+        if elapsed < max(WINDOW_S, 4.0 / expected):
+            return
+        self.measured = self._count / elapsed
+        self._begin_window(now)
+        if self.granted is None or self.state is StreamState.ASKED:
+            return
+        if self.measured >= SHORTFALL * expected:
+            self.state, self.again, self.due = StreamState.FLOWING, 0, None
+        elif self.due is None:
+            self.ask_later(now, StreamState.SLOW if self.measured else StreamState.SILENT)
+
+    def settle(self, now: float, rung: int) -> None:
+        """An interval was granted: measure what comes of it."""
+        self.granted = rung
+        self.due = None
+        self.state = StreamState.GRANTED
+        self._begin_window(now)
+
+    def ask_later(self, now: float, state: StreamState) -> None:
+        """Ask again, the later the oftener it did not help."""
+        self.state = state
+        self.due = now + AGAIN_S[min(self.again, len(AGAIN_S) - 1)]
+        self.again += 1
+
+    def _begin_window(self, now: float) -> None:
+        self._since, self._count = now, 0
+
+
+class StreamNegotiator:
+    """Gets the requested messages flowing and keeps them so; a link participant.
+
+    Args:
+        requests: what is wanted.
+
+    Raises:
+        ValueError: a message that the dialect does not have.
+    """
+
+    def __init__(self, requests: Iterable[StreamRequest] = DEFAULT_STREAMS) -> None:
+        try:
+            self._streams = {stream.number: stream for stream in map(_Stream, requests)}
+        except KeyError as error:
+            raise ValueError(f"no MAVLink message is called {error.args[0]}") from None
+        self.legacy = False
+        self._target: tuple[int, int] | None = None
+        self._current: _Stream | None = None
+        self._rung = 0
+        self._asked_at = 0.0
+        self._asks = 0
+        self._answered = False
+        self._mute = 0
+        self._too_fast = 0
+        self._groups_asked: dict[int, float] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The messages to be fed: COMMAND_ACK and all that are measured."""
+        return ("COMMAND_ACK", *(stream.request.name for stream in self._streams.values()))
+
+    def start(self, system: int, component: int, now: float) -> None:
+        """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
+        self._target = (system, component)
+        self.legacy = False
+        self._current = None
+        self._answered = False
+        self._mute = 0
+        self._too_fast = 0
+        self._groups_asked.clear()
+        for stream in self._streams.values():
+            stream.restart(now)
+
+    def feed(self, message: Message, now: float) -> Sequence[Message]:
+        """Count a message, or take an answer and return the next question."""
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if source != self._target:
+            return ()
+        stream = self._streams.get(message.get_msgId())
+        if stream is not None:
+            stream.count()
+            return ()
+        if (
+            message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
+            or message.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+            or message.target_system not in (0, source[0])
+            or message.target_component not in (0, COMPONENT)
+            or self._current is None
+        ):
+            return ()
+        return self._answer(self._current, message.result, now)
+
+    def poll(self, now: float) -> Sequence[Message]:
+        """Measure; return the question that is due, if any."""
+        for stream in self._streams.values():
+            stream.measure(now)
+        if self._target is None:
+            return ()
+        if self._current is None:
+            return self._next(now)
+        if now - self._asked_at < ACK_TIMEOUT_S:
+            return ()
+        if self._asks < ASKS:
+            return self._ask(self._current, now)
+        self._current.ask_later(now, StreamState.WAITING)
+        self._current = None
+        if not self._answered:
+            self._mute += 1
+            if self._mute >= MUTE_MESSAGES:
+                self._go_legacy(now)
+        return self._next(now)
+
+    def report(self) -> tuple[StreamStatus, ...]:
+        """The state of every stream, in the order of the requests."""
+        return tuple(
+            StreamStatus(
+                name=stream.request.name,
+                state=stream.state,
+                asked=stream.request.rate,
+                granted=None if stream.granted_ms is None else 1e3 / stream.granted_ms,
+                measured=stream.measured,
+            )
+            for stream in self._streams.values()
+        )
+
+    def _answer(self, stream: _Stream, result: int, now: float) -> Sequence[Message]:
+        if result == mavlink.MAV_RESULT_IN_PROGRESS:
+            self._asked_at = now
+            return ()
+        self._current = None
+        if result == mavlink.MAV_RESULT_ACCEPTED:
+            self._answered = True
+            stream.settle(now, self._rung)
+        elif result == mavlink.MAV_RESULT_DENIED:
+            self._answered = True
+            if stream.granted is not None and self._rung >= stream.granted:
+                stream.granted, stream.denied = None, -1  # granted once, no longer
+            stream.denied = max(stream.denied, self._rung)
+        elif result == mavlink.MAV_RESULT_UNSUPPORTED and not self._answered:
+            self._go_legacy(now)
+            return self._next(now)
+        else:
+            stream.ask_later(now, StreamState.WAITING)
+            return self._next(now)
+        rung = stream.choose(0)
+        if rung is not None:
+            return self._begin(stream, rung, now)
+        if stream.granted is None:
+            stream.state, stream.due = StreamState.UNSUPPORTED, None
+        elif stream.denied >= 0:
+            self._too_fast = max(self._too_fast, stream.ladder[stream.denied])
+        return self._next(now)
+
+    def _next(self, now: float) -> Sequence[Message]:
+        """Ask for the stream that has been due longest."""
+        due = [s for s in self._streams.values() if s.due is not None and s.due <= now]
+        if not due:
+            return ()
+        if self.legacy:
+            return [message for stream in due for message in self._ask_legacy(stream, now)]
+        stream = min(due, key=lambda s: s.due or 0.0)
+        rung = stream.granted if stream.granted is not None else stream.choose(self._too_fast)
+        return () if rung is None else self._begin(stream, rung, now)
+
+    def _begin(self, stream: _Stream, rung: int, now: float) -> Sequence[Message]:
+        self._current, self._rung, self._asks = stream, rung, 0
+        return self._ask(stream, now)
+
+    def _ask(self, stream: _Stream, now: float) -> Sequence[Message]:
+        if self._target is None:
+            return ()
+        stream.state = StreamState.ASKED
+        self._asked_at = now
+        message = mavlink.MAVLink_command_long_message(
+            *self._target,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+            self._asks,
+            float(stream.number),
+            1e3 * stream.ladder[self._rung],
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
+        self._asks += 1
+        return (message,)
+
+    def _go_legacy(self, now: float) -> None:
+        self.legacy = True
+        self._current = None
+        for stream in self._streams.values():
+            stream.restart(now)
+
+    def _ask_legacy(self, stream: _Stream, now: float) -> Sequence[Message]:
+        """REQUEST_DATA_STREAM for the group that carries the message, at its fastest rate."""
+        group = LEGACY_GROUPS.get(stream.request.name)
+        if group is None or self._target is None:
+            stream.state, stream.due = StreamState.UNSUPPORTED, None
+            return ()
+        stream.settle(now, 0)
+        asked = self._groups_asked.get(group)
+        if asked is not None and now - asked < ACK_TIMEOUT_S:
+            return ()
+        self._groups_asked[group] = now
+        rate = max(
+            s.request.rate
+            for s in self._streams.values()
+            if LEGACY_GROUPS.get(s.request.name) == group
+        )
+        return (
+            mavlink.MAVLink_request_data_stream_message(
+                *self._target, group, max(1, round(rate)), 1
+            ),
+        )

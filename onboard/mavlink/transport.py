@@ -1,0 +1,285 @@
+"""Byte transports on the asyncio loop: UDP, TCP and serial behind one small protocol.
+
+All three read from a file descriptor that the loop watches.  Small packets arrive by the
+hundred per second (a UART even hands over a few bytes at a time), and a wake-up of the loop
+costs more than parsing what it brings.  So after each read the descriptor is left alone for
+``linger`` seconds and then drained, which bounds the wake-ups to ``1 / linger`` per second
+and delays a message by ``linger`` at most; a quiet line goes back to being watched.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+import socket
+from collections.abc import Callable
+from typing import Protocol
+
+from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.serialport import open_serial
+
+DEFAULT_LINGER_S = 0.01
+CONNECT_TIMEOUT_S = 5.0
+DATAGRAMS_PER_WAKE = 128
+READ_SIZE = 65536
+WRITE_LIMIT = 65536
+"""Bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast."""
+PEER_LIMIT = 8
+PEER_SILENCE_S = 30.0
+UNUSABLE = (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES, errno.EPERM)
+
+Receive = Callable[[bytes], None]
+Lost = Callable[[str], None]
+
+
+class Transport(Protocol):
+    """What the link needs of a connection; ``dropped`` counts writes that could not be sent."""
+
+    dropped: int
+
+    def write(self, data: bytes) -> None:
+        """Send without waiting; drops and counts when the line does not take it."""
+
+    def close(self) -> None:
+        """Let go of the descriptor; nothing is received after this.  May be called twice."""
+
+
+async def open_transport(
+    endpoint: Endpoint, receive: Receive, lost: Lost, *, linger: float = DEFAULT_LINGER_S
+) -> Transport:
+    """Open an endpoint.
+
+    Args:
+        endpoint: where to.
+        receive: called with what was read.
+        lost: called once with the reason when the connection breaks by itself.
+        linger: longest delay of a message, s (see the module's text).
+
+    Raises:
+        EndpointError: port in use, no such local address, or no permission.
+        OSError: the peer or device is not there (now): worth another try.
+    """
+    if endpoint.kind is EndpointKind.SERIAL:
+        return StreamTransport(open_serial(endpoint), receive, lost, linger)
+    loop = asyncio.get_running_loop()
+    kind = socket.SOCK_STREAM if endpoint.kind is EndpointKind.TCP else socket.SOCK_DGRAM
+    async with asyncio.timeout(CONNECT_TIMEOUT_S):
+        family, _, _, _, address = (
+            await loop.getaddrinfo(endpoint.host or "0.0.0.0", endpoint.port, type=kind)  # noqa: S104 - the user asked for all interfaces
+        )[0]
+        sock = socket.socket(family, kind)
+        try:
+            sock.settimeout(0.0)
+            if endpoint.kind is EndpointKind.TCP:
+                await loop.sock_connect(sock, address)
+                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+                return StreamTransport(sock, receive, lost, linger)
+            with contextlib.suppress(OSError):
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+            if endpoint.kind is EndpointKind.UDP_IN:
+                sock.bind(address)
+                return DatagramTransport(sock, receive, linger, clock=loop.time)
+            sock.connect(address)
+            return DatagramTransport(sock, receive, linger)
+        except OSError as error:
+            sock.close()
+            if endpoint.kind is not EndpointKind.TCP and error.errno in UNUSABLE:
+                what = "port in use" if error.errno == errno.EADDRINUSE else error.strerror
+                raise EndpointError(f"{endpoint}: {what}") from None
+            raise
+        except BaseException:
+            sock.close()
+            raise
+
+
+class Pace:
+    """Calls ``drain`` when the descriptor is readable, but not oftener than ``linger`` allows.
+
+    ``drain`` reads all there is and says whether there was anything.
+    """
+
+    def __init__(self, descriptor: int, drain: Callable[[], bool], linger: float) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._descriptor = descriptor
+        self._drain = drain
+        self._linger = linger
+        self._timer: asyncio.TimerHandle | None = None
+        self._closed = False
+        self._loop.add_reader(descriptor, self._readable)
+
+    def _readable(self) -> None:
+        self._drain()
+        if self._linger > 0.0 and not self._closed:
+            self._loop.remove_reader(self._descriptor)
+            self._timer = self._loop.call_later(self._linger, self._again)
+
+    def _again(self) -> None:
+        busy = self._drain()
+        if self._closed:
+            return
+        if busy:
+            self._timer = self._loop.call_later(self._linger, self._again)
+        else:
+            self._timer = None
+            self._loop.add_reader(self._descriptor, self._readable)
+
+    def close(self) -> None:
+        """Stop reading."""
+        if self._closed:
+            return
+        self._closed = True
+        self._loop.remove_reader(self._descriptor)
+        if self._timer is not None:
+            self._timer.cancel()
+
+
+class DatagramTransport:
+    """UDP, connected (``udpout``) or listening (``udpin``: answers everyone heard of late).
+
+    UDP is never lost: an ICMP refusal only says that nobody listens yet.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        receive: Receive,
+        linger: float,
+        clock: Callable[[], float] | None = None,
+    ) -> None:
+        self.dropped = 0
+        self._socket = sock
+        self._receive = receive
+        self._clock = clock
+        self._peers: dict[tuple[object, ...], float] = {}
+        self._buffer = memoryview(bytearray(READ_SIZE))
+        self._closed = False
+        self._pace = Pace(sock.fileno(), self._drain, linger)
+
+    @property
+    def port(self) -> int:
+        """The local port, of interest where the system chose it."""
+        return int(self._socket.getsockname()[1])
+
+    def write(self, data: bytes) -> None:
+        """Send one datagram to the peer, or to each peer heard within 30 s."""
+        if self._closed:
+            self.dropped += 1
+        elif self._clock is None:
+            self._send(data, None)
+        else:
+            now = self._clock()
+            silent = [peer for peer, heard in self._peers.items() if now - heard > PEER_SILENCE_S]
+            for peer in silent:
+                del self._peers[peer]
+            for peer in self._peers:
+                self._send(data, peer)
+            if not self._peers:
+                self.dropped += 1
+
+    def close(self) -> None:
+        """Stop and release the port."""
+        if not self._closed:
+            self._closed = True
+            self._pace.close()
+            self._socket.close()
+
+    def _send(self, data: bytes, peer: tuple[object, ...] | None) -> None:
+        try:
+            if peer is None:
+                self._socket.send(data)
+            else:
+                self._socket.sendto(data, peer)
+        except OSError:
+            self.dropped += 1
+
+    def _drain(self) -> bool:
+        chunks: list[bytes] = []
+        for _ in range(DATAGRAMS_PER_WAKE):
+            try:
+                size, peer = self._socket.recvfrom_into(self._buffer)
+            except BlockingIOError:
+                break
+            except OSError:
+                continue  # an ICMP error about something we sent
+            chunks.append(bytes(self._buffer[:size]))
+            if self._clock is not None and (peer in self._peers or len(self._peers) < PEER_LIMIT):
+                self._peers[peer] = self._clock()
+        if chunks:
+            self._receive(b"".join(chunks))
+        return bool(chunks)
+
+
+class StreamTransport:
+    """TCP or serial: a byte stream on one descriptor (``source``: a socket or a raw one)."""
+
+    def __init__(
+        self, source: socket.socket | int, receive: Receive, lost: Lost, linger: float
+    ) -> None:
+        self.dropped = 0
+        self._socket = None if isinstance(source, int) else source
+        self._descriptor = source if isinstance(source, int) else source.fileno()
+        self._receive = receive
+        self._lost = lost
+        self._loop = asyncio.get_running_loop()
+        self._waiting = bytearray()
+        self._closed = False
+        self._pace = Pace(self._descriptor, self._drain, linger)
+
+    def write(self, data: bytes) -> None:
+        """Send; what the line does not take at once waits, up to a limit."""
+        if self._closed or len(self._waiting) + len(data) > WRITE_LIMIT:
+            self.dropped += 1
+            return
+        idle = not self._waiting
+        self._waiting += data
+        if idle:
+            self._flush()
+
+    def close(self) -> None:
+        """Stop and release the descriptor."""
+        if self._closed:
+            return
+        self._closed = True
+        self._pace.close()
+        self._loop.remove_writer(self._descriptor)
+        if self._socket is not None:
+            self._socket.close()
+        else:
+            os.close(self._descriptor)
+
+    def _flush(self) -> None:
+        try:
+            sent = os.write(self._descriptor, self._waiting)
+        except BlockingIOError:
+            sent = 0
+        except OSError as error:
+            self._break(error.strerror or str(error))
+            return
+        del self._waiting[:sent]
+        if self._waiting:
+            self._loop.add_writer(self._descriptor, self._flush)
+        else:
+            self._loop.remove_writer(self._descriptor)
+
+    def _drain(self) -> bool:
+        try:
+            data = os.read(self._descriptor, READ_SIZE)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            self._break(error.strerror or str(error))
+            return False
+        if not data:
+            self._break("closed by the other side")
+            return False
+        self._receive(data)
+        return True
+
+    def _break(self, reason: str) -> None:
+        if not self._closed:
+            self.close()
+            # Not from within write(): the caller may be iterating over its connections.
+            self._loop.call_soon(self._lost, reason)
