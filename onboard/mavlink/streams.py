@@ -184,7 +184,7 @@ class _Stream:
         self._since, self._count = now, 0
 
 
-class StreamNegotiator:
+class Streams:
     """Gets the requested messages flowing and keeps them so; a link participant.
 
     Args:
