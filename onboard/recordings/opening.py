@@ -7,6 +7,7 @@ from pathlib import Path
 from onboard.errors import RecordingError
 from onboard.recordings.dataflash import is_dataflash, open_dataflash
 from onboard.recordings.recording import Recording
+from onboard.recordings.tlog import is_tlog, open_tlog
 from onboard.recordings.ulog import is_ulog, open_ulog
 
 HEAD_LENGTH = 65536
@@ -36,4 +37,6 @@ def open_recording(path: str | Path) -> Recording:
         return open_ulog(path)
     if is_dataflash(head):
         return open_dataflash(path)
+    if is_tlog(head):
+        return open_tlog(path)
     raise RecordingError(f"{path}: not a .tlog, DataFlash .BIN or .ulg recording")

@@ -7,7 +7,7 @@ import pytest
 from dataflash_writer import modern_log, old_log
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from telemetry_writer import px4_log
+from telemetry_writer import px4_log, telemetry
 
 from onboard.core.samples import (
     AttitudeSample,
@@ -23,6 +23,7 @@ from onboard.recordings.opening import open_recording
 LOGS = {
     "modern.BIN": bytes(modern_log(1)),
     "old.BIN": bytes(old_log(1)),
+    "mavlink.tlog": bytes(telemetry(1)),
     "px4.ulg": px4_log(1),
 }
 
@@ -36,6 +37,7 @@ def test_the_kind_is_found_from_the_content(tmp_path):
     assert kinds == {
         "modern.BIN": "dataflash",
         "old.BIN": "dataflash",
+        "mavlink.tlog": "tlog",
         "px4.ulg": "ulog",
     }
 
