@@ -150,6 +150,8 @@ class IntegralCriterion:
     The axes are those of ``f_hat``: body with ``R_nb``, or sensor with ``R_nb R_bs``.  Each kind
     of sample comes in order of its time.  A velocity may come ahead, and waits for the specific
     force to reach it; one from before the latest specific force is refused.
+
+    ``horizontal_only`` leaves the vertical out, for receivers that do not tell it (GPS_RAW_INT).
     """
 
     def __init__(
@@ -157,10 +159,13 @@ class IntegralCriterion:
         initial_velocity: InitialVelocity = InitialVelocity.ELIMINATED,
         weighting: Weighting = Weighting.TIME,
         gravity: float = STANDARD_GRAVITY,
+        *,
+        horizontal_only: bool = False,
     ) -> None:
         self._initial_velocity = initial_velocity
         self._weighting = weighting
         self._gravity = gravity
+        self._axes = 2 if horizontal_only else 3
         self._closed = CriterionSums.zero()
         self._refused = 0
         self._begin()
@@ -188,10 +193,10 @@ class IntegralCriterion:
         self._waiting: deque[tuple[float, Array]] = deque()
         self._reference: Array | None = None
         self._previous: tuple[float, Array] | None = None
-        # Rows are (3, 7): H and y side by side.  Moments about the mean where it is eliminated.
+        # Rows are (axes, 7): H and y side by side.  Moments about the mean where it is eliminated.
         self._weight = 0.0
         self._rows = 0
-        self._mean = np.zeros((3, 7))
+        self._mean = np.zeros((self._axes, 7))
         self._moments = np.zeros((7, 7))
 
     def specific_force(self, t: float, f_hat: ArrayLike, R_nb: ArrayLike) -> None:
@@ -222,7 +227,7 @@ class IntegralCriterion:
 
         Args:
             t: s.
-            v_n: (3,) m/s.
+            v_n: (3,) m/s; the third is not looked at where only the horizontal counts.
         """
         newest = self._waiting[-1][0] if self._waiting else -np.inf
         if not self._waiting and self._previous is not None:
@@ -248,7 +253,7 @@ class IntegralCriterion:
             there = self._integrand + share * (integrand - self._integrand)
             H = self._H + 0.5 * h * (self._integrand + there)
             y = v_n - np.array([0.0, 0.0, self._gravity * (at - start)])
-            self._epoch(at, np.hstack([H, y[:, None]]))
+            self._epoch(at, np.hstack([H, y[:, None]])[: self._axes])
 
     def _epoch(self, t: float, row: Array) -> None:
         if self._initial_velocity is InitialVelocity.FIRST_FIX:

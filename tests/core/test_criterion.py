@@ -241,6 +241,14 @@ def test_turning_the_world_about_the_vertical_changes_nothing():
         assert close(a, there.feed(IntegralCriterion(treatment)).sums)
 
 
+def test_without_a_vertical_speed_the_horizontal_still_tells():
+    flight = Flight(17)
+    flight.v_n[:, 2] = np.nan
+    solution = flight.feed(IntegralCriterion(horizontal_only=True)).sums.solve()
+    assert np.allclose(solution.alpha, ALPHA, atol=1e-6)
+    assert np.allclose(solution.beta, BETA, atol=1e-5)
+
+
 def test_a_hover_leaves_what_it_does_not_show_at_its_nominal_value():
     criterion = IntegralCriterion()
     for k in range(1000):
