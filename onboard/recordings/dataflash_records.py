@@ -112,9 +112,17 @@ def imu(batch: Batch, _context: Context) -> Converted:
     gx, gy, gz = batch.floats("GyrX", "GyrY", "GyrZ")
     ax, ay, az = batch.floats("AccX", "AccY", "AccZ")
     named = next((c for c in ("T", "Temp") if batch.form.has(c)), None)
-    heat: list[float] | list[None] = batch.floats(named)[0] if named else [None] * len(t)
+    heat = batch.floats(named)[0] if named else [0.0] * len(t)
     return [
-        ImuSample(t[k], numbers[k], (ax[k], ay[k], az[k]), (gx[k], gy[k], gz[k]), heat[k])
+        ImuSample(
+            t[k],
+            numbers[k],
+            (ax[k], ay[k], az[k]),
+            (gx[k], gy[k], gz[k]),
+            heat[k] or None,  # exactly 0: a sensor without a thermometer
+        )
+        if ax[k] or ay[k] or az[k] or gx[k] or gy[k] or gz[k]
+        else None  # not a measurement: the sensor was not there yet
         for k in range(len(t))
     ]
 
@@ -152,7 +160,7 @@ def gps(batch: Batch, context: Context) -> Converted:
                 v_n=v_n[k],
                 v_e=v_e[k],
                 v_d=down[k] if vertical and down is not None else None,
-                t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if ms[k] else None,
+                t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if week[k] else None,
                 satellites=satellites[k] if satellites[k] >= 0 else None,
                 hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
                 speed_accuracy=_nearest(context.speed_accuracy.get(receiver), t),

@@ -125,6 +125,18 @@ def test_no_vertical_speed_where_the_receiver_has_none(tmp_path):
     assert {f.v_d for f in of_type(saved(tmp_path, without), GpsFix)} == {None}
 
 
+def test_what_is_not_a_measurement_does_not_become_one(tmp_path):
+    log = modern_log(1)
+    log.add("IMU", 9_000_000, 0, *[0.0] * 6, 0, 0, 0.0, 1, 1, 1000, 1000)
+    log.add("IMU", 9_040_000, 0, *[0.5] * 6, 0, 0, 0.0, 1, 1, 1000, 1000)
+    log.add("GPS", 9_040_000, 0, 3, 500, 0, 12, 99.99, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5, 0.0, 1)
+    *_, last = of_type(path := saved(tmp_path, log), ImuSample)
+    assert [s.t for s in of_type(path, ImuSample)].count(9.0) == 0
+    assert (last.t, last.temperature) == (9.04, None)
+    fix = of_type(path, GpsFix)[-1]
+    assert (fix.t_receiver, fix.hdop) == (None, None)
+
+
 def test_format_with_unknown_letter_is_stepped_over(tmp_path):
     log = DataflashWriter()
     log.format(60, "NEW", "Q?", "TimeUS,Odd", length=12)
