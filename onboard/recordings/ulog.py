@@ -88,7 +88,7 @@ def _load(path: Path) -> tuple[dict[tuple[str, int], Columns], list[Sample], tup
     except Exception as error:  # noqa: BLE001 - pyulog raises anything on damaged bytes
         why = " ".join(str(error).split()) or type(error).__name__
         raise RecordingError(f"{path}: a ULog that cannot be parsed ({why})") from None
-    topics = {(d.name, int(d.multi_id)): d.data for d in log.data_list}
+    topics = {(d.name, int(d.multi_id)): d.data for d in log.data_list if "timestamp" in d.data}
     if "sensor_gps" in {name for name, _ in topics}:
         # vehicle_gps_position is then a selection from, or a blend of, the receivers.
         topics = {key: c for key, c in topics.items() if key[0] != "vehicle_gps_position"}

@@ -97,7 +97,7 @@ def read_all(path: Path) -> int:
 
 @pytest.mark.parametrize("name", LOGS)
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
 def test_damaged_files_are_read_or_refused(tmp_path, capsys, name, data):
