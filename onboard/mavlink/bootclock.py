@@ -10,7 +10,8 @@ UNIX_FROM_US = 10**15
 """A ``time_usec`` above this (31 years of uptime) is unix time: some autopilots send that."""
 REBOOT_STEP_S = 3.0
 """Time that goes back by less is late delivery (UDP, radio buffers), not a reboot."""
-UNIX_STEP_S = 1.0
+UNIX_STEP_S = 10.0
+"""Unix time that departs this far from boot time has been set (by GPS, say)."""
 
 
 class BootClock:
@@ -25,6 +26,7 @@ class BootClock:
         self.reboots = 0
         self._suspect: float | None = None
         self._unix_offset: float | None = None
+        self._paired = False
 
     def from_ms(self, time_boot_ms: int) -> float:
         """Seconds since boot from a 32-bit ``time_boot_ms``; continues across the wrap."""
@@ -37,6 +39,9 @@ class BootClock:
         t = self.convert_us(time_usec)
         if time_usec < UNIX_FROM_US:
             self._observe(t)
+        elif self.latest is None or t > self.latest:
+            # Unix time runs on through a reboot: it tells how late it is, not of reboots.
+            self.latest = t
         return t
 
     def convert_us(self, time_usec: int) -> float:
@@ -44,12 +49,12 @@ class BootClock:
         t = time_usec * 1e-6
         if time_usec < UNIX_FROM_US:
             return t
-        reference = self.latest
+        reference = self.latest or 0.0
         if self._unix_offset is None or (
-            reference is not None and abs(t - self._unix_offset - reference) > UNIX_STEP_S
+            not self._paired and abs(t - self._unix_offset - reference) > UNIX_STEP_S
         ):
             # Without SYSTEM_TIME the offset is that of the moment: good to the message delay.
-            self._unix_offset = t - (reference if reference is not None else 0.0)
+            self._unix_offset = t - reference
         return t - self._unix_offset
 
     def pair(self, time_unix_usec: int, time_boot_ms: int) -> None:
@@ -57,6 +62,7 @@ class BootClock:
         t = self.from_ms(time_boot_ms)
         if time_unix_usec > UNIX_FROM_US:
             self._unix_offset = time_unix_usec * 1e-6 - t
+            self._paired = True
 
     def _unwrapped(self, t: float) -> float:
         latest = self.latest
@@ -78,5 +84,6 @@ class BootClock:
                 self.reboots += 1
                 self.latest = t
                 self._suspect = None
+                self._unix_offset, self._paired = None, False
             else:
                 self._suspect = t

@@ -286,6 +286,8 @@ class Decoder:
         return NOTHING
 
     def _param_value(self, m: Message) -> Samples:
+        if not math.isfinite(m.param_value):
+            return self._refuse("PARAM_VALUE: not finite")
         return (ParameterValue(m.param_id, m.param_value, self.clock.latest),)
 
 

@@ -9,6 +9,7 @@ answer is a promise only: rates are measured, and asked for again when they do n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -20,6 +21,9 @@ LADDER_MS = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000)
 ACK_TIMEOUT_S = 1.0
 ASKS = 4
 """Tries of one question before the autopilot counts as mute on it."""
+RECHECK_S = 60.0
+"""When a message is found to be unsupported it is asked for once more: an acknowledgement that
+came late or twice can have been about another message."""
 MUTE_MESSAGES = 2
 """So many mute questions, while nothing was ever answered, mean firmware without the command."""
 WINDOW_S = 4.0
@@ -120,10 +124,10 @@ class _Stream:
         self.state = StreamState.WAITING
         self.denied = -1
         self.granted: int | None = None
-        self.rung = 0
         self.due: float | None = now
         self.measured: float | None = None
         self.again = 0
+        self.rechecked = False
         self._since = now
         self._count = 0
 
@@ -174,6 +178,13 @@ class _Stream:
         self.state = StreamState.GRANTED
         self._begin_window(now)
 
+    def give_up(self, now: float) -> None:
+        """Even the slowest interval was denied: there is no such message, unless we misheard."""
+        self.state = StreamState.UNSUPPORTED
+        self.due = None if self.rechecked else now + RECHECK_S
+        self.rechecked = True
+        self.denied = -1
+
     def ask_later(self, now: float, state: StreamState) -> None:
         """Ask again, the later the oftener it did not help."""
         self.state = state
@@ -208,6 +219,7 @@ class Streams:
         self._answered = False
         self._mute = 0
         self._too_fast = 0
+        self._quiet_until = 0.0
         self._groups_asked: dict[int, float] = {}
 
     @property
@@ -223,12 +235,17 @@ class Streams:
         self._answered = False
         self._mute = 0
         self._too_fast = 0
+        self._quiet_until = now
         self._groups_asked.clear()
         for stream in self._streams.values():
             stream.restart(now)
 
     def feed(self, message: Message, now: float) -> Sequence[Message]:
-        """Count a message, or take an answer and return the next question."""
+        """Count a message or take an answer.
+
+        The next question waits for :meth:`poll`, so that the same acknowledgement come twice
+        is not taken for its answer.
+        """
         source = (message.get_srcSystem(), message.get_srcComponent())
         if source != self._target:
             return ()
@@ -244,7 +261,8 @@ class Streams:
             or self._current is None
         ):
             return ()
-        return self._answer(self._current, message.result, now)
+        self._answer(self._current, message.result, now)
+        return ()
 
     def poll(self, now: float) -> Sequence[Message]:
         """Measure; return the question that is due, if any."""
@@ -253,7 +271,7 @@ class Streams:
         if self._target is None:
             return ()
         if self._current is None:
-            return self._next(now)
+            return self._next(now) if now >= self._quiet_until else ()
         if now - self._asked_at < ACK_TIMEOUT_S:
             return ()
         if self._asks < ASKS:
@@ -279,33 +297,40 @@ class Streams:
             for stream in self._streams.values()
         )
 
-    def _answer(self, stream: _Stream, result: int, now: float) -> Sequence[Message]:
+    def _answer(self, stream: _Stream, result: int, now: float) -> None:
         if result == mavlink.MAV_RESULT_IN_PROGRESS:
             self._asked_at = now
-            return ()
+            return
         self._current = None
-        if result == mavlink.MAV_RESULT_ACCEPTED:
+        if self._asks > 1:
+            # The earlier tries may be answered yet: let that pass before the next question.
+            self._quiet_until = now + ACK_TIMEOUT_S
+        if result == mavlink.MAV_RESULT_UNSUPPORTED and not self._answered:
+            self._go_legacy(now)
+        elif result == mavlink.MAV_RESULT_ACCEPTED:
             self._answered = True
             stream.settle(now, self._rung)
+            self._refine(stream, now)
         elif result == mavlink.MAV_RESULT_DENIED:
             self._answered = True
             if stream.granted is not None and self._rung >= stream.granted:
                 stream.granted, stream.denied = None, -1  # granted once, no longer
             stream.denied = max(stream.denied, self._rung)
-        elif result == mavlink.MAV_RESULT_UNSUPPORTED and not self._answered:
-            self._go_legacy(now)
-            return self._next(now)
+            self._refine(stream, now)
         else:
             stream.ask_later(now, StreamState.WAITING)
-            return self._next(now)
-        rung = stream.choose(0)
-        if rung is not None:
-            return self._begin(stream, rung, now)
-        if stream.granted is None:
-            stream.state, stream.due = StreamState.UNSUPPORTED, None
-        elif stream.denied >= 0:
-            self._too_fast = max(self._too_fast, stream.ladder[stream.denied])
-        return self._next(now)
+
+    def _refine(self, stream: _Stream, now: float) -> None:
+        """After a yes or a no: is there another interval to ask for?"""
+        if stream.choose(0) is not None:
+            # Before any other stream, which can then profit from the limit found here.
+            stream.state, stream.due = StreamState.ASKED, -math.inf
+        elif stream.granted is None:
+            stream.give_up(now)
+        else:
+            stream.settle(now, stream.granted)
+            if stream.denied >= 0:
+                self._too_fast = max(self._too_fast, stream.ladder[stream.denied])
 
     def _next(self, now: float) -> Sequence[Message]:
         """Ask for the stream that has been due longest."""
@@ -315,11 +340,9 @@ class Streams:
         if self.legacy:
             return [message for stream in due for message in self._ask_legacy(stream, now)]
         stream = min(due, key=lambda s: s.due or 0.0)
-        rung = stream.granted if stream.granted is not None else stream.choose(self._too_fast)
-        return () if rung is None else self._begin(stream, rung, now)
-
-    def _begin(self, stream: _Stream, rung: int, now: float) -> Sequence[Message]:
-        self._current, self._rung, self._asks = stream, rung, 0
+        rung = stream.choose(self._too_fast)
+        self._current, self._asks = stream, 0
+        self._rung = rung if rung is not None else stream.granted or 0
         return self._ask(stream, now)
 
     def _ask(self, stream: _Stream, now: float) -> Sequence[Message]:
