@@ -1,0 +1,122 @@
+"""What the journal remembers of a push: one frozen record per fact, in the order of the facts.
+
+A transaction is the records with its identifier.  It is *open* from ``Planned`` until
+``Closed``; an open one is what a restart has to take care of (:class:`Recovery`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+from msgspec import Struct
+
+from onboard.push.plan import PushPlan
+
+
+class Result(Enum):
+    """How a transaction ended.
+
+    ``COMPLETED``, ``ROLLED_BACK`` and ``ABORTED`` (nothing was written) are final.
+    ``INTERRUPTED`` and ``OTHER_VEHICLE`` leave it open: it is to be resumed when the
+    autopilot, or the right one, is there again.  ``ABANDONED``: a person gave it up.
+    """
+
+    COMPLETED = "completed"
+    ROLLED_BACK = "rolled_back"
+    ABORTED = "aborted"
+    INTERRUPTED = "interrupted"
+    OTHER_VEHICLE = "other_vehicle"
+    ABANDONED = "abandoned"
+
+
+class Purpose(Enum):
+    """Why a plan is written: a new calibration, or the way back from one."""
+
+    PUSH = "push"
+    ROLL_BACK = "roll_back"
+
+
+class Verdict(Enum):
+    """What the flight after a push said."""
+
+    KEPT = "kept"
+    WORSE = "worse"
+    SUPERSEDED = "superseded"
+
+
+class Planned(Struct, frozen=True, tag="planned"):
+    """A transaction begins; holds everything needed to undo it.  Durable before any write."""
+
+    transaction: str
+    plan: PushPlan
+    purpose: Purpose = Purpose.PUSH
+
+
+class Writing(Struct, frozen=True, tag="writing"):
+    """A PARAM_SET is about to be sent (``undo``: on the way back)."""
+
+    transaction: str
+    name: str
+    before: float
+    value: float
+    undo: bool = False
+
+
+class ReadBack(Struct, frozen=True, tag="read_back"):
+    """The autopilot confirmed a write; ``saved``: and announced that it is stored."""
+
+    transaction: str
+    name: str
+    value: float
+    saved: bool
+
+
+class Undoing(Struct, frozen=True, tag="undoing"):
+    """From here on the transaction is rolled back, also after a crash."""
+
+    transaction: str
+    reason: str
+    sentence: str
+
+
+class Closed(Struct, frozen=True, tag="closed"):
+    """The transaction is over; ``values`` are the six as last read back."""
+
+    transaction: str
+    result: Result
+    reason: str
+    sentence: str
+    values: dict[str, float]
+
+
+class Watched(Struct, frozen=True, tag="watched"):
+    """The verdict of the flight after a completed push."""
+
+    transaction: str
+    verdict: Verdict
+    sentence: str
+
+
+Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """An open transaction as the journal knows it.
+
+    ``undo``: a roll-back had begun and is to be carried on.  ``confirmed``: names that were
+    read back with their wanted value and announced as stored.
+    """
+
+    transaction: str
+    plan: PushPlan
+    purpose: Purpose
+    undo: bool
+    confirmed: frozenset[str]
+
+    @property
+    def all_confirmed(self) -> bool:
+        """Whether every write is known to have been stored: then it may be finished."""
+        return all(c.name in self.confirmed for c in self.plan.changes if c.differs)

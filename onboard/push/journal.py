@@ -1,0 +1,277 @@
+"""Append-only journal of pushes on disk: one JSON line per entry, durable when ``append`` returns.
+
+Why appending and not rewriting the file for every entry: history already on disk is never
+touched again, an entry costs one write and one fsync, and the only damage that a crash or
+a power cut can do is a torn *last* line.  That line's write to the autopilot had not been
+sent (nothing is sent before its entry is durable), so dropping it loses nothing.  Each line
+carries a checksum of its entry, so that a torn line is told from a whole one.  The file is
+rewritten (temporary file, fsync, rename, fsync of the directory) only to keep it small:
+when it has grown past its limit and is opened, or a transaction has just closed.
+
+A damaged line in the middle (worn SD card) is skipped and counted; what was lost with it
+shows: a lost ``Closed`` leaves a transaction open, which reading the autopilot settles; a
+lost ``Planned`` of an open transaction is an error, since nobody knows the old values.
+
+One process at a time: the file is locked while it is open.  Methods block for the time of an
+fsync (milliseconds); an asyncio driver may call them in a thread.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+from zlib import crc32
+
+import msgspec
+
+from onboard.errors import PushError, StateError
+from onboard.push.entries import (
+    Closed,
+    Entry,
+    Planned,
+    Purpose,
+    ReadBack,
+    Recovery,
+    Result,
+    Undoing,
+    Watched,
+)
+
+SCHEMA = 1
+
+
+class Line(msgspec.Struct, frozen=True):
+    """One line of the file; ``at`` is Unix time, for people; ``check`` the CRC-32 of ``entry``."""
+
+    schema: int
+    at: float
+    check: int
+    entry: msgspec.Raw
+
+
+class Journal:
+    """The journal of one daemon.
+
+    Raises:
+        StateError: the file cannot be opened, is in use, or is of a newer version.
+    """
+
+    def __init__(self, path: Path, *, limit_bytes: int = 1_000_000, keep: int = 50) -> None:
+        """Open or make the file.
+
+        Args:
+            path: the file; its directory is made.
+            limit_bytes: size from which on old transactions are dropped.
+            keep: closed transactions kept then.  Open ones, and the last completed push of
+                each accelerometer (what a roll-back goes to), are always kept.
+        """
+        self._path = path
+        self._limit = limit_bytes
+        self._keep = keep
+        self._lines: list[tuple[float, Entry]] = []
+        self._encoder = msgspec.json.Encoder()
+        self._decoder = msgspec.json.Decoder(Entry)
+        self.damaged = 0
+        self._size = 0
+        self._torn = False
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = self._open()
+            self._load()
+        except OSError as error:
+            raise StateError(f"{path}: {error.strerror}") from error
+        if self._size > self._limit:
+            self._compact()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the file."""
+        if self._fd >= 0:
+            os.close(self._fd)
+            self._fd = -1
+
+    @property
+    def entries(self) -> tuple[tuple[float, Entry], ...]:
+        """All entries with their Unix time, oldest first."""
+        return tuple(self._lines)
+
+    def append(self, entry: Entry, at: float) -> None:
+        """Write an entry; it is on the disk when this returns.
+
+        Raises:
+            StateError: it could not be written (disk full, ...): nothing may be sent that
+                relies on it.
+        """
+        line = self._line(entry, at)
+        try:
+            if self._torn:  # the disk was full in the middle of a line: start a clean one
+                os.ftruncate(self._fd, self._size)
+            self._torn = True
+            _write_all(self._fd, line)
+            os.fsync(self._fd)
+        except OSError as error:
+            raise StateError(f"{self._path}: {error.strerror}") from error
+        self._torn = False
+        self._size += len(line)
+        self._lines.append((at, entry))
+        if self._size > self._limit and isinstance(entry, Closed | Watched):
+            self._compact()
+
+    def recover(self) -> tuple[Recovery, ...]:
+        """The transactions that are open, oldest first: each is to be resumed.
+
+        Raises:
+            StateError: one of them has lost its plan.
+        """
+        return tuple(self._recovery(name) for name in self._open_transactions())
+
+    def abandon(self, transaction: str, sentence: str, at: float) -> None:
+        """Give up an open transaction (the airframe is gone): a person's decision."""
+        entry = Closed(transaction, Result.ABANDONED, Result.ABANDONED.value, sentence, {})
+        self.append(entry, at)
+
+    def last_completed(self, imu: int) -> Planned | None:
+        """The push of this accelerometer that is in force: what a roll-back takes back.
+
+        None if there is none, or it was rolled back already.
+        """
+        plans = self._plans()
+        found: Planned | None = None
+        for _, entry in self._lines:
+            if not isinstance(entry, Closed) or entry.result is not Result.COMPLETED:
+                continue
+            planned = plans.get(entry.transaction)
+            if planned is not None and planned.plan.imu == imu:
+                found = planned if planned.purpose is Purpose.PUSH else None
+        return found
+
+    def unwatched(self) -> tuple[Planned, ...]:
+        """Pushes in force on which no flight has given its verdict yet."""
+        seen = {e.transaction for _, e in self._lines if isinstance(e, Watched)}
+        last = (self.last_completed(imu) for imu in range(1, 6))
+        return tuple(p for p in last if p is not None and p.transaction not in seen)
+
+    def _plans(self) -> dict[str, Planned]:
+        return {e.transaction: e for _, e in self._lines if isinstance(e, Planned)}
+
+    def _open_transactions(self) -> list[str]:
+        order: dict[str, None] = {}
+        for _, entry in self._lines:
+            if isinstance(entry, Closed):
+                order.pop(entry.transaction, None)
+            elif not isinstance(entry, Watched):
+                order.setdefault(entry.transaction)
+        return list(order)
+
+    def _recovery(self, transaction: str) -> Recovery:
+        planned = self._plans().get(transaction)
+        if planned is None:
+            raise StateError(
+                f"{self._path}: transaction {transaction} is open but its plan is damaged; "
+                "compare the autopilot's INS_ACC* parameters with a backup"
+            )
+        own = [e for _, e in self._lines if e.transaction == transaction]
+        wanted = planned.plan.wanted
+        return Recovery(
+            transaction=transaction,
+            plan=planned.plan,
+            purpose=planned.purpose,
+            undo=any(isinstance(e, Undoing) for e in own),
+            confirmed=frozenset(
+                e.name
+                for e in own
+                if isinstance(e, ReadBack) and e.saved and e.value == wanted.get(e.name)
+            ),
+        )
+
+    def _open(self) -> int:
+        fd = os.open(self._path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(fd)
+            raise StateError(f"{self._path}: in use by another process") from None
+        _sync_directory(self._path.parent)
+        return fd
+
+    def _load(self) -> None:
+        data = self._path.read_bytes()
+        whole, _, torn = data.rpartition(b"\n")
+        self._size = len(data) - len(torn)
+        self._torn = bool(torn)
+        for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
+            try:
+                record = msgspec.json.decode(line, type=Line)
+                if record.schema > SCHEMA:
+                    raise StateError(f"{self._path}: line {number} is of a newer version")
+                if crc32(bytes(record.entry)) != record.check:
+                    self.damaged += 1
+                    continue
+                self._lines.append((record.at, self._decoder.decode(record.entry)))
+            except (msgspec.DecodeError, UnicodeDecodeError, PushError):
+                self.damaged += 1
+
+    def _line(self, entry: Entry, at: float) -> bytes:
+        body = self._encoder.encode(entry)
+        line = Line(SCHEMA, at, crc32(body), msgspec.Raw(body))
+        return self._encoder.encode(line) + b"\n"
+
+    def _compact(self) -> None:
+        """Rewrite the file with what is still needed; on failure the old file stays in use."""
+        keep = set(self._open_transactions())
+        for imu in range(1, 6):
+            last = self.last_completed(imu)
+            if last is not None:
+                keep.add(last.transaction)
+        closed = [e.transaction for _, e in self._lines if isinstance(e, Closed)]
+        keep.update(closed[max(0, len(closed) - self._keep) :])
+        lines = [(at, e) for at, e in self._lines if e.transaction in keep]
+        if len(lines) == len(self._lines) and not self.damaged:
+            return
+        temporary = self._path.with_suffix(self._path.suffix + ".new")
+        data = b"".join(self._line(e, at) for at, e in lines)
+        fd = -1
+        try:
+            fd = os.open(temporary, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_TRUNC, 0o600)
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _write_all(fd, data)
+            os.fsync(fd)
+            temporary.rename(self._path)
+        except OSError:
+            if fd >= 0:
+                os.close(fd)
+                temporary.unlink(missing_ok=True)
+            return
+        os.close(self._fd)
+        self._fd, self._size, self._lines, self.damaged = fd, len(data), lines, 0
+        self._torn = False
+        with contextlib.suppress(OSError):  # either file is whole, whichever survives
+            _sync_directory(self._path.parent)
+
+
+def _write_all(fd: int, data: bytes) -> None:
+    view = memoryview(data)
+    while view:
+        view = view[os.write(fd, view) :]
+
+
+def _sync_directory(path: Path) -> None:
+    fd = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

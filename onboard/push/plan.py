@@ -1,0 +1,253 @@
+"""What would be written: a calibration and the autopilot's current values make a plan.
+
+Estimates are absolute (raw units), so the wanted parameter simply *is* the estimate, as
+float32; numbers that the flight did not show stay at the value in force and the others are
+conditioned on that (:mod:`onboard.push.conditioning`).
+
+**Order of the writes.**  PARAM_SET takes effect on the next sample and there is no atomic
+group, so between the writes the autopilot flies on a mixture.  Three choices make each
+mixture harmless:
+
+* Scale and offset of one axis follow each other at once: never more than one axis is mixed.
+* Within an axis, of the two possible mixtures (old scale, new offset) and (new scale, old
+  offset) the one is passed that errs less against the wanted calibration.  With
+  ``f = s (raw - o)`` the first errs by ``|s0 / s1 - 1| g`` when that axis carries gravity,
+  the second by ``|s1 (o1 - o0)|``.  Usually one of them is smaller than the error that is
+  being corrected; where scale and offset cancel each other (a hover calibration), neither
+  is, and the smaller one is the best to be had.
+* The axis with the largest target offset comes first.  Proof that the offset vector is then
+  never exactly zero in between (ArduPilot takes that for "never calibrated"): until that
+  axis is written the vector is the starting one, not zero; from then on it holds a non-zero
+  element.  The same order and proof hold for a roll-back, and from any mixture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.result import Calibration, Six
+from onboard.core.samples import Vector3
+from onboard.errors import PushError
+from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.conditioning import condition
+
+GRAVITY = 9.80665
+UNCHANGED = 1.2e-7
+"""Below FLT_EPSILON ArduPilot takes two floats for equal and may not store the difference."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """Whom a plan is for; ``device_id`` is the accelerometer's INS_ACC_ID as PARAM_VALUE has it.
+
+    ``board`` is the autopilot's unique id in hex (AUTOPILOT_VERSION), empty if not known.
+    """
+
+    system_id: int
+    device_id: float
+    board: str = ""
+
+    def same_airframe(self, system_id: int, board: str = "") -> bool:
+        """Whether a link to this system and board can be this vehicle."""
+        if self.system_id != system_id:
+            return False
+        return not (self.board and board) or self.board == board
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One parameter: value in force, value wanted (both float32), bounds, conditional sigma.
+
+    ``kept``: the flight does not show this number, it stays as it is.
+    """
+
+    name: str
+    before: float
+    wanted: float
+    low: float
+    high: float
+    sigma: float
+    kept: bool = False
+
+    @property
+    def differs(self) -> bool:
+        """Whether there is anything to write."""
+        return self.before != self.wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Residuals at the time of the plan, for judging it later; None where not known.
+
+    Whitened RMS on held-out segments with the parameters in force and with the estimate,
+    and velocity RMS (m/s) with the parameters in force.
+    """
+
+    held_out_before: float | None
+    held_out_after: float | None
+    velocity_rms_before: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PushPlan:
+    """Six parameters of one accelerometer, order of ``parameter_names(imu).six``.
+
+    Cannot exist with other names, or with values that are not finite float32s.
+
+    Raises:
+        PushError: the changes are not those six, or not float32.
+    """
+
+    vehicle: Vehicle
+    imu: int
+    changes: tuple[Change, ...]
+    baseline: Baseline
+    contradiction: float = 0.0
+    contradiction_limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        try:
+            names = parameter_names(self.imu)
+        except ValueError as error:
+            raise PushError(str(error)) from None
+        if tuple(c.name for c in self.changes) != names.six:
+            raise PushError(f"a plan for IMU {self.imu} holds exactly {', '.join(names.six)}")
+        for c in self.changes:
+            for value in (c.before, c.wanted):
+                if not math.isfinite(value) or to_float32(value) != value:
+                    raise PushError(f"{c.name}: {value} is not a float32")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The six names."""
+        return tuple(c.name for c in self.changes)
+
+    @property
+    def device_id_name(self) -> str:
+        """Parameter that identifies the accelerometer; read, never written."""
+        return parameter_names(self.imu).device_id
+
+    @property
+    def before(self) -> dict[str, float]:
+        """Value in force by name."""
+        return {c.name: c.before for c in self.changes}
+
+    @property
+    def wanted(self) -> dict[str, float]:
+        """Wanted value by name."""
+        return {c.name: c.wanted for c in self.changes}
+
+    def six_before(self) -> SixParameters:
+        """Scale and offset in force."""
+        return _six([c.before for c in self.changes])
+
+    def six_wanted(self) -> SixParameters:
+        """Scale and offset wanted."""
+        return _six([c.wanted for c in self.changes])
+
+    def reversed(self) -> PushPlan:
+        """The plan that takes this one back: written like any other plan."""
+        changes = tuple(
+            Change(c.name, c.wanted, c.before, c.low, c.high, c.sigma, c.kept) for c in self.changes
+        )
+        return PushPlan(self.vehicle, self.imu, changes, self.baseline)
+
+    def write_order(self, current: Mapping[str, float], *, undo: bool = False) -> tuple[str, ...]:
+        """Names to write, in a safe order, to get from ``current`` to wanted (undo: before)."""
+        target = self.before if undo else self.wanted
+        names = parameter_names(self.imu)
+        axes = sorted(range(3), key=lambda i: -abs(target[names.offset[i]]))
+        order: list[str] = []
+        for i in axes:
+            scale, offset = self.changes[i], self.changes[3 + i]
+            errs_old_scale = abs(scale.before / scale.wanted - 1.0) * GRAVITY
+            errs_old_offset = abs(scale.wanted * (offset.wanted - offset.before))
+            through_old_scale = errs_old_scale <= errs_old_offset
+            offset_first = through_old_scale != undo
+            pair = (offset.name, scale.name) if offset_first else (scale.name, offset.name)
+            order += [name for name in pair if current[name] != target[name]]
+        return tuple(order)
+
+
+def propose(
+    calibration: Calibration,
+    current: Mapping[str, float],
+    *,
+    system_id: int,
+    board: str = "",
+    scale_bounds: tuple[float, float] = (0.8, 1.2),
+    offset_bound: float = 3.5,
+) -> PushPlan:
+    """Plan for one accelerometer; ``current`` holds the autopilot's values by name.
+
+    Whether it may be written is :func:`onboard.push.policy.judge`'s to say.
+
+    Raises:
+        PushError: a current value is missing, or the calibration is no usable estimate
+            (not finite, covariance not positive definite).
+    """
+    names = parameter_names(calibration.imu)
+    missing = [n for n in (*names.six, names.device_id) if n not in current]
+    if missing:
+        raise PushError(f"the autopilot has not told {', '.join(missing)}")
+    before = [to_float32(current[n]) for n in names.six]
+    held = [not seen for seen in calibration.observable]
+    try:
+        result = condition(
+            calibration.scale + calibration.offset,
+            np.array(calibration.covariance, dtype=np.float64),
+            held,
+            before,
+        )
+        wanted = [to_float32(v) for v in result.values]
+    except ValueError as error:
+        raise PushError(f"IMU {calibration.imu}: {error}") from None
+    changes = []
+    for i, name in enumerate(names.six):
+        low, high = scale_bounds if i < 3 else (-offset_bound, offset_bound)
+        stays = held[i] or abs(wanted[i] - before[i]) < UNCHANGED
+        changes.append(
+            Change(
+                name=name,
+                before=before[i],
+                wanted=before[i] if stays else wanted[i],
+                low=low,
+                high=high,
+                sigma=result.sigmas[i],
+                kept=held[i],
+            )
+        )
+    return PushPlan(
+        vehicle=Vehicle(system_id, current[names.device_id], board),
+        imu=calibration.imu,
+        changes=tuple(changes),
+        baseline=Baseline(
+            _finite(calibration.held_out_before),
+            _finite(calibration.held_out_after),
+            _finite(calibration.velocity_rms_before),
+        ),
+        contradiction=result.contradiction,
+        contradiction_limit=result.limit,
+    )
+
+
+def offset_is_zero(offset: tuple[float, ...]) -> bool:
+    """Whether ArduPilot may take this offset vector for "never calibrated"."""
+    return all(abs(o) < UNCHANGED for o in offset)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _six(values: list[float]) -> SixParameters:
+    six = cast("Six", tuple(values))
+    scale: Vector3 = six[:3]
+    offset: Vector3 = six[3:]
+    return SixParameters(scale, offset)

@@ -1,0 +1,115 @@
+"""What a push transaction is told, what it wants done, and how it ends: frozen records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TypeAlias
+
+from onboard.mavlink.parameter_messages import ParameterEvent, SendAction
+from onboard.push.entries import Entry, Purpose, Result
+from onboard.push.plan import PushPlan
+
+
+class Reason(Enum):
+    """Why a transaction did not simply complete."""
+
+    NONE = "none"
+    CHANGED_BY_OTHER = "changed_by_other"
+    ARMED = "armed"
+    EKF_UNHEALTHY = "ekf_unhealthy"
+    DENIED = "denied"
+    NOT_SAVED = "not_saved"
+    SILENT = "silent"
+    LINK_LOST = "link_lost"
+    REBOOTED = "rebooted"
+    REVERTED = "reverted"
+    JOURNAL_FAILED = "journal_failed"
+    CANCELLED = "cancelled"
+    OTHER_VEHICLE = "other_vehicle"
+    TOO_LONG = "too_long"
+    RESTARTED = "restarted"
+
+
+@dataclass(frozen=True, slots=True)
+class JournalWritten:
+    """The oldest unconfirmed ``Record`` is on the disk."""
+
+
+@dataclass(frozen=True, slots=True)
+class JournalFailed:
+    """The oldest unconfirmed ``Record`` could not be written."""
+
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleReport:
+    """Armed state and EKF health (:func:`onboard.push.policy.ekf_healthy`), None if unknown."""
+
+    armed: bool | None = None
+    ekf_healthy: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Rebooted:
+    """The autopilot's boot time went back."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkLost:
+    """No heartbeat: what is sent now will not arrive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cancelled:
+    """A person, or the daemon's shutdown, wants it undone."""
+
+    sentence: str
+
+
+TransactionEvent: TypeAlias = (
+    ParameterEvent
+    | JournalWritten
+    | JournalFailed
+    | VehicleReport
+    | Rebooted
+    | LinkLost
+    | Cancelled
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Append ``entry`` to the journal, durably, before the next output."""
+
+    entry: Entry
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How it ended; ``values`` are the six as last read back, ``left`` those of somebody else.
+
+    ``open``: the journal still holds the transaction as open, it has to be resumed.
+    """
+
+    transaction: str
+    plan: PushPlan
+    purpose: Purpose
+    result: Result
+    reason: Reason
+    sentence: str
+    values: Mapping[str, float] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
+    open: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The last output of a transaction."""
+
+    outcome: Outcome
+
+
+TransactionOutput: TypeAlias = SendAction | Record | Finished

@@ -1,0 +1,552 @@
+"""One push as a sans-IO transaction: six parameters of one accelerometer, all or none.
+
+Two rules, and everything else follows from them:
+
+1. Nothing is written before what undoes it is durable: the first PARAM_SET leaves only after
+   the driver has confirmed the journal's ``Planned`` entry.
+2. After the first write there are three ways out: all six read back new, all six read back
+   old (what somebody else wrote meanwhile is left alone), or the journal stays open and the
+   transaction is resumed later.  Any trouble on the way to "new" turns it towards "old",
+   and nothing turns it back.
+
+The state machine is :data:`onboard.push.states.TRANSITIONS`; the code below only says what is
+done on entering a state and which trigger an event amounts to.  A driver does this::
+
+    transaction = PushTransaction(plan, identifier=..., system_id=..., allow_armed=False)
+    # or: PushTransaction.resume(recovery, system_id=...)  when policy.moment() has no objection
+    outputs = transaction.start(now)
+    outputs = transaction.feed(event, now)   # any TransactionEvent (onboard.push.signals)
+    outputs = transaction.tick(now)          # not later than transaction.next_deadline()
+
+and acts on the outputs strictly in their order:
+
+``SendParamRead``, ``SendParamSet``
+    send it (:func:`onboard.mavlink.parameter_messages.parameter_message`).
+``Record(entry)``
+    ``journal.append(entry, unix_time)``, then feed ``JournalWritten()``, or
+    ``JournalFailed(sentence)`` on :class:`~onboard.errors.StateError`, before going on with
+    the next output.
+``Finished(outcome)``
+    the last output.  If ``outcome.open``, ask ``journal.recover()`` once the autopilot is
+    heard again.
+
+Feed it every PARAM_VALUE, PARAM_ERROR and STATUSTEXT of the autopilot (others' too: that is how
+a concurrent change is seen), each change of armed state and EKF health, reboots and the
+loss of the link.  One transaction at a time: IMUs are pushed one after the other.
+
+**Late packets.**  A link may duplicate and delay a PARAM_SET, and the protocol has nothing
+to tell an old one from a new one.  So, after the last write, the transaction lets
+``settle_s`` pass before it reads all six once more and believes them.
+
+**Arming.**  A landed push that sees the vehicle arm goes back at once: the old values have
+flown, a half-verified set has not.  A resumed transaction whose writes had all been
+confirmed needs only reading, and is finished whether armed or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Self
+
+from onboard.errors import PushError
+from onboard.mavlink.parameter_messages import (
+    ErrorReceived,
+    SendParamSet,
+    TextReceived,
+    ValueReceived,
+)
+from onboard.mavlink.parameters import (
+    ClientSettings,
+    Failure,
+    ParameterClient,
+    ParameterOutput,
+    ReadFailed,
+    SetDone,
+    SetFailed,
+    ValueChanged,
+    ValueRead,
+)
+from onboard.push.entries import (
+    Closed,
+    Entry,
+    Planned,
+    Purpose,
+    ReadBack,
+    Recovery,
+    Result,
+    Undoing,
+    Writing,
+)
+from onboard.push.plan import PushPlan, offset_is_zero
+from onboard.push.signals import (
+    Cancelled,
+    Finished,
+    JournalFailed,
+    JournalWritten,
+    LinkLost,
+    Outcome,
+    Reason,
+    Rebooted,
+    Record,
+    TransactionEvent,
+    TransactionOutput,
+    VehicleReport,
+)
+from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TransactionSettings:
+    """``settle_s`` must exceed the longest delay of the link; ``limit_s`` is for the way to new."""
+
+    client: ClientSettings = field(default_factory=ClientSettings)
+    settle_s: float = 2.0
+    limit_s: float = 60.0
+    undo_rounds: int = 3
+
+
+class PushTransaction:
+    """See the module.  ``start`` once, then ``feed`` and ``tick`` until ``Finished``."""
+
+    def __init__(
+        self,
+        plan: PushPlan,
+        *,
+        identifier: str,
+        system_id: int,
+        board: str = "",
+        allow_armed: bool = False,
+        purpose: Purpose = Purpose.PUSH,
+        settings: TransactionSettings | None = None,
+    ) -> None:
+        """A new push.
+
+        Args:
+            plan: what to write; judged already (:func:`onboard.push.policy.judge`).
+            identifier: names the transaction in the journal, unique for ever.
+            system_id: system id of the autopilot on this link.
+            board: its unique id where known, as in :class:`~onboard.push.plan.Vehicle`.
+            allow_armed: an in-flight push; then the EKF is watched instead of arming.
+            purpose: what the plan is for; a roll-back is the plan ``reversed()``.
+            settings: patience.
+        """
+        self._plan = plan
+        self._identifier = identifier
+        self._purpose = purpose
+        self._right_link = plan.vehicle.same_airframe(system_id, board)
+        self._allow_armed = allow_armed
+        self._settings = settings or TransactionSettings()
+        self._client = ParameterClient(self._settings.client)
+        self._recovery: Recovery | None = None
+        self._turned = False
+        self._state = State.NEW
+        self._out: list[TransactionOutput] = []
+        self._unconfirmed = 0
+        self._journal_broken = False
+        self._awaiting: set[str] = set()
+        self._values: dict[str, float] = {}
+        self._queue: list[str] = []
+        self._written: set[str] = set()
+        self._left: dict[str, float] = {}
+        self._undo_unsaved = False
+        self._rounds = 0
+        self._finishing = False
+        self._limit_at: float | None = None
+        self._settled_at: float | None = None
+        self._result = Result.INTERRUPTED
+        self._reason, self._sentence = Reason.NONE, ""
+        self._outcome: Outcome | None = None
+
+    @classmethod
+    def resume(
+        cls,
+        recovery: Recovery,
+        *,
+        system_id: int,
+        board: str = "",
+        settings: TransactionSettings | None = None,
+    ) -> Self:
+        """Take up what a crash, a lost link or a reboot left open.
+
+        It is finished if every write had been confirmed and all six still read new, undone
+        otherwise.  It writes: start it when :func:`onboard.push.policy.moment` allows.
+        """
+        new = cls(
+            recovery.plan,
+            identifier=recovery.transaction,
+            system_id=system_id,
+            board=board,
+            purpose=recovery.purpose,
+            settings=settings,
+        )
+        new._recovery = recovery
+        new._turned = recovery.undo
+        return new
+
+    @property
+    def state(self) -> State:
+        """Where it is."""
+        return self._state
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How it ended, None while it runs."""
+        return self._outcome
+
+    @property
+    def plan(self) -> PushPlan:
+        """What it writes."""
+        return self._plan
+
+    def start(self, now: float) -> tuple[TransactionOutput, ...]:
+        """Begin.
+
+        Raises:
+            PushError: it was started before.
+        """
+        if self._state is not State.NEW:
+            raise PushError(f"transaction {self._identifier} was started before")
+        self._limit_at = now + self._settings.limit_s
+        if not self._right_link:
+            self._note(Reason.OTHER_VEHICLE, "this is not the airframe that the plan is for")
+            self._result = Result.OTHER_VEHICLE if self._recovery else Result.ABORTED
+            self._go(Trigger.STUCK, now)
+        elif self._recovery is None:
+            self._go(Trigger.PUSH, now)
+        else:
+            self._note(Reason.RESTARTED, "the transaction had been interrupted")
+            self._go(Trigger.RESUME, now)
+        return self._flush()
+
+    def next_deadline(self) -> float | None:
+        """When :meth:`tick` is due, None if only an event can move it."""
+        if self._state is State.FINISHED:
+            return None
+        deadlines = [self._client.next_deadline(), self._settled_at]
+        if self._state in FORWARD:
+            deadlines.append(self._limit_at)
+        return min((d for d in deadlines if d is not None), default=None)
+
+    def tick(self, now: float) -> tuple[TransactionOutput, ...]:
+        """Let time pass."""
+        if self._state in {State.NEW, State.FINISHED}:
+            return ()
+        self._absorb(self._client.tick(now), now)
+        if self._settled_at is not None and now >= self._settled_at:
+            self._settled_at = None
+            self._go(Trigger.WAITED, now)
+        if self._state in FORWARD and self._limit_at is not None and now >= self._limit_at:
+            self._trouble(Reason.TOO_LONG, f"not done in {self._settings.limit_s:g} s", now)
+        return self._flush()
+
+    def feed(self, event: TransactionEvent, now: float) -> tuple[TransactionOutput, ...]:
+        """Take one event; after the end nothing happens any more."""
+        if self._state in {State.NEW, State.FINISHED}:
+            return ()
+        match event:
+            case ValueReceived() | ErrorReceived() | TextReceived():
+                self._absorb(self._client.feed(event, now), now)
+            case JournalWritten():
+                self._journalled(now)
+            case JournalFailed(sentence):
+                self._journal_broken = True
+                self._trouble(Reason.JOURNAL_FAILED, f"the journal failed: {sentence}", now)
+                self._journalled(now)
+            case VehicleReport():
+                self._vehicle(event, now)
+            case Rebooted():
+                self._trouble(Reason.REBOOTED, "the autopilot rebooted in the middle", now)
+            case LinkLost():
+                self._stuck(Reason.LINK_LOST, "the link was lost", now)
+            case Cancelled(sentence):
+                if not self._finishing:
+                    self._trouble(Reason.CANCELLED, sentence, now)
+        return self._flush()
+
+    # What events amount to
+
+    def _vehicle(self, report: VehicleReport, now: float) -> None:
+        if self._finishing or not report.armed:
+            return
+        if not self._allow_armed:
+            self._trouble(Reason.ARMED, "the vehicle was armed in the middle", now)
+        elif report.ekf_healthy is False:
+            self._trouble(Reason.EKF_UNHEALTHY, "the EKF became unhealthy", now)
+
+    def _journalled(self, now: float) -> None:
+        self._unconfirmed = max(0, self._unconfirmed - 1)
+        if self._unconfirmed == 0 and self._state in {State.RECORDING, State.CLOSING}:
+            self._go(Trigger.DURABLE, now)
+
+    def _trouble(self, reason: Reason, sentence: str, now: float) -> None:
+        """Turn towards "old"; on that way already, or closing, it changes nothing."""
+        if self._state not in FORWARD:
+            return
+        self._note(reason, sentence)
+        self._go(Trigger.TROUBLE, now)
+
+    def _stuck(self, reason: Reason, sentence: str, now: float) -> None:
+        if self._state is State.CLOSING:
+            return  # everything is read back: only the journal is waited for
+        if self._state in FORWARD or self._reason in {Reason.NONE, Reason.RESTARTED}:
+            self._note(reason, sentence)
+        else:
+            self._sentence += f"; then {sentence}"
+        self._go(Trigger.STUCK, now)
+
+    def _note(self, reason: Reason, sentence: str) -> None:
+        self._reason, self._sentence = reason, sentence
+
+    def _absorb(self, outputs: tuple[ParameterOutput, ...], now: float) -> None:
+        for output in outputs:
+            match output:
+                case ValueRead(name, value):
+                    self._value_read(name, value, now)
+                case ReadFailed(name, failure):
+                    self._stuck_or_trouble(name, failure, now)
+                case SetDone():
+                    self._set_done(output, now)
+                case SetFailed(name, failure, value):
+                    self._set_failed(name, failure, value, now)
+                case ValueChanged(name, _, value):
+                    # May be a late duplicate: only a read of our own convicts.
+                    if self._state in FORWARD and value != self._expected(name, value):
+                        self._absorb(self._client.read((name,), now), now)
+                case SendParamSet(name, value):
+                    # After a turn of direction an overdue resend must not write the old goal.
+                    if self._may_send(name, value):
+                        self._out.append(output)
+                case _:
+                    self._out.append(output)
+
+    def _may_send(self, name: str, value: float) -> bool:
+        target = {State.WRITING: self._plan.wanted, State.UNDOING: self._plan.before}
+        return target.get(self._state, {}).get(name) == value
+
+    def _expected(self, name: str, otherwise: float) -> float:
+        if name == self._plan.device_id_name:
+            return self._plan.vehicle.device_id
+        if name not in self._plan.names:
+            return otherwise
+        written = name in self._written or self._finishing
+        return (self._plan.wanted if written else self._plan.before)[name]
+
+    def _value_read(self, name: str, value: float, now: float) -> None:
+        if name in self._awaiting:
+            self._awaiting.discard(name)
+            self._values[name] = value
+            if not self._awaiting:
+                self._all_read(now)
+        elif self._state in FORWARD and value != self._expected(name, value):
+            self._trouble(Reason.CHANGED_BY_OTHER, f"{name} became {value:.7g} meanwhile", now)
+
+    def _stuck_or_trouble(self, name: str, failure: Failure, now: float) -> None:
+        sentence = f"{name} cannot be read: {failure.value}"
+        if self._state in FORWARD:
+            self._trouble(Reason.SILENT, sentence, now)
+        else:
+            self._stuck(Reason.SILENT, sentence, now)
+
+    def _set_done(self, done: SetDone, now: float) -> None:
+        self._values[done.name] = done.value
+        self._record(ReadBack(self._identifier, done.name, done.value, done.saved))
+        if not done.saved:
+            self._undo_unsaved |= self._state is State.UNDOING
+            sentence = f"{done.name} is in force, but the autopilot does not say that it is stored"
+            self._trouble(Reason.NOT_SAVED, sentence, now)
+        if self._state in {State.WRITING, State.UNDOING}:
+            self._write_next(now)
+
+    def _set_failed(self, name: str, failure: Failure, value: float | None, now: float) -> None:
+        reason = {
+            Failure.SILENT: Reason.SILENT,
+            Failure.CHANGED_BY_OTHER: Reason.CHANGED_BY_OTHER,
+        }.get(failure, Reason.DENIED)
+        sentence = f"{name} was not written: {failure.value}"
+        if self._state is State.WRITING:
+            self._trouble(reason, sentence, now)
+        elif self._state is State.UNDOING:
+            if reason is Reason.CHANGED_BY_OTHER and value is not None:
+                self._left[name] = self._values[name] = value
+                self._write_next(now)
+            else:
+                self._stuck(reason, sentence, now)
+
+    def _all_read(self, now: float) -> None:
+        """The six and the accelerometer's id were read: what do they say?"""
+        plan, values = self._plan, self._values
+        if values[plan.device_id_name] != plan.vehicle.device_id:
+            sentence = f"{plan.device_id_name} is another accelerometer's"
+            if self._state in FORWARD:
+                self._trouble(Reason.OTHER_VEHICLE, sentence, now)
+            else:
+                self._result = Result.OTHER_VEHICLE
+                self._stuck(Reason.OTHER_VEHICLE, sentence, now)
+            return
+        if self._state in FORWARD:
+            target = plan.before if self._state is State.COMPARING else plan.wanted
+            wrong = [n for n in plan.names if values[n] != target[n]]
+            if not wrong:
+                self._go(Trigger.AGREES, now)
+                return
+            foreign = self._state is State.COMPARING or self._foreign()
+            reason = Reason.CHANGED_BY_OTHER if foreign else Reason.REVERTED
+            told = ", ".join(f"{n} is {values[n]:.7g}, not {target[n]:.7g}" for n in wrong)
+            self._trouble(reason, told, now)
+            return
+        self._left = self._foreign()
+        if self._can_finish():
+            self._go(Trigger.ALL_NEW, now)
+        elif self._undo_order():
+            self._go(Trigger.DIFFERS, now)
+        elif self._undo_unsaved and self._state is State.UNDO_VERIFYING:
+            sentence = "the old values are in force, but not known to be stored"
+            self._stuck(Reason.NOT_SAVED, sentence, now)
+        else:
+            self._go(Trigger.AGREES, now)
+
+    def _foreign(self) -> dict[str, float]:
+        """Values that are neither old nor new: somebody else's, not ours to touch."""
+        return {
+            c.name: self._values[c.name]
+            for c in self._plan.changes
+            if self._values[c.name] not in {c.before, c.wanted}
+        }
+
+    def _can_finish(self) -> bool:
+        """Whether a resumed transaction needs nothing but its verification."""
+        if self._turned or self._recovery is None or self._state is not State.INSPECTING:
+            return False
+        wanted = self._plan.wanted
+        return self._recovery.all_confirmed and all(
+            self._values[n] == wanted[n] for n in self._plan.names
+        )
+
+    def _undo_order(self) -> tuple[str, ...]:
+        current = {n: self._values[n] for n in self._plan.names}
+        names = self._plan.write_order(current, undo=True)
+        return tuple(n for n in names if n not in self._left)
+
+    # What is done on entering a state
+
+    def _go(self, trigger: Trigger, now: float) -> None:
+        following = TRANSITIONS[self._state].get(trigger)
+        if following is None:
+            raise PushError(f"no transition from {self._state.value} by {trigger.value}")
+        previous, self._state = self._state, following
+        self._settled_at = None
+        match following:
+            case State.COMPARING | State.VERIFYING | State.UNDO_VERIFYING:
+                self._read_six(now)
+            case State.RECORDING:
+                self._record(Planned(self._identifier, self._plan, self._purpose))
+            case State.WRITING:
+                self._queue = list(self._plan.write_order(self._values))
+                self._write_next(now)
+            case State.SETTLING | State.UNDO_SETTLING:
+                self._finishing = previous is State.INSPECTING and following is State.SETTLING
+                self._settled_at = now + self._settings.settle_s
+            case State.INSPECTING:
+                if previous is not State.NEW:
+                    self._turn()
+                self._read_six(now)
+            case State.UNDOING:
+                self._undo(now)
+            case State.CLOSING:
+                self._close(previous)
+            case State.FINISHED:
+                self._finish(previous)
+
+    def _read_six(self, now: float) -> None:
+        self._client.cancel()
+        names = (*self._plan.names, self._plan.device_id_name)
+        self._awaiting = set(names)
+        self._absorb(self._client.read(names, now), now)
+
+    def _turn(self) -> None:
+        """From here on back to old, also after a crash."""
+        self._finishing = False
+        self._turned = True
+        self._record(Undoing(self._identifier, self._reason.value, self._sentence))
+
+    def _undo(self, now: float) -> None:
+        if not self._turned:
+            self._turn()
+        self._rounds += 1
+        if self._rounds > self._settings.undo_rounds:
+            self._stuck(Reason.REVERTED, "what is undone does not stay undone", now)
+            return
+        self._queue = list(self._undo_order())
+        self._write_next(now)
+
+    def _write_next(self, now: float) -> None:
+        undo = self._state is State.UNDOING
+        target = self._plan.before if undo else self._plan.wanted
+        while self._queue:
+            name = self._queue.pop(0)
+            if self._would_be_zero(name, target[name]):
+                if not undo:
+                    self._trouble(Reason.CHANGED_BY_OTHER, "all offsets would be zero", now)
+                    return
+                self._left[name] = self._values[name]
+                continue
+            previous = self._values[name]
+            self._written.add(name)
+            self._record(Writing(self._identifier, name, previous, target[name], undo))
+            self._absorb(self._client.set(name, target[name], now, before=previous), now)
+            return
+        self._go(Trigger.DONE, now)
+
+    def _would_be_zero(self, name: str, value: float) -> bool:
+        """Whether this write would leave three zero offsets where there were none before.
+
+        The order of the writes rules it out; only somebody else's write in between can bring
+        it about.
+        """
+        offsets = self._plan.names[3:]
+        if name not in offsets or offset_is_zero(self._plan.six_before().offset):
+            return False
+        return offset_is_zero(tuple(value if n == name else self._values[n] for n in offsets))
+
+    def _close(self, previous: State) -> None:
+        if previous is State.VERIFYING:
+            self._result = Result.COMPLETED
+            self._sentence = self._sentence or "all six read back as wanted"
+        elif previous is State.RECORDING:
+            self._result = Result.ABORTED
+        else:
+            self._result = Result.ROLLED_BACK
+            if self._left:
+                self._sentence += f"; {', '.join(self._left)} left as somebody else set it"
+        values = {n: self._values[n] for n in self._plan.names}
+        entry = Closed(self._identifier, self._result, self._reason.value, self._sentence, values)
+        self._record(entry)
+
+    def _finish(self, previous: State) -> None:
+        self._client.cancel()
+        if previous is State.COMPARING:
+            self._result = Result.ABORTED
+        still_open = self._result in {Result.INTERRUPTED, Result.OTHER_VEHICLE}
+        self._outcome = Outcome(
+            transaction=self._identifier,
+            plan=self._plan,
+            purpose=self._purpose,
+            result=self._result,
+            reason=self._reason,
+            sentence=self._sentence,
+            values=MappingProxyType(
+                {n: self._values[n] for n in self._plan.names if n in self._values}
+            ),
+            left=tuple(self._left),
+            open=still_open or (self._journal_broken and previous is not State.COMPARING),
+        )
+        self._out.append(Finished(self._outcome))
+
+    def _record(self, entry: Entry) -> None:
+        self._unconfirmed += 1
+        self._out.append(Record(entry))
+
+    def _flush(self) -> tuple[TransactionOutput, ...]:
+        out, self._out = tuple(self._out), []
+        return out

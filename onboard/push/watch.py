@@ -1,0 +1,133 @@
+"""The flight after a push judges it: kept, or rolled back.
+
+Feed :class:`PushWatch` with the calibration of *what was flown since the push* (sums begun
+after it) when a trust window closes; it is sans-IO and answers with a verdict once there is
+enough to judge.  Two questions are asked:
+
+* Has the held-out residual with the pushed parameters become larger than it was with the old
+  ones?  Whitened, so that flights compare; velocity RMS where there is no whitened one.
+* Would the old parameters have done better on *this* flight?  The residual sum of the linear
+  model is a parabola about the new estimate, ``J(p) = J(x) + (p - x)^T P^-1 (p - x)``, so the
+  difference between old and pushed needs nothing but the estimate and its covariance.
+
+The second compares like with like and therefore overrules the first where it is clear
+(``evidence``): a rough flight is no reason to go back to values that would have been worse.
+
+A push made in flight is also watched for EKF health during its first half minute.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.result import Calibration
+from onboard.push.entries import Planned, Verdict, Watched
+from onboard.push.plan import PushPlan
+from onboard.push.signals import VehicleReport
+
+SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchSettings:
+    """``margin``: share by which a residual may grow; ``evidence``: of a residual sum, clear."""
+
+    minimum_s: float = 60.0
+    margin: float = 0.1
+    evidence: float = 9.0
+    ekf_s: float = 30.0
+
+
+class PushWatch:
+    """Judges one completed push.
+
+    Args:
+        pushed: its journal entry (:meth:`onboard.push.journal.Journal.unwatched`).
+        settings: limits.
+        in_flight_since: when it was written, if the vehicle was flying.
+    """
+
+    def __init__(
+        self,
+        pushed: Planned,
+        settings: WatchSettings | None = None,
+        *,
+        in_flight_since: float | None = None,
+    ) -> None:
+        self._pushed = pushed
+        self._settings = settings or WatchSettings()
+        self._in_flight_since = in_flight_since
+
+    @property
+    def plan(self) -> PushPlan:
+        """What was written; ``reversed()`` is the way back."""
+        return self._pushed.plan
+
+    def vehicle(self, report: VehicleReport, now: float) -> Watched | None:
+        """Take a change of armed state or EKF health."""
+        since = self._in_flight_since
+        if since is None or now - since > self._settings.ekf_s or report.ekf_healthy is not False:
+            return None
+        return self._say(Verdict.WORSE, f"the EKF became unhealthy {now - since:.0f} s after it")
+
+    def judge(self, flown: Calibration) -> Watched | None:
+        """Verdict on the calibration of the flight since the push; None: not enough yet."""
+        plan = self._pushed.plan
+        if flown.imu != plan.imu or not flown.parameters_known:
+            return None
+        if flown.trusted_s < self._settings.minimum_s:
+            return None
+        in_force = np.array(flown.in_force_scale + flown.in_force_offset)
+        if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > SAME:
+            return self._say(Verdict.SUPERSEDED, "somebody has changed the parameters since")
+        worse = self._residual_worse(flown)
+        preference = _preference(plan, flown)
+        clear = self._settings.evidence
+        if preference is not None and preference < -clear:
+            sentence = f"the old values fit this flight better (by {-preference:.3g} in J)"
+            return self._say(Verdict.WORSE, sentence)
+        if worse is None and preference is None:
+            return None
+        if worse and (preference is None or preference < clear):
+            return self._say(Verdict.WORSE, worse)
+        if worse:
+            sentence = f"{worse}, but the old values would have done worse still on this flight"
+            return self._say(Verdict.KEPT, sentence)
+        return self._say(Verdict.KEPT, "the residual has not grown")
+
+    def _residual_worse(self, flown: Calibration) -> str | None:
+        """A sentence if it is worse, empty if it is not, None if it cannot be said."""
+        baseline = self._pushed.plan.baseline
+        growth = 1.0 + self._settings.margin
+        before, after = baseline.held_out_before, flown.held_out_before
+        if before is not None and np.isfinite(after):
+            # A whitened residual below one is noise: it cannot get worse there.
+            if after > growth * max(before, 1.0):
+                return f"the held-out residual grew from {before:.3g} to {after:.3g}"
+            return ""
+        before, after = baseline.velocity_rms_before, flown.velocity_rms_before
+        if before is not None and np.isfinite(after):
+            if after > growth * before:
+                return f"the velocity residual grew from {before:.3g} to {after:.3g} m/s"
+            return ""
+        return None
+
+    def _say(self, verdict: Verdict, sentence: str) -> Watched:
+        return Watched(self._pushed.transaction, verdict, sentence)
+
+
+def _preference(plan: PushPlan, flown: Calibration) -> float | None:
+    """J(old) - J(pushed) on the new flight: positive speaks for the push.  None: unknown."""
+    P = np.array(flown.covariance, dtype=np.float64)
+    x = np.array(flown.scale + flown.offset)
+    if P.shape != (6, 6) or not np.all(np.isfinite(P)) or not np.all(np.isfinite(x)):
+        return None
+    unit = np.sqrt(np.maximum(np.diag(P), 1e-30))
+    correlation = P / np.outer(unit, unit)
+    if np.linalg.eigvalsh(correlation)[0] <= 0.0:
+        return None
+    old = (plan.six_before().as_vector() - x) / unit
+    new = (plan.six_wanted().as_vector() - x) / unit
+    return float(old @ np.linalg.solve(correlation, old) - new @ np.linalg.solve(correlation, new))
