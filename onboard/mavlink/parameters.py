@@ -125,6 +125,7 @@ class ClientSettings:
 
 class _Phase(Enum):
     READING = auto()
+    CHECKING = auto()
     SETTING = auto()
     CONFIRMING = auto()
 
@@ -191,15 +192,18 @@ class ParameterClient:
             name: the parameter.
             value: rounded to float32 here.
             now: the driver's monotonic clock, s.
-            before: the value in force as last read.  With it, a third value (neither this
-                nor ours) is taken for somebody else's write and not written over.
+            before: the value in force as last read.  With it the write is as near to a
+                compare-and-set as the protocol allows: the parameter is read right before each
+                PARAM_SET, and a third value (neither this nor ours) is taken for somebody
+                else's and not written over.
 
         Raises:
             ValueError: the value is not finite or does not fit a float32.
         """
         wanted = to_float32(value)
         self._exchanges.pop(name, None)
-        exchange = _Exchange(name, _Phase.SETTING, self._settings.attempts, wanted, before)
+        phase = _Phase.SETTING if before is None else _Phase.CHECKING
+        exchange = _Exchange(name, phase, self._settings.attempts, wanted, before)
         self._exchanges[name] = exchange
         self._exchanges.move_to_end(name, last=False)
         return self._flush(now)
@@ -247,6 +251,10 @@ class ParameterClient:
         match exchange.phase:
             case _Phase.READING:
                 self._end(exchange, ValueRead(name, value))
+            case _Phase.CHECKING if value in {exchange.before, exchange.wanted}:
+                self._enter(exchange, _Phase.SETTING, now)
+            case _Phase.CHECKING:
+                self._end(exchange, SetFailed(name, Failure.CHANGED_BY_OTHER, value))
             case _Phase.SETTING:
                 exchange.saved = value == exchange.wanted
                 self._enter(exchange, _Phase.CONFIRMING, now)
@@ -290,6 +298,8 @@ class ParameterClient:
             if exchange.sets >= exchange.attempts:
                 # Perhaps it was taken and only the announcements are missing: ask.
                 self._enter(exchange, _Phase.CONFIRMING, now)
+            elif exchange.before is not None:
+                self._enter(exchange, _Phase.CHECKING, now)
             else:
                 self._send(exchange, now)
         elif exchange.tries >= exchange.attempts:

@@ -6,6 +6,7 @@ A transaction is the records with its identifier.  It is *open* from ``Planned``
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
@@ -120,3 +121,25 @@ class Recovery:
     def all_confirmed(self) -> bool:
         """Whether every write is known to have been stored: then it may be finished."""
         return all(c.name in self.confirmed for c in self.plan.changes if c.differs)
+
+
+def audit(completed: Planned, values: Mapping[str, float]) -> Recovery | None:
+    """What a completed push needs after a reboot of the autopilot, None if nothing.
+
+    That a value is *stored* cannot be proved over MAVLink: the announcement "stored" and a
+    (duplicated, late) answer to a read look alike.  So after each boot compare: where any of
+    the six came back old, the push is to be undone, as a transaction that had been
+    interrupted (which only writes it down where all six are old).  Where somebody else has
+    set values meanwhile, nothing is touched.
+
+    Args:
+        completed: the push in force (:meth:`onboard.push.journal.Journal.last_completed`).
+        values: the autopilot's parameters by name, read after the boot.
+    """
+    changes = [c for c in completed.plan.changes if c.differs]
+    known = all(values.get(c.name) in {c.before, c.wanted} for c in changes)
+    if not known or all(values.get(c.name) == c.wanted for c in changes):
+        return None
+    return Recovery(
+        completed.transaction, completed.plan, completed.purpose, undo=True, confirmed=frozenset()
+    )

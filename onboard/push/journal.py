@@ -152,11 +152,15 @@ class Journal:
         plans = self._plans()
         found: Planned | None = None
         for _, entry in self._lines:
-            if not isinstance(entry, Closed) or entry.result is not Result.COMPLETED:
+            if not isinstance(entry, Closed):
                 continue
             planned = plans.get(entry.transaction)
-            if planned is not None and planned.plan.imu == imu:
+            if planned is None or planned.plan.imu != imu:
+                continue
+            if entry.result is Result.COMPLETED:
                 found = planned if planned.purpose is Purpose.PUSH else None
+            elif found is not None and found.transaction == entry.transaction:
+                found = None  # completed once, undone by an audit
         return found
 
     def unwatched(self) -> tuple[Planned, ...]:

@@ -36,7 +36,8 @@ loss of the link.  One transaction at a time: IMUs are pushed one after the othe
 
 **Late packets.**  A link may duplicate and delay a PARAM_SET, and the protocol has nothing
 to tell an old one from a new one.  So, after the last write, the transaction lets
-``settle_s`` pass before it reads all six once more and believes them.
+``settle_s`` pass before it reads all six once more and believes them.  (Until then a late
+copy of a write that was rolled back can put any mixture in force for a moment.)
 
 **Arming.**  A landed push that sees the vehicle arm goes back at once: the old values have
 flown, a half-verified set has not.  A resumed transaction whose writes had all been
@@ -52,7 +53,6 @@ from typing import Self
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import (
     ErrorReceived,
-    SendParamSet,
     TextReceived,
     ValueReceived,
 )
@@ -299,7 +299,10 @@ class PushTransaction:
         self._reason, self._sentence = reason, sentence
 
     def _absorb(self, outputs: tuple[ParameterOutput, ...], now: float) -> None:
+        state = self._state
         for output in outputs:
+            if self._state is not state:
+                return  # the rest answers questions of a state that is left
             match output:
                 case ValueRead(name, value):
                     self._value_read(name, value, now)
@@ -313,16 +316,8 @@ class PushTransaction:
                     # May be a late duplicate: only a read of our own convicts.
                     if self._state in FORWARD and value != self._expected(name, value):
                         self._absorb(self._client.read((name,), now), now)
-                case SendParamSet(name, value):
-                    # After a turn of direction an overdue resend must not write the old goal.
-                    if self._may_send(name, value):
-                        self._out.append(output)
                 case _:
                     self._out.append(output)
-
-    def _may_send(self, name: str, value: float) -> bool:
-        target = {State.WRITING: self._plan.wanted, State.UNDOING: self._plan.before}
-        return target.get(self._state, {}).get(name) == value
 
     def _expected(self, name: str, otherwise: float) -> float:
         if name == self._plan.device_id_name:

@@ -7,7 +7,8 @@ Independent of the client: written from the behaviour of GCS_Param.cpp and AP_Pa
 * storing the x element of a vector announces all three elements.
 * PARAM_REQUEST_READ by name: queue of 20, answered later with index 65535 too.
 * reboot: RAM is reloaded from storage; silent for a while; what was queued is lost.
-* storage full: RAM changes, nothing is stored, nothing announced.
+* storage full: what has a place there is stored as ever; of a parameter that never left its
+  default RAM changes, but nothing is stored and nothing announced.
 """
 
 import heapq
@@ -49,6 +50,7 @@ class Autopilot:
         self.stored = dict(self.ram)
         self.denied = set()
         self.full = False
+        self.places = set()  # names that have a place in storage
         self.speaks_errors = False
         self.store_delay, self.reply_delay = store_delay, reply_delay
         self.silent_until = -math.inf
@@ -93,6 +95,9 @@ class Autopilot:
                 elif self.speaks_errors:
                     events.append(ErrorReceived(name, ParameterErrorCode.DOES_NOT_EXIST))
             elif kind == "store":
+                if self.full and name not in self.places:
+                    continue
+                self.places.add(name)
                 self.stored[name] = self.ram[name]
                 events += [self._value(n) for n in self._announced(name)]
             elif kind == "old":
@@ -108,8 +113,7 @@ class Autopilot:
         self.ram[name] = value
         self.history.append((name, value))
         self.states.append(dict(self.ram))
-        if not self.full:
-            self._later(now + self.store_delay, "store", name)
+        self._later(now + self.store_delay, "store", name)
 
     def _announced(self, name):
         if name.endswith(VECTORS):
