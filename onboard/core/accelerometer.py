@@ -66,8 +66,8 @@ class SixParameters:
 
     def apply(self, raw_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Raw sensor reading (..., 3) to specific force, both in sensor axes, m/s^2."""
-        return np.asarray(self.scale) * (raw_s - np.asarray(self.offset))
+        return np.array(self.scale, np.float64) * (raw_s - np.array(self.offset, np.float64))
 
     def undo(self, f_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inverse of :meth:`apply`."""
-        return f_s / np.asarray(self.scale) + np.asarray(self.offset)
+        return f_s / np.array(self.scale, np.float64) + np.array(self.offset, np.float64)

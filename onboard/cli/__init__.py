@@ -1,0 +1,1 @@
+"""The command line: :mod:`onboard.cli.main` is the door, each verb has a module of its own."""

@@ -1,0 +1,151 @@
+"""A replay as tables and plain sentences that fit into 80 columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from onboard.core.accelerometer import parameter_names
+from onboard.core.result import SIX_NAMES, Calibration, Estimate, Status
+from onboard.replay import Replay
+
+STATUS_WORDS = {
+    Status.CALIBRATED: ("calibrated", "bold green"),
+    Status.COLLECTING: ("not enough data yet", "bold yellow"),
+    Status.INSUFFICIENT: ("the flight does not show enough", "bold yellow"),
+    Status.INVALID: ("no valid result", "bold red"),
+}
+AUTOPILOT_WORDS = {"ardupilot": "ArduPilot", "px4": "PX4"}
+UNKNOWN = "-"
+
+
+def replay_report(result: Replay) -> Iterator[RenderableType]:
+    """What a replay prints, part by part."""
+    yield _recordings(result)
+    for calibration in result.calibrations:
+        yield Text()
+        yield _headline(calibration)
+        yield _six(calibration, result.autopilot)
+        yield _sentences(_about(calibration, result.autopilot))
+
+
+def _recordings(result: Replay) -> RenderableType:
+    kind = AUTOPILOT_WORDS.get(result.autopilot, "an unknown autopilot")
+    rows: list[tuple[str, str]] = []
+    for recording in result.recordings:
+        rows.append(("recording", f"{recording.path.name}: {kind}, {recording.duration_s:.0f} s"))
+        rows += [("damage", note) for note in recording.damage]
+        rows += [("note", note) for note in recording.notes]
+    return _sentences(rows)
+
+
+def _headline(calibration: Calibration) -> Text:
+    words, style = STATUS_WORDS[calibration.status]
+    return Text.assemble(f"Accelerometer {calibration.imu}: ", (words, style))
+
+
+def _six(calibration: Calibration, autopilot: str) -> Table:
+    """The six numbers: in force, estimate, sigma, and the parameter that takes the estimate."""
+    c = calibration
+    table = Table(pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for header in ("in force", "estimate", "sigma"):
+        table.add_column(header, justify="right", no_wrap=True)
+    table.add_column("set" if c.status is Status.CALIBRATED else "parameter", no_wrap=True)
+    table.add_column("observed", no_wrap=True)
+    names = parameter_names(c.imu).six if autopilot != "px4" else (UNKNOWN,) * 6
+    rows = zip(
+        SIX_NAMES,
+        c.in_force_scale + c.in_force_offset,
+        c.scale + c.offset,
+        c.scale_sigma + c.offset_sigma,
+        names,
+        c.observable,
+        strict=True,
+    )
+    for name, before, value, sigma, parameter, observed in rows:
+        digits = 4 if "scale" in name else 3
+        table.add_row(
+            name,
+            _fixed(before, digits) if c.parameters_known else UNKNOWN,
+            _fixed(value, digits),
+            _fixed(sigma, digits),
+            parameter,
+            Text("yes", "green") if observed else Text("no", "yellow"),
+        )
+    return table
+
+
+def _about(calibration: Calibration, autopilot: str) -> Iterator[tuple[str, str]]:
+    """Label and sentence of everything else that is known about one accelerometer."""
+    c = calibration
+    if not c.parameters_known and autopilot != "px4":
+        yield (
+            "parameters",
+            "not in the recording: scale 1 and offset 0 are taken for those in force",
+        )
+    if timing := "; ".join(_timing(c.timing)):
+        yield "timing", timing
+    trusted = f"{c.trusted_s:.0f} s of GPS"
+    if c.rejected:
+        trusted += ", not used: " + ", ".join(
+            f"{name.replace('_', ' ')} {n}" for name, n in sorted(c.rejected.items())
+        )
+    yield "trusted", trusted
+    if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
+        before, after = c.velocity_rms_before, c.velocity_rms_after
+        yield "residual", f"velocity {before:.2f} m/s as it is, {after:.2f} m/s calibrated (RMS)"
+    if math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after):
+        change = f"{c.held_out_before:.2f} before, {c.held_out_after:.2f} after"
+        yield "check", f"{change}, in units of the noise, on parts that the fit did not see"
+    if c.certificate is not None:
+        window, bound = c.certificate.window_s, c.certificate.uniform_bound
+        seen = f"{c.certificate.observed_max:.2f} m/s was seen"
+        yield "certificate", f"velocity error below {bound:.2f} m/s over {window:.0f} s; {seen}"
+    if c.dead_reckoning is not None and c.dead_reckoning.windows:
+        d = c.dead_reckoning
+        drift = f"{d.drift_before:.1f} m/s as it is, {d.drift_after:.1f} m/s calibrated"
+        yield (
+            "without GPS",
+            f"velocity off after {d.horizon_s:.0f} s: {drift} ({d.windows} windows)",
+        )
+    coverage = f"{c.coverage.percent:.0f} %"
+    if c.coverage.weakest:
+        coverage += f", weakest: {c.coverage.weakest}"
+    yield "coverage", coverage
+    if c.coverage.advice:
+        yield "advice", c.coverage.advice
+    if c.note:
+        yield "note", c.note
+
+
+def _timing(timing: dict[str, Estimate]) -> Iterator[str]:
+    phrases = {
+        "gps_delay_s": "GPS is {} ms late",
+        "gps_smoothing_window_s": "it averages over {} ms",
+        "imu_delay_s": "the attitude is {} ms late against the accelerometer",
+    }
+    for name, phrase in phrases.items():
+        estimate = timing.get(name)
+        if estimate is not None and math.isfinite(estimate.value):
+            spread = f" ± {1e3 * estimate.sigma:.0f}" if math.isfinite(estimate.sigma) else ""
+            yield phrase.format(f"{1e3 * estimate.value:.0f}{spread}")
+
+
+def _sentences(rows: Iterable[tuple[str, str]]) -> Table:
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column()
+    last = None
+    for label, text in rows:
+        grid.add_row(label if label != last else "", Text(text))
+        last = label
+    return grid
+
+
+def _fixed(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else UNKNOWN

@@ -1,0 +1,154 @@
+"""Recordings of one vehicle through the core: the code path of the live service, fed from files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from onboard.core.accelerometer import parameter_names
+from onboard.core.result import Calibration
+from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.document import RecordingDocument, ReplayDocument, imu_document
+from onboard.errors import RecordingError, UsageError
+from onboard.recordings.opening import open_recording
+from onboard.recordings.recording import Recording
+
+Progress = Callable[[float], None]
+"""Told the share of the work that is done, 0 ... 1, now and then."""
+
+PROGRESS_EVERY = 1024
+DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
+
+
+class Estimator(Protocol):
+    """What replay needs of :class:`onboard.core.calibrator.Calibrator`."""
+
+    def feed(self, sample: Sample) -> object:
+        """Take a sample."""
+
+    def finish(self) -> object:
+        """Process what is pending: the recording ends here."""
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers seen."""
+
+    def calibration(self, imu: int) -> Calibration:
+        """The answer for one of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """Recordings and what they gave; ``counts`` are samples fed, ``imu <n>`` and ``gps``."""
+
+    recordings: tuple[Recording, ...]
+    calibrations: tuple[Calibration, ...]
+    counts: dict[str, int]
+
+    @property
+    def autopilot(self) -> str:
+        """The kind of autopilot that all of them come from."""
+        return self.recordings[0].autopilot
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all recordings together, s."""
+        return sum(recording.duration_s for recording in self.recordings)
+
+    def document(self) -> ReplayDocument:
+        """The result as other programs read it."""
+        return ReplayDocument(
+            recording=RecordingDocument(
+                files=[str(recording.path) for recording in self.recordings],
+                autopilot=self.autopilot,
+                duration_s=self.duration_s,
+                samples=self.counts,
+                damage=[f"{r.path.name}: {note}" for r in self.recordings for note in r.damage],
+                notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes],
+            ),
+            imus=[imu_document(c, self.autopilot) for c in self.calibrations],
+        )
+
+
+def replay(
+    paths: Sequence[str | Path],
+    estimator: Estimator,
+    *,
+    imu: int | None = None,
+    progress: Progress | None = None,
+) -> Replay:
+    """Feed files, one after the other, to one estimator: its sums add up over the flights.
+
+    Args:
+        paths: at least one recording, all of the same vehicle.
+        estimator: a fresh one; it is finished after each file.
+        imu: answer for this accelerometer only.
+        progress: called every few thousand samples.
+
+    Raises:
+        RecordingError: a file that cannot be used, or one of another vehicle.
+        UsageError: there is no such accelerometer in the recordings.
+    """
+    recordings = tuple(open_recording(path) for path in paths)
+    if not recordings:
+        raise UsageError("no recording given")
+    _refuse_mixture(recordings)
+    total = sum(sum(recording.counts.values()) for recording in recordings)
+    vehicle = _Vehicle()
+    fed = 0
+    for recording in recordings:
+        for sample in recording.samples():
+            vehicle.check(sample, recording)
+            estimator.feed(sample)
+            fed += 1
+            if progress is not None and fed % PROGRESS_EVERY == 0:
+                progress(min(1.0, fed / total))
+        estimator.finish()
+    if progress is not None:
+        progress(1.0)
+    wanted = estimator.imus if imu is None else (imu,)
+    if imu is not None and imu not in estimator.imus:
+        there = ", ".join(map(str, estimator.imus)) or "none"
+        raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
+    return Replay(recordings, tuple(estimator.calibration(n) for n in wanted), vehicle.counts)
+
+
+def _refuse_mixture(recordings: Sequence[Recording]) -> None:
+    first = recordings[0]
+    for other in recordings[1:]:
+        if other.autopilot != first.autopilot:
+            raise RecordingError(
+                f"{other.path}: of another vehicle than {first.path} "
+                f"(autopilot {other.autopilot}, there {first.autopilot})"
+            )
+
+
+class _Vehicle:
+    """Counts the samples and sees to it that the accelerometers stay the same ones."""
+
+    def __init__(self) -> None:
+        self.counts: dict[str, int] = {}
+        self._device: dict[int, tuple[np.float32, Recording]] = {}
+
+    def check(self, sample: Sample, recording: Recording) -> None:
+        if isinstance(sample, ImuSample):
+            self._count(f"imu {sample.imu}")
+        elif isinstance(sample, GpsFix):
+            self._count("gps")
+        elif isinstance(sample, ParameterValue) and sample.name in DEVICE_IDS and sample.value:
+            imu = DEVICE_IDS[sample.name]
+            # Logs and telemetry carry identifiers as single-precision numbers.
+            device = np.float32(sample.value)
+            known, where = self._device.setdefault(imu, (device, recording))
+            if known != device and where is not recording:
+                raise RecordingError(
+                    f"{recording.path}: of another vehicle than {where.path} "
+                    f"({sample.name} is {device:.0f}, there {known:.0f})"
+                )
+
+    def _count(self, name: str) -> None:
+        self.counts[name] = self.counts.get(name, 0) + 1
