@@ -91,7 +91,7 @@ class Connection:
         self.state = ConnectionState.IDLE
         self.last_error = ""
         self.connects = 0
-        self.dropped = 0
+        self._dropped = 0
         self.last_received: float | None = None
         self._receive = receive
         self._changed = changed
@@ -106,10 +106,15 @@ class Connection:
         """Whether bytes can flow."""
         return self.state is ConnectionState.UP
 
+    @property
+    def dropped(self) -> int:
+        """Frames that could not be sent: no connection, no peer yet, or a stalled line."""
+        return self._dropped + (self._transport.dropped if self._transport is not None else 0)
+
     def write(self, data: bytes) -> None:
         """Send if the connection is up; count the loss if not."""
         if self._transport is None:
-            self.dropped += 1
+            self._dropped += 1
         else:
             self._transport.write(data)
 
@@ -176,7 +181,7 @@ class Connection:
 
     def _drop_transport(self) -> None:
         if self._transport is not None:
-            self.dropped += self._transport.dropped
+            self._dropped += self._transport.dropped
             self._transport.close()
             self._transport = None
 

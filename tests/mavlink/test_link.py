@@ -1,0 +1,383 @@
+"""The link in virtual time, its sockets replaced; and once for real over loopback."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import socket
+from contextlib import asynccontextmanager
+from itertools import pairwise
+
+import pytest
+from mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
+from virtual_time import virtual_time
+
+from onboard.errors import LinkError
+from onboard.mavlink import connection as connection_module
+from onboard.mavlink.autopilot import (
+    AutopilotFound,
+    AutopilotRebooted,
+    AutopilotReturned,
+    AutopilotSilent,
+    AutopilotState,
+)
+from onboard.mavlink.codec import Codec
+from onboard.mavlink.connection import (
+    BACKOFF_CAP_S,
+    SILENCE_S,
+    TRANSITIONS,
+    Backoff,
+    ConnectionState,
+)
+from onboard.mavlink.dialect import mavlink
+from onboard.mavlink.endpoint import Endpoint, EndpointError
+from onboard.mavlink.link import HEARTBEAT_TIMEOUT_S, Link
+from onboard.mavlink.streams import StreamRequest, Streams
+from onboard.mavlink.timesync import TimeSync
+
+UDP = Endpoint.parse("udpin:127.0.0.1:14550")
+TCP = Endpoint.parse("tcp:127.0.0.1:5760")
+
+
+@pytest.fixture
+def air(monkeypatch):
+    air = FakeAir()
+    monkeypatch.setattr(connection_module, "open_transport", air.open)
+    return air
+
+
+@asynccontextmanager
+async def running(*endpoints, **kwargs):
+    """A link under way, with the events it emitted; stopped at the end."""
+    clock = asyncio.get_running_loop().time
+    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, rng=random.Random(1), **kwargs)
+    link.events = []
+    link.subscribe_events(lambda now, event: link.events.append(event))
+    task = asyncio.create_task(link.run())
+    await asyncio.sleep(0.01)
+    try:
+        yield link
+    finally:
+        link.close()
+        await task
+
+
+def events(link, kind):
+    return [event for event in link.events if isinstance(event, kind)]
+
+
+async def beat(transport, seconds, *messages):
+    """A heartbeat a second, and the messages with it."""
+    for _ in range(round(seconds)):
+        for message in (heartbeat(), *messages):
+            transport.say(message)
+        await asyncio.sleep(1.0)
+
+
+class TestConnection:
+    @virtual_time
+    async def test_refused_connections_are_tried_again_with_growing_jittered_waits(self, air):
+        air.failures = [ConnectionRefusedError(111, "Connection refused") for _ in range(60)]
+        async with running(TCP) as link:
+            await asyncio.sleep(800.0)
+            assert link.connections[0].connects >= 1
+            waits = [b - a for a, b in pairwise(air.opened_at[:61])]
+            assert all(wait <= BACKOFF_CAP_S + 1e-6 for wait in waits)
+            assert waits[0] <= 0.5 + 1e-6
+            assert max(waits) > 5.0
+
+    @virtual_time
+    async def test_a_broken_connection_comes_back_and_hears_again(self, air):
+        async with running(TCP) as link:
+            heard = []
+            link.subscribe(lambda now, message: heard.append(message), ["ATTITUDE"])
+            await beat(air.transports[0], 3)
+            air.transports[0].lost("closed by the other side")
+            await asyncio.sleep(1.0)
+            first, second = air.transports
+            assert first.closed
+            await beat(second, 1, attitude(5000))
+            assert len(heard) == 1
+            assert link.connections[0].connects == 2
+            assert link.connections[0].last_error == "closed by the other side"
+
+    @virtual_time
+    async def test_a_line_gone_dead_is_opened_anew_but_udp_is_left_alone(self, air):
+        async with running(TCP, UDP):
+            await asyncio.sleep(SILENCE_S + 5.0)
+            assert [t.endpoint for t in air.transports] == [TCP, UDP, TCP]
+
+    @virtual_time
+    async def test_what_cannot_be_opened_at_all_ends_the_link(self, air):
+        air.failures = [EndpointError(f"{UDP}: port in use")]
+        link = Link([UDP], clock=asyncio.get_running_loop().time)
+        with pytest.raises(EndpointError, match="port in use"):
+            await link.run()
+
+    @virtual_time
+    async def test_once_up_even_that_is_tried_again(self, air):
+        async with running(TCP) as link:
+            air.failures = [EndpointError("no permission while udev sets the device up")]
+            air.transports[0].lost("unplugged")
+            await asyncio.sleep(20.0)
+            assert link.connections[0].is_up
+
+    @virtual_time
+    async def test_every_state_is_left_only_by_the_table(self, air):
+        states = []
+        async with running(TCP) as link:
+            states.append(link.connections[0].state)
+            link.subscribe_events(
+                lambda now, event: states.append(event.state) if hasattr(event, "state") else None
+            )
+            for _ in range(3):
+                air.transports[-1].lost("again")
+                await asyncio.sleep(30.0)
+        assert states[-1] is ConnectionState.CLOSED
+        for a, b in pairwise(states):
+            assert b in TRANSITIONS[a]
+
+    def test_backoff_is_full_jitter(self):
+        backoff = Backoff(random.Random(2))
+        for attempt in range(50):
+            assert 0.0 <= backoff.next() <= min(15.0, 0.5 * 2.0**attempt)
+        backoff.reset()
+        assert backoff.next() <= 0.5
+
+
+class TestAutopilot:
+    @virtual_time
+    async def test_it_is_found_and_we_take_its_system_id(self, air):
+        async with running() as link:
+            transport = air.transports[0]
+            transport.say(heartbeat(6, 8), Codec(system=255, component=190))
+            assert link.autopilot is None
+            transport.say(heartbeat(1, 3), Codec(system=42, component=1))
+            found = await link.wait_autopilot(1.0)
+            assert (found.system, found.component, found.vehicle) == (42, 1, "plane")
+            assert found.is_ardupilot
+            await asyncio.sleep(1.5)
+            ours = transport.heard[-1]
+            assert (ours.get_srcSystem(), ours.get_srcComponent()) == (42, 191)
+            assert events(link, AutopilotFound) == [AutopilotFound(found)]
+
+    @virtual_time
+    async def test_another_firmware_is_not_ardupilot(self, air):
+        async with running() as link:
+            air.transports[0].say(heartbeat(2, 12))
+            found = await link.wait_autopilot(1.0)
+            assert not found.is_ardupilot
+            assert found.firmware_name == "px4"
+
+    @virtual_time
+    async def test_only_the_system_asked_for_counts(self, air):
+        async with running(system=7) as link:
+            air.transports[0].say(heartbeat(), Codec(system=1, component=1))
+            assert link.autopilot is None
+            air.transports[0].say(heartbeat(), Codec(system=7, component=1))
+            assert link.autopilot.system == 7
+
+    @virtual_time
+    async def test_our_heartbeat_goes_out_once_a_second_from_the_start(self, air):
+        async with running():
+            await asyncio.sleep(10.05)
+            heard = [m for m in air.transports[0].heard if m.get_type() == "HEARTBEAT"]
+            assert 10 <= len(heard) <= 12
+            assert {m.type for m in heard} == {mavlink.MAV_TYPE_ONBOARD_CONTROLLER}
+            assert {m.autopilot for m in heard} == {mavlink.MAV_AUTOPILOT_INVALID}
+
+    @virtual_time
+    async def test_no_heartbeat_in_time_names_every_endpoint(self, air):
+        air.failures = [ConnectionRefusedError(111, "Connection refused") for _ in range(99)]
+        async with running(TCP) as link:
+            with pytest.raises(LinkError, match="in 5 s") as caught:
+                await link.wait_autopilot(5.0)
+            assert f"{TCP} (Connection refused)" in str(caught.value)
+            assert caught.value.exit_status == 3
+
+    @virtual_time
+    async def test_silence_and_return_are_told(self, air):
+        async with running() as link:
+            await beat(air.transports[0], 3)
+            await asyncio.sleep(HEARTBEAT_TIMEOUT_S + 1.0)
+            assert link.state is AutopilotState.SILENT
+            (silent,) = events(link, AutopilotSilent)
+            assert silent.silence == pytest.approx(HEARTBEAT_TIMEOUT_S, abs=0.3)
+            await beat(air.transports[0], 1)
+            assert link.state is AutopilotState.PRESENT
+            assert events(link, AutopilotReturned) == [AutopilotReturned()]
+
+    @virtual_time
+    async def test_a_reboot_is_told_once(self, air):
+        async with running() as link:
+            transport = air.transports[0]
+            transport.say(heartbeat())
+            for ms in (60_000, 60_020, 1000, 1020, 1040):
+                transport.say(attitude(ms))
+                transport.say(raw_imu(ms * 1000))
+            assert events(link, AutopilotRebooted) == [AutopilotRebooted(1)]
+
+
+class TestTraffic:
+    @virtual_time
+    async def test_of_two_ways_to_one_autopilot_one_is_used_and_the_other_takes_over(self, air):
+        async with running(UDP, TCP) as link:
+            heard = []
+            link.subscribe(lambda now, m: heard.append(m.time_boot_ms), ["ATTITUDE"])
+            udp, tcp = air.transports
+            for ms in range(10_000, 12_000, 100):
+                for transport in (udp, tcp):
+                    transport.say(heartbeat())
+                    transport.say(attitude(ms))
+                await asyncio.sleep(0.1)
+            assert heard == list(range(10_000, 12_000, 100))
+            assert link.standby == 40
+            for ms in range(12_000, 16_000, 100):
+                tcp.say(attitude(ms))
+                await asyncio.sleep(0.1)
+            assert heard[-1] == 15_900
+            assert len(heard) == len(set(heard))
+            assert heard.index(heard[20]) == 20
+            assert heard[20] <= 12_000 + 1700
+
+    @virtual_time
+    async def test_answers_go_where_the_target_was_heard_and_the_rest_everywhere(self, air):
+        async with running(UDP, TCP) as link:
+            udp, tcp = air.transports
+            udp.say(heartbeat())
+            tcp.say(heartbeat(6, 8), Codec(system=255, component=190))
+            link.send(mavlink.MAVLink_param_request_read_message(1, 1, b"X", -1))
+            link.send(mavlink.MAVLink_param_value_message(b"OBC_STATE", 1.0, 9, 1, 0))
+            link.send(mavlink.MAVLink_command_ack_message(1, 0, 0, 0, 255, 190))
+            kinds = [
+                [m.get_type() for m in t.heard if m.get_type() != "HEARTBEAT"] for t in (udp, tcp)
+            ]
+            assert kinds == [["PARAM_REQUEST_READ", "PARAM_VALUE"], ["PARAM_VALUE", "COMMAND_ACK"]]
+
+    @virtual_time
+    async def test_our_own_messages_come_back_by_a_router_are_not_taken_for_anything(self, air):
+        async with running() as link:
+            heard = []
+            link.subscribe(lambda now, message: heard.append(message), ["HEARTBEAT"])
+            air.transports[0].say(heartbeat())
+            air.transports[0].say(heartbeat(18, 8), Codec(system=1, component=191))
+            assert len(heard) == 1
+            assert link.echoed == 1
+
+    @virtual_time
+    async def test_messages_iterate_in_order_with_their_receive_times(self, air):
+        async with running() as link:
+
+            async def collect():
+                out = []
+                async for now, message in link.messages(["ATTITUDE"]):
+                    out.append((round(now, 3), message.time_boot_ms))
+                    if len(out) == 3:
+                        return out
+                return out
+
+            task = asyncio.create_task(collect())
+            await asyncio.sleep(0.0)
+            start = asyncio.get_running_loop().time()
+            for i in range(3):
+                air.transports[0].say(attitude(i))
+                await asyncio.sleep(0.5)
+            assert await task == [(round(start + 0.5 * i, 3), i) for i in range(3)]
+
+    @virtual_time
+    async def test_a_handler_that_fails_ends_the_link_with_its_error(self, air):
+        loop = asyncio.get_running_loop()
+        link = Link([UDP], clock=loop.time)
+
+        def fail(now, message):
+            raise RuntimeError("the estimator broke")
+
+        link.subscribe(fail, ["ATTITUDE"])
+        task = asyncio.create_task(link.run())
+        await asyncio.sleep(0.1)
+        air.transports[0].say(attitude(1))
+        with pytest.raises(RuntimeError, match="the estimator broke"):
+            await task
+        assert air.transports[0].closed
+
+    @virtual_time
+    async def test_cancelling_lets_go_of_everything(self, air):
+        link = Link([UDP, TCP], clock=asyncio.get_running_loop().time)
+        task = asyncio.create_task(link.run())
+        await asyncio.sleep(0.1)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert all(transport.closed for transport in air.transports)
+        assert {c.state for c in link.connections} == {ConnectionState.CLOSED}
+
+    @virtual_time
+    async def test_a_link_closed_before_it_ran_ends_at_once(self, air):
+        link = Link([UDP], clock=asyncio.get_running_loop().time)
+        link.close()
+        await link.run()
+
+
+class TestParticipants:
+    @virtual_time
+    async def test_streams_and_time_synchronisation_are_driven_and_restarted(self, air):
+        streams, timesync = Streams([StreamRequest("ATTITUDE", 50.0)]), TimeSync()
+        booted_at = 0.0
+        asked = []
+
+        def autopilot(message):
+            loop = asyncio.get_running_loop()
+            if message.get_type() == "COMMAND_LONG":
+                asked.append(message.param1)
+                yield mavlink.MAVLink_command_ack_message(message.command, 0, 0, 0, 1, 191)
+            elif message.get_type() == "TIMESYNC":
+                tc1 = round((loop.time() - booted_at) * 1e9)
+                yield mavlink.MAVLink_timesync_message(tc1, message.ts1)
+
+        async with running() as link:
+            link.attach(streams)
+            link.attach(timesync)
+            transport = air.transports[0]
+            transport.answer = autopilot
+            await asyncio.sleep(5.0)
+            assert asked == []
+            await beat(transport, 3, attitude(50_000))
+            assert asked == [30.0]
+            assert streams.report()[0].granted == 50.0
+            assert timesync.offset == pytest.approx(0.0, abs=1e-6)
+            booted_at = asyncio.get_running_loop().time()
+            transport.say(attitude(10))
+            transport.say(attitude(30))
+            assert timesync.offset is None
+            await beat(transport, 3)
+            assert asked == [30.0, 30.0]
+            assert timesync.offset == pytest.approx(-booted_at, abs=1e-6)
+
+
+async def test_over_real_udp():
+    found = asyncio.Event()
+    heard = []
+
+    def hear(now, message):
+        heard.append(message.time_boot_ms)
+        if len(heard) == 50:
+            found.set()
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        vehicle.settimeout(20.0)
+        link = Link([Endpoint.parse(f"udpout:127.0.0.1:{vehicle.getsockname()[1]}")])
+        link.subscribe(hear, ["ATTITUDE"])
+        task = asyncio.create_task(link.run())
+        codec = Codec(system=3, component=1)
+        ours, address = await asyncio.to_thread(vehicle.recvfrom, 300)
+        assert Codec().feed(ours)[0].component == 191
+        vehicle.sendto(codec.encode(heartbeat()), address)
+        for ms in range(50):
+            vehicle.sendto(codec.encode(attitude(ms)), address)
+        await link.wait_autopilot(20.0)
+        async with asyncio.timeout(20.0):
+            await found.wait()
+        assert heard == list(range(50))
+        link.close()
+        await task
