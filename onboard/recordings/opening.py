@@ -22,13 +22,14 @@ def open_recording(path: str | Path) -> Recording:
         RecordingError: no such file, not a file, not a log, or nothing in it that can be used.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        what = "a directory" if path.is_dir() else "not a regular file"
+        raise RecordingError(f"{path}: is {what}; a recording is a file that can be read twice")
     try:
         with path.open("rb") as file:
             head = file.read(HEAD_LENGTH)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise RecordingError(f"{path}: is a directory, not a recording") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
     if not head:

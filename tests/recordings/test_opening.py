@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,22 @@ def test_absent_file_and_directory(tmp_path):
         open_recording(tmp_path / "none.tlog")
     with pytest.raises(RecordingError, match="directory"):
         open_recording(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RecordingError, match="regular file"):
+        open_recording(tmp_path / "pipe")
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may read everything")
+def test_a_file_that_may_not_be_read(tmp_path):
+    path = tmp_path / "x.BIN"
+    path.write_bytes(LOGS["modern.BIN"])
+    path.chmod(0)
+    with pytest.raises(RecordingError, match="cannot be read"):
+        open_recording(path)
 
 
 def test_px4_log(tmp_path, capsys):
