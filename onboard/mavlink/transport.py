@@ -20,7 +20,7 @@ from typing import Protocol
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
 from onboard.mavlink.serialport import open_serial
 
-DEFAULT_LINGER_S = 0.01
+DEFAULT_LINGER_S = 0.02
 CONNECT_TIMEOUT_S = 5.0
 DATAGRAMS_PER_WAKE = 128
 READ_SIZE = 65536
