@@ -1,0 +1,251 @@
+from dataclasses import replace
+
+import pytest
+from calibrations import calibration, covariance, current
+
+from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.result import Status
+from onboard.push.plan import propose
+from onboard.push.policy import (
+    ALLOWED,
+    Accelerometer,
+    Mode,
+    Objection,
+    PolicySettings,
+    VehicleCondition,
+    context_names,
+    ekf_healthy,
+    judge,
+    moment,
+)
+
+LANDED = VehicleCondition(armed=False, disarmed_for=6.0, landed=True)
+HEALTHY = 0x001 | 0x002 | 0x004 | 0x008 | 0x010 | 0x020 | 0x100 | 0x200
+FLYING = VehicleCondition(armed=True, landed=False, ekf_flags=HEALTHY)
+
+
+def objections(cal=None, condition=LANDED, settings=None, values=None, others=(), **now):
+    cal = cal or calibration()
+    plan = propose(cal, current(cal.imu, **now), system_id=1)
+    found = judge(plan, cal, condition, settings or PolicySettings(), values=values, others=others)
+    for refusal in found:
+        assert refusal.sentence
+    return {r.objection for r in found}
+
+
+def test_good_calibration_of_a_landed_vehicle_may_be_written():
+    assert objections() == set()
+
+
+def test_nothing_but_thirty_accelerometer_names_is_ever_allowed():
+    assert len(ALLOWED) == 30
+    assert all(n.startswith("INS") and ("ACC" in n) and n[-1] in "XYZ" for n in ALLOWED)
+    assert not any("ID" in n or "CALTEMP" in n for n in ALLOWED)
+
+
+class TestMoment:
+    @pytest.mark.parametrize(
+        ("mode", "condition", "expected"),
+        [
+            (Mode.NEVER, LANDED, {Objection.NEVER}),
+            (Mode.LANDED, VehicleCondition(), {Objection.STATE_UNKNOWN}),
+            (Mode.LANDED, FLYING, {Objection.ARMED}),
+            (Mode.LANDED, replace(LANDED, disarmed_for=4.9), {Objection.DISARMED_TOO_SHORT}),
+            (Mode.LANDED, replace(LANDED, landed=False), {Objection.IN_AIR}),
+            (Mode.LANDED, replace(LANDED, landed=None), set()),
+            (Mode.IN_FLIGHT, LANDED, set()),
+            (Mode.IN_FLIGHT, FLYING, set()),
+            (Mode.IN_FLIGHT, replace(FLYING, ekf_flags=None), {Objection.EKF_UNHEALTHY}),
+            (
+                Mode.IN_FLIGHT,
+                replace(FLYING, ekf_flags=HEALTHY | 0x8000),
+                {Objection.EKF_UNHEALTHY},
+            ),
+        ],
+    )
+    def test_who_may_write_when(self, mode, condition, expected):
+        found = moment(condition, PolicySettings(mode=mode))
+        assert {r.objection for r in found} == expected
+
+    @pytest.mark.parametrize("bit", [0x001, 0x002, 0x004, 0x010, 0x020])
+    def test_each_needed_ekf_flag_is_needed(self, bit):
+        assert ekf_healthy(HEALTHY)
+        assert not ekf_healthy(HEALTHY & ~bit)
+
+    @pytest.mark.parametrize("bit", [0x080, 0x400, 0x8000])
+    def test_each_forbidden_ekf_flag_forbids(self, bit):
+        assert not ekf_healthy(HEALTHY | bit)
+
+
+class TestEstimate:
+    @pytest.mark.parametrize("status", [s for s in Status if s is not Status.CALIBRATED])
+    def test_only_calibrated(self, status):
+        assert objections(calibration(status=status)) == {Objection.NOT_CALIBRATED}
+
+    def test_raw_units_must_have_been_known(self):
+        cal = calibration(parameters_known=False)
+        assert objections(cal) == {Objection.PARAMETERS_UNKNOWN}
+
+    @pytest.mark.parametrize(
+        ("before", "after"), [(1.0, 1.0), (1.0, 0.98), (1.0, 1.3), (float("nan"), 1.0)]
+    )
+    def test_must_improve_what_it_has_not_seen(self, before, after):
+        cal = calibration(held_out_before=before, held_out_after=after)
+        assert objections(cal) == {Objection.NO_IMPROVEMENT}
+
+    @pytest.mark.parametrize("i", range(6))
+    def test_each_number_must_be_sharp(self, i):
+        sigmas = [0.001] * 3 + [0.008] * 3
+        sigmas[i] *= 6
+        assert objections(calibration(covariance=covariance(sigmas))) == {Objection.SIGMA_TOO_LARGE}
+
+    def test_value_that_is_already_there_is_not_written_again(self):
+        cal = calibration()
+        assert objections(cal, scale=cal.scale, offset=cal.offset) == {Objection.NOTHING_TO_CHANGE}
+
+    def test_unseen_number_is_left_and_its_sigma_does_not_matter(self):
+        sigmas = (0.001, 0.001, 0.03, 0.008, 0.008, 0.02)
+        cal = calibration(
+            observable=(True, True, False, True, True, True), covariance=covariance(sigmas)
+        )
+        plan = propose(cal, current(), system_id=1)
+        assert plan.wanted["INS_ACCSCAL_Z"] == 1.0
+        assert objections(cal) == set()
+
+    def test_sigma_that_counts_is_the_one_given_what_stays(self):
+        """z offset is known to 0.3 only because the z scale is not; with that held, to 0.01."""
+        sigmas = (0.001, 0.001, 0.03, 0.008, 0.008, 0.3)
+        cal = calibration(
+            observable=(True, True, False, True, True, True),
+            covariance=covariance(sigmas, [(2, 5, 0.9997)]),
+        )
+        assert objections(cal) == set()
+        assert Objection.SIGMA_TOO_LARGE in objections(replace(cal, observable=(True,) * 6))
+
+    def test_unseen_number_that_the_flight_contradicts_stops_everything(self):
+        cal = calibration(observable=(False, True, True, True, True, True))
+        assert objections(cal) == {Objection.CONTRADICTED}
+
+    def test_nothing_seen(self):
+        cal = calibration(observable=(False,) * 6, covariance=covariance((0.1,) * 3 + (1.0,) * 3))
+        assert objections(cal) == {Objection.NOTHING_OBSERVED}
+
+
+class TestBounds:
+    @pytest.mark.parametrize("value", [0.79, 1.21])
+    @pytest.mark.parametrize("i", range(3))
+    def test_scale(self, value, i):
+        scale = tuple(value if j == i else 1.01 for j in range(3))
+        assert objections(calibration(scale=scale)) == {Objection.OUT_OF_BOUNDS}
+
+    @pytest.mark.parametrize("value", [-3.51, 3.51])
+    @pytest.mark.parametrize("i", range(3))
+    def test_offset(self, value, i):
+        offset = tuple(value if j == i else 0.1 for j in range(3))
+        assert objections(calibration(offset=offset)) == {Objection.OUT_OF_BOUNDS}
+
+    def test_three_zero_offsets(self):
+        assert objections(calibration(offset=(0.0, 0.0, 0.0))) == {Objection.ZERO_OFFSETS}
+
+    def test_old_value_out_of_bounds_that_stays_is_not_ours_to_judge(self):
+        cal = calibration(
+            observable=(False, True, True, True, True, True),
+            covariance=covariance((0.2, 0.001, 0.002, 0.008, 0.008, 0.02)),
+        )
+        assert objections(cal, scale=(1.3, 1.0, 1.0)) == set()
+
+
+class TestInFlight:
+    SETTINGS = PolicySettings(mode=Mode.IN_FLIGHT)
+
+    def test_large_step_waits_for_the_ground(self):
+        assert objections(condition=FLYING, settings=self.SETTINGS) == {Objection.STEP_TOO_LARGE}
+        assert objections(condition=LANDED, settings=self.SETTINGS) == set()
+
+    def test_small_step_may_be_made(self):
+        cal = calibration(scale=(1.004, 1.0, 1.0), offset=(0.06, -0.03, 0.04))
+        assert objections(cal, FLYING, self.SETTINGS) == set()
+
+
+class TestTemperature:
+    ENABLE, CALTEMP, _ = context_names(1)
+
+    @pytest.mark.parametrize(
+        ("values", "expected"),
+        [
+            ({}, set()),
+            ({ENABLE: 0.0}, set()),
+            ({ENABLE: 1.0, CALTEMP: 35.0}, set()),
+            ({ENABLE: 1.0}, {Objection.TEMPERATURE_REFERENCE}),
+            ({ENABLE: 1.0, CALTEMP: -300.0}, {Objection.TEMPERATURE_REFERENCE}),
+            ({ENABLE: 2.0, CALTEMP: 35.0}, {Objection.TEMPERATURE_LEARNING}),
+        ],
+    )
+    def test_calibration_of_temperature(self, values, expected):
+        assert objections(values=values) == expected
+
+    def test_names_of_later_instances(self):
+        assert context_names(2)[:2] == ("INS_TCAL2_ENABLE", "INS_ACC2_CALTEMP")
+        assert context_names(4)[:2] == ("INS4_TCAL_ENABLE", "INS4_ACC_CALTEMP")
+
+
+class TestConsistency:
+    """IMU 1 is written; IMU 2 stays as it is, wrong by some offset."""
+
+    def other(self, wrong, imu=2, axis=0):
+        truth = SixParameters((1.0,) * 3, (0.1, 0.1, 0.1))
+        offset = tuple(0.1 + (wrong if i == axis else 0.0) for i in range(3))
+        return Accelerometer(imu, truth, SixParameters((1.0,) * 3, offset))
+
+    @pytest.mark.parametrize(
+        ("wrong", "imu", "axis", "refused"),
+        [
+            (0.74, 2, 0, False),
+            (0.76, 2, 0, True),
+            (0.76, 2, 2, False),  # z counts half
+            (1.52, 2, 2, True),
+            (2.2, 3, 0, False),  # the third may differ by three times as much
+            (2.3, 3, 0, True),
+        ],
+    )
+    def test_arming_would_fail(self, wrong, imu, axis, refused):
+        # IMU 1 is wrong the same way now, so that the two agree before the push.
+        now = {"offset": tuple(0.15 + (wrong if i == axis else 0.0) for i in range(3))}
+        cal = calibration(scale=(1.0,) * 3, offset=(0.15,) * 3)
+        found = objections(cal, others=[self.other(wrong, imu, axis)], **now)
+        assert found == ({Objection.IMUS_INCONSISTENT} if refused else set())
+
+    def test_threshold_is_the_autopilots_own(self):
+        now = {"offset": (0.65, 0.15, 0.15)}
+        cal = calibration(scale=(1.0,) * 3, offset=(0.15,) * 3)
+        values = {"ARMING_ACCTHRESH": 0.4}
+        assert objections(cal, others=[self.other(0.5)], values=values, **now) == {
+            Objection.IMUS_INCONSISTENT
+        }
+
+    def test_push_that_makes_an_inconsistency_smaller_is_welcome(self):
+        now = {"offset": (-0.75, 0.15, 0.15)}
+        cal = calibration(scale=(1.0,) * 3, offset=(0.15,) * 3)
+        assert objections(cal, others=[self.other(1.0)], **now) == set()
+
+    def test_both_pushed_in_one_sitting(self):
+        now = {"offset": (1.15, 0.15, 0.15)}
+        cal = calibration(scale=(1.0,) * 3, offset=(0.15,) * 3)
+        assert objections(cal, others=[self.other(0.0)], **now) == set()
+
+
+def test_all_objections_are_given_at_once():
+    cal = calibration(status=Status.COLLECTING, scale=(1.3, 1.0, 1.0), held_out_after=5.0)
+    assert objections(cal, condition=FLYING) == {
+        Objection.ARMED,
+        Objection.NOT_CALIBRATED,
+        Objection.OUT_OF_BOUNDS,
+        Objection.NO_IMPROVEMENT,
+    }
+
+
+def test_third_accelerometer_has_its_own_names():
+    cal = calibration(imu=3)
+    plan = propose(cal, current(3), system_id=1)
+    assert plan.names == parameter_names(3).six
+    assert judge(plan, cal, LANDED, PolicySettings()) == ()
