@@ -11,16 +11,13 @@ from numpy.typing import NDArray
 
 from onboard.core.samples import Sample
 from onboard.errors import RecordingError
+from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_index import MAGIC, DataflashIndex, index_dataflash
 from onboard.recordings.dataflash_records import (
     CONVERTERS,
-    GPS_NAMES,
     IMU_NAMES,
     NEEDED,
     Batch,
-    Context,
-    Floats,
-    receiver_of,
     record_times,
 )
 from onboard.recordings.recording import Recording, elapsed_s
@@ -28,7 +25,6 @@ from onboard.recordings.recording import Recording, elapsed_s
 BLOCK = 16384
 """Records converted at a time: bounds the memory, whatever the length of the log."""
 WANTED = frozenset(CONVERTERS) | {"GPA"}
-EKF2 = 2
 
 
 def is_dataflash(head: bytes) -> bool:
@@ -53,7 +49,7 @@ def open_dataflash(path: Path) -> Recording:
             f"{path}: a DataFlash log without inertial records (IMU) that have a time"
         )
     t = _times(index, imu_slots)
-    context = _context(index, float(t[0]))
+    context = context_of(index, float(t[0]))
 
     def read() -> Iterator[Sample]:
         return _samples(index, usable, context)
@@ -105,55 +101,6 @@ def _damage(index: DataflashIndex) -> tuple[str, ...]:
     if index.cut_off:
         notes.append("cut off: the end of the log is missing")
     return tuple(notes)
-
-
-def _context(index: DataflashIndex, first_time: float) -> Context:
-    accuracy: dict[int, list[tuple[Floats, Floats]]] = {}
-    vertical: dict[int, bool] = {}
-    denied: set[int] = set()
-    for form, records in index.all_of("GPA"):
-        if not form.has("SAcc", "TimeUS"):
-            continue
-        receivers = np.array(receiver_of(form, records))
-        t, sigma = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "SAcc")
-        for receiver in np.unique(receivers).tolist():
-            mine = receivers == receiver
-            accuracy.setdefault(receiver, []).append((t[mine], sigma[mine]))
-            if form.has("VV") and not records["VV"][mine].any():
-                denied.add(receiver)
-    for name in GPS_NAMES:
-        for form, records in index.all_of(name):
-            if not form.has("VZ"):
-                continue
-            receivers = np.array(receiver_of(form, records))
-            for receiver in np.unique(receivers).tolist():
-                seen = bool(records["VZ"][receivers == receiver].any())
-                vertical[receiver] = vertical.get(receiver, False) or seen
-    ekf = ekf_in_use(index)
-    return Context(
-        speed_accuracy={k: _sorted_series(parts) for k, parts in accuracy.items()},
-        vertical_speed={k: v and k not in denied for k, v in vertical.items()},
-        ekf_status_from=ekf,
-        first_time=first_time,
-    )
-
-
-def _sorted_series(parts: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
-    t = np.concatenate([p[0] for p in parts])
-    values = np.concatenate([p[1] for p in parts])
-    order = np.argsort(t, kind="stable")
-    return t[order], values[order]
-
-
-def ekf_in_use(index: DataflashIndex) -> str:
-    """XKF4 or NKF4: the record of the EKF that AHRS_EKF_TYPE chooses, or that there is."""
-    counts = index.counts()
-    for form, records in index.all_of("PARM"):
-        if form.has("Name", "Value"):
-            chosen = records["Value"][records["Name"] == b"AHRS_EKF_TYPE"]
-            if len(chosen):
-                return "NKF4" if int(chosen[-1]) == EKF2 else "XKF4"
-    return "XKF4" if counts.get("XKF4") else "NKF4"
 
 
 def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Sample]:

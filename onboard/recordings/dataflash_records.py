@@ -8,11 +8,10 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from onboard.core.samples import (
     AirData,
@@ -28,9 +27,8 @@ from onboard.core.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, receiver_of
 from onboard.recordings.dataflash_index import Format, Records
-
-Floats = NDArray[np.float64]
 
 SECONDS_PER_WEEK = 604800.0
 SAME_FIX_S = 2e-3
@@ -47,22 +45,6 @@ EVENTS: dict[int, tuple[bool | None, bool | None]] = {
     28: (None, False),
 }
 """EV record: event number to (armed, landed)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Context:
-    """What a converter must know of the rest of the log.
-
-    ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
-    follow the GPS record that they belong to; ``vertical_speed`` says per receiver whether it
-    measures one; ``ekf_status_from`` names the record of the EKF that flies; ``first_time`` (s) is
-    given to records without a time that stand before all others.
-    """
-
-    speed_accuracy: Mapping[int, tuple[Floats, Floats]]
-    vertical_speed: Mapping[int, bool]
-    ekf_status_from: str
-    first_time: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +77,6 @@ def record_times(form: Format, records: Records) -> Floats | None:
     if form.name.startswith("GPS"):
         return form.numbers(records, "T") / 1e3 if form.has("T") else None
     return form.numbers(records, "TimeMS") / 1e3 if form.has("TimeMS") else None
-
-
-def receiver_of(form: Format, records: Records) -> list[int]:
-    """(n,) number of the GPS receiver, from 1."""
-    if form.has("I"):
-        return [int(i) + 1 for i in records["I"]]
-    return [2 if form.name.endswith("2") else 1] * len(records)
 
 
 def imu(batch: Batch, _context: Context) -> Converted:
@@ -206,6 +181,16 @@ def throttle(batch: Batch, _context: Context) -> Converted:
     return map(Throttle, batch.t.tolist(), values.tolist())
 
 
+def motors(batch: Batch, context: Context) -> Converted:
+    """RCOU: mean output of the motors, where the log has no CTUN."""
+    channels = [c for c in context.motor_channels if batch.form.has(c)]
+    if not channels:
+        return [None] * len(batch.t)
+    low, high = context.motor_range_us
+    mean = np.mean([batch.form.numbers(batch.records, c) for c in channels], axis=0)
+    return map(Throttle, batch.t.tolist(), np.clip((mean - low) / (high - low), 0.0, 1.0).tolist())
+
+
 def airspeed(batch: Batch, _context: Context) -> Converted:
     """ARSP of the first sensor."""
     values, sensor = batch.floats("Airspeed")[0], batch.integers("I")
@@ -304,13 +289,13 @@ def flying(batch: Batch, _context: Context) -> Converted:
 
 
 IMU_NAMES = ("IMU", "IMU2", "IMU3")
-GPS_NAMES = ("GPS", "GPS2")
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     **dict.fromkeys(IMU_NAMES, (imu,)),
     **dict.fromkeys(GPS_NAMES, (gps,)),
     "ATT": (attitude,),
     "VIBE": (vibration,),
     "CTUN": (throttle,),
+    "RCOU": (motors,),
     "ARSP": (airspeed,),
     "XKF2": (ekf_bias, wind),
     "XKF4": (ekf_status,),

@@ -137,6 +137,28 @@ def test_what_is_not_a_measurement_does_not_become_one(tmp_path):
     assert (fix.t_receiver, fix.hdop) == (None, None)
 
 
+def test_throttle_from_the_motors_where_there_is_no_better(tmp_path):
+    log = modern_log(1)
+    log.format(30, "RCOU", "QHHHH", "TimeUS,C1,C2,C3,C4")
+    for name, value in {"SERVO2_FUNCTION": 33, "SERVO3_FUNCTION": 34, "SERVO4_FUNCTION": 7}.items():
+        log.add("PARM", 9_000_000, name, float(value), 0.0)
+    log.add("RCOU", 9_000_000, 1900, 1200, 1600, 1900)
+    assert [s.throttle for s in of_type(saved(tmp_path, log), Throttle)] == [pytest.approx(0.4)]
+    log.format(31, "CTUN", "Qf", "TimeUS,ThO")
+    log.add("CTUN", 9_000_000, 0.45)
+    assert [s.throttle for s in of_type(saved(tmp_path, log), Throttle)] == [pytest.approx(0.45)]
+
+
+def test_speed_accuracy_is_that_of_the_same_receiver(tmp_path):
+    log = modern_log(1)
+    for t, i, accuracy in ((9_000_000, 0, 0.5), (9_000_050, 1, 0.9)):
+        log.add("GPS", t, i, 3, 500, 2300, 12, 0.8, 1.0, 1.0, 1.0, 1.0, 0.0, 0.5, 0.0, 1)
+        log.add("GPA", t, i, 1.1, 0.5, 0.7, accuracy, 0.0, 1 - i, 9000, 200, 0.0, 0, 0)
+    first, second = of_type(saved(tmp_path, log), GpsFix)[-2:]
+    assert (first.receiver, first.speed_accuracy, first.v_d) == (1, 0.5, 0.5)
+    assert (second.receiver, second.speed_accuracy, second.v_d) == (2, 0.9, None)
+
+
 def test_format_with_unknown_letter_is_stepped_over(tmp_path):
     log = DataflashWriter()
     log.format(60, "NEW", "Q?", "TimeUS,Odd", length=12)

@@ -1,0 +1,126 @@
+"""What a converter must know of the whole log before it meets a record: a few small records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.recordings.dataflash_index import DataflashIndex, Format, Records
+
+Floats = NDArray[np.float64]
+
+GPS_NAMES = ("GPS", "GPS2")
+EKF2 = 2.0
+MOTOR_FUNCTIONS = frozenset((*range(33, 41), *range(82, 86), 70))
+"""SERVOn_FUNCTION of motors 1 ... 12, and of a plane's throttle."""
+CHANNELS = 14
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a converter must know of the rest of the log.
+
+    ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
+    follow the GPS record that they belong to; ``vertical_speed`` says per receiver whether it
+    measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
+    the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
+    widths at none and at full; ``first_time`` (s) is given to records without a time that
+    stand before all others.
+    """
+
+    speed_accuracy: Mapping[int, tuple[Floats, Floats]]
+    vertical_speed: Mapping[int, bool]
+    ekf_status_from: str
+    motor_channels: tuple[str, ...]
+    motor_range_us: tuple[float, float]
+    first_time: float
+
+
+def context_of(index: DataflashIndex, first_time: float) -> Context:
+    """Look through the records that say it."""
+    counts, parameters = index.counts(), _parameters(index)
+    return Context(
+        speed_accuracy=_speed_accuracy(index),
+        vertical_speed=_vertical_speed(index),
+        ekf_status_from=_ekf_status(parameters, counts),
+        motor_channels=() if counts.get("CTUN") else _motor_channels(parameters),
+        motor_range_us=_motor_range(parameters),
+        first_time=first_time,
+    )
+
+
+def receiver_of(form: Format, records: Records) -> list[int]:
+    """(n,) number of the GPS receiver, from 1."""
+    if form.has("I"):
+        return [int(i) + 1 for i in records["I"]]
+    return [2 if form.name.endswith("2") else 1] * len(records)
+
+
+def _parameters(index: DataflashIndex) -> dict[str, float]:
+    """Parameters by name, the last value of each."""
+    values: dict[str, float] = {}
+    for form, records in index.all_of("PARM"):
+        if form.has("Name", "Value"):
+            names = (bytes(name).decode("ascii", "replace") for name in records["Name"])
+            values.update(zip(names, form.numbers(records, "Value").tolist(), strict=True))
+    return values
+
+
+def _speed_accuracy(index: DataflashIndex) -> dict[int, tuple[Floats, Floats]]:
+    parts: dict[int, list[tuple[Floats, Floats]]] = {}
+    for form, records in index.all_of("GPA"):
+        if not form.has("SAcc", "TimeUS"):
+            continue
+        receivers = np.array(receiver_of(form, records))
+        t, sigma = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "SAcc")
+        for receiver in np.unique(receivers).tolist():
+            mine = receivers == receiver
+            parts.setdefault(receiver, []).append((t[mine], sigma[mine]))
+    series = {}
+    for receiver, pieces in parts.items():
+        t, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        order = np.argsort(t, kind="stable")
+        series[receiver] = t[order], sigma[order]
+    return series
+
+
+def _vertical_speed(index: DataflashIndex) -> dict[int, bool]:
+    """A receiver without vertical speed logs zeros, and GPA.VV says so."""
+    denied: set[int] = set()
+    for form, records in index.all_of("GPA"):
+        if form.has("VV"):
+            receivers = np.array(receiver_of(form, records))
+            have = set(receivers[records["VV"] != 0].tolist())
+            denied |= set(receivers.tolist()) - have
+    measured: dict[int, bool] = {}
+    for name in GPS_NAMES:
+        for form, records in index.all_of(name):
+            if form.has("VZ"):
+                receivers = np.array(receiver_of(form, records))
+                for receiver in np.unique(receivers).tolist():
+                    moves = bool(records["VZ"][receivers == receiver].any())
+                    measured[receiver] = measured.get(receiver, False) or moves
+    return {receiver: moves and receiver not in denied for receiver, moves in measured.items()}
+
+
+def _ekf_status(parameters: Mapping[str, float], counts: Mapping[str, int]) -> str:
+    """XKF4 or NKF4: the record of the EKF that AHRS_EKF_TYPE chooses, or that there is."""
+    chosen = parameters.get("AHRS_EKF_TYPE")
+    if chosen is None:
+        return "XKF4" if counts.get("XKF4") else "NKF4"
+    return "NKF4" if chosen == EKF2 else "XKF4"
+
+
+def _motor_channels(parameters: Mapping[str, float]) -> tuple[str, ...]:
+    numbers = range(1, CHANNELS + 1)
+    return tuple(
+        f"C{n}" for n in numbers if parameters.get(f"SERVO{n}_FUNCTION") in MOTOR_FUNCTIONS
+    )
+
+
+def _motor_range(parameters: Mapping[str, float]) -> tuple[float, float]:
+    low, high = parameters.get("MOT_PWM_MIN", 0.0), parameters.get("MOT_PWM_MAX", 0.0)
+    return (low, high) if 0.0 < low < high else (1000.0, 2000.0)
