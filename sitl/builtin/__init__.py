@@ -1,0 +1,1 @@
+"""The built-in autopilot: flight, sensors, attitude filter, parameters, streams, server."""

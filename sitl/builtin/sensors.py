@@ -1,0 +1,287 @@
+"""Inertial sensors of a whole flight: what the chips deliver at 1 kHz, before any parameter.
+
+Every imperfection enters here, in the order of a real device: effects on the specific force,
+vibration, sensor axes, scale and offset, noise, range, quantisation; then ArduPilot's
+two-pole low-pass.  The filter is linear with unit gain, so the autopilot's scale and offset
+may be applied after it as well as before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+
+from sitl.builtin import effects as fx
+from sitl.builtin import rotation
+from sitl.builtin.orientation import board_rotation
+from sitl.builtin.smoothing import DT, RATE, Array, derivative
+from sitl.builtin.trajectory import STANDARD_GRAVITY, Trajectory
+from sitl.builtin.truth import ImuTruth, Truth
+
+RANGE = 16.0 * STANDARD_GRAVITY
+RESOLUTION = RANGE / 32768.0
+CRUISE_THROTTLE = 0.4
+VIBE_FLOOR_HZ = 5.0
+VIBE_LEVEL_HZ = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReadings:
+    """One IMU over one flight: (n, 3) arrays at 1 kHz.
+
+    ``raw`` and ``filtered`` are sensor axes, uncorrected, m/s^2; ``gyro`` and
+    ``gyro_filtered`` are body axes, rad/s; ``vibration`` is the level that VIBRATION reports
+    (body axes); ``clipped`` counts samples at the rail since the start.
+    """
+
+    raw: Array
+    filtered: Array
+    gyro: Array
+    gyro_filtered: Array
+    temperature: Array
+    vibration: Array
+    clipped: np.ndarray[tuple[int], np.dtype[np.int64]]
+
+    def first(self, n: int) -> ImuReadings:
+        """The first ``n`` samples."""
+        return ImuReadings(*(getattr(self, f.name)[:n] for f in fields(self)))
+
+
+def low_pass_response(cutoff_hz: float) -> Array:
+    """Impulse response of the two-pole Butterworth low-pass, bilinear transform at 1 kHz.
+
+    The biquad of ArduPilot's LowPassFilter2p; its group delay at low frequency is
+    ``sqrt(2) / (2 pi cutoff)``.
+    """
+    ohm = np.tan(np.pi * cutoff_hz * DT)
+    c = 1.0 + np.sqrt(2.0) * ohm + ohm**2
+    b = np.array([1.0, 2.0, 1.0]) * ohm**2 / c
+    a1, a2 = 2.0 * (ohm**2 - 1.0) / c, (1.0 - np.sqrt(2.0) * ohm + ohm**2) / c
+    n = int(RATE * min(4.0, 8.0 / cutoff_hz)) + 8
+    h = np.zeros(n)
+    for i in range(n):
+        h[i] = b[i] if i < 3 else 0.0
+        h[i] -= (a1 * h[i - 1] if i > 0 else 0.0) + (a2 * h[i - 2] if i > 1 else 0.0)
+    return h
+
+
+def one_pole_response(cutoff_hz: float) -> Array:
+    """Impulse response of a first-order low-pass at 1 kHz."""
+    a = 1.0 - np.exp(-2.0 * np.pi * cutoff_hz * DT)
+    n = int(RATE * 5.0 / cutoff_hz)
+    out: Array = a * (1.0 - a) ** np.arange(n)
+    return out
+
+
+@lru_cache(maxsize=16)
+def _response(kind: str, cutoff_hz: float) -> Array:
+    return low_pass_response(cutoff_hz) if kind == "two" else one_pole_response(cutoff_hz)
+
+
+def low_pass(x: Array, cutoff_hz: float, kind: str = "two") -> Array:
+    """Filters (n, k) along axis 0, starting in the steady state of the first sample."""
+    if cutoff_hz <= 0.0:
+        return x.copy()
+    h = _response(kind, float(cutoff_hz))
+    size = _fast_length(len(x) + len(h))
+    spectrum = np.fft.rfft(h, size)
+    start = x[:1]
+    out = np.empty_like(x)
+    for i in range(x.shape[1]):
+        y = np.fft.irfft(np.fft.rfft(x[:, i] - start[0, i], size) * spectrum, size)
+        out[:, i] = y[: len(x)] + start[0, i]
+    return out
+
+
+def _fast_length(n: int) -> int:
+    block = 1 << max(0, n.bit_length() - 4)
+    return -(-n // block) * block
+
+
+def temperature_profile(truth: ImuTruth, t: Array) -> Array:
+    """Warming up after power-on: (n,) degrees Celsius at boot times ``t``."""
+    rise = 1.0 - np.exp(-t / truth.temperature_time)
+    out: Array = truth.temperature_start + (truth.temperature_end - truth.temperature_start) * rise
+    return out
+
+
+def read_imu(
+    trajectory: Trajectory,
+    truth: Truth,
+    index: int,
+    *,
+    start: float,
+    accel_filter_hz: float,
+    gyro_filter_hz: float,
+    origin: float = 0.0,
+) -> ImuReadings:
+    """Everything that IMU ``index`` (from 0) delivers on a trajectory that starts at ``start``.
+
+    Args:
+        trajectory: the motion.
+        truth: the hardware.
+        index: which of ``truth.imus``.
+        start: boot time of the first sample, s.
+        accel_filter_hz: INS_ACCEL_FILTER; 0 is no filter.
+        gyro_filter_hz: INS_GYRO_FILTER.
+        origin: boot time at which ramps and steps of the effects count from.
+    """
+    imu = truth.imus[index]
+    n = trajectory.n
+    t = start + np.arange(n, dtype=np.float64) * DT
+
+    def stream(purpose: int) -> np.random.Generator:
+        # One generator a purpose: a shorter flight must be a prefix of a longer one.
+        return np.random.default_rng([truth.seed, index, round(start * RATE), purpose])
+
+    shake = _vibration(imu, trajectory.throttle, stream(0), stream(1))
+    level = vibration_level(shake)
+    temperature = temperature_profile(imu, t)
+    f_b = trajectory.f_b + _lever(trajectory, imu)
+    f_b = f_b + _deterministic(
+        truth,
+        index,
+        f_b,
+        elapsed=t - origin,
+        temperature=temperature,
+        trajectory=trajectory,
+        level=level,
+    )
+    R_bs = board_rotation(truth.orientation)
+    f_s = (f_b + shake) @ R_bs
+    raw = f_s / np.array(imu.scale) + np.array(imu.offset)
+    raw += stream(2).standard_normal((n, 3)) * (imu.accel_noise * np.sqrt(RATE / 2.0))
+    raw += np.cumsum(stream(3).standard_normal((n, 3)), axis=0) * (imu.bias_walk * np.sqrt(DT))
+    limit = min(
+        [RANGE]
+        + [e.limit for e in truth.effects if isinstance(e, fx.Saturation) and _hits(e.imu, index)]
+    )
+    rail = np.any(np.abs(raw) >= limit, axis=1)
+    raw = np.clip(np.round(raw / RESOLUTION) * RESOLUTION, -limit, limit)
+    gyro = _gyro(trajectory, imu, stream(4), stream(5), t)
+    return ImuReadings(
+        raw=raw,
+        filtered=low_pass(raw, accel_filter_hz),
+        gyro=gyro,
+        gyro_filtered=low_pass(gyro, gyro_filter_hz),
+        temperature=temperature,
+        vibration=level,
+        clipped=np.cumsum(rail),
+    )
+
+
+def _hits(wanted: int, index: int) -> bool:
+    return wanted in (0, index + 1)
+
+
+def _lever(trajectory: Trajectory, imu: ImuTruth) -> Array:
+    """Centripetal and Euler acceleration of an IMU away from the reference point."""
+    if not any(imu.position):
+        return np.zeros(3)
+    r = np.array(imu.position)
+    w = trajectory.w_b
+    out: Array = np.cross(derivative(w), r) + np.cross(w, np.cross(w, r))
+    return out
+
+
+def _vibration(
+    imu: ImuTruth, throttle: Array, phases: np.random.Generator, noise: np.random.Generator
+) -> Array:
+    """Motor tones with harmonics whose speed follows throttle, and broadband noise, (n, 3)."""
+    n = len(throttle)
+    load = np.clip(throttle / CRUISE_THROTTLE, 0.0, 3.0)
+    phase = 2.0 * np.pi * np.cumsum(imu.vibration_hz * np.sqrt(load)) * DT
+    out = np.zeros((n, 3))
+    for harmonic, share in ((1, 1.0), (2, 0.4), (5, 0.25)):
+        offsets = phases.uniform(0.0, 2.0 * np.pi, 3)
+        for axis in range(3):
+            if imu.vibration[axis]:
+                tone = np.sin(harmonic * phase + offsets[axis])
+                out[:, axis] += share * imu.vibration[axis] * load * tone
+    if imu.broadband:
+        out += imu.broadband * load[:, None] * noise.standard_normal((n, 3))
+    return out
+
+
+def vibration_level(shake: Array) -> Array:
+    """Level as VIBRATION reports it: high-pass at 5 Hz, square, low-pass at 2 Hz, root."""
+    high = shake - low_pass(shake, VIBE_FLOOR_HZ, "one")
+    level: Array = np.sqrt(np.maximum(low_pass(high**2, VIBE_LEVEL_HZ, "one"), 0.0))
+    return level
+
+
+def _deterministic(
+    truth: Truth,
+    index: int,
+    f_b: Array,
+    *,
+    elapsed: Array,
+    temperature: Array,
+    trajectory: Trajectory,
+    level: Array,
+) -> Array:
+    """Sum of the accelerometer effects on IMU ``index``: what it reads too much, (n, 3)."""
+    extra = np.zeros_like(f_b)
+    for effect in truth.effects:
+        if not _hits(getattr(effect, "imu", 0), index):
+            continue
+        match effect:
+            case fx.CrossAxis(xy=xy, xz=xz, yx=yx, yz=yz, zx=zx, zy=zy):
+                extra += f_b @ np.array([[0, xy, xz], [yx, 0, yz], [zx, zy, 0]]).T
+            case fx.TemperatureDrift(x=x, y=y, z=z, reference=reference):
+                extra += np.outer(temperature - reference, (x, y, z))
+            case fx.BiasRamp(x=x, y=y, z=z):
+                extra += np.outer(elapsed, (x, y, z))
+            case fx.BiasStep(time=time, x=x, y=y, z=z):
+                extra += np.outer(elapsed >= time, (x, y, z))
+            case fx.ScaleNonlinearity(x=x, y=y, z=z):
+                extra += np.array((x, y, z)) * f_b**2 / STANDARD_GRAVITY
+            case fx.VibrationRectification(x=x, y=y, z=z):
+                extra += np.array((x, y, z)) * level**2
+            case fx.ThrottleCoupling(x=x, y=y, z=z):
+                extra += np.outer(trajectory.throttle, (x, y, z))
+            case fx.LoadFlex(roll=roll, pitch=pitch):
+                load = -f_b[:, 2] / STANDARD_GRAVITY - 1.0
+                flex = rotation.from_vector(np.outer(load, (roll, pitch, 0.0)))
+                extra += rotation.rotate(flex, f_b) - f_b
+            case _:
+                pass
+    return extra
+
+
+def _gyro(
+    trajectory: Trajectory,
+    imu: ImuTruth,
+    white: np.random.Generator,
+    wander: np.random.Generator,
+    t: Array,
+) -> Array:
+    n = trajectory.n
+    noise = white.standard_normal((n, 3)) * (imu.gyro_noise * np.sqrt(RATE / 2.0))
+    walk = np.cumsum(wander.standard_normal((n, 3)), axis=0) * (imu.gyro_walk * np.sqrt(DT))
+    drift = np.outer(np.sin(2.0 * np.pi * t / 600.0), imu.gyro_bias)
+    out: Array = trajectory.w_b * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
+    return out
+
+
+class Barometer:
+    """Static pressure with slow drift and noise; standard atmosphere."""
+
+    SEA_LEVEL = 101_325.0
+    LAPSE = 2.255_77e-5
+    EXPONENT = 5.255_88
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng([seed, 31])
+        self._drift = 0.0
+
+    def altitude(self, true_altitude: float) -> float:
+        """Pressure altitude over sea level, m."""
+        self._drift = 0.998 * self._drift + 0.02 * float(self._rng.standard_normal())
+        return true_altitude + self._drift + 0.08 * float(self._rng.standard_normal())
+
+    def pressure(self, altitude: float) -> float:
+        """Static pressure at an altitude, Pa."""
+        return float(self.SEA_LEVEL * (1.0 - self.LAPSE * altitude) ** self.EXPONENT)

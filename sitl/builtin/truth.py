@@ -1,0 +1,93 @@
+"""What the simulated hardware is really like: the numbers that a calibration has to find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from sitl.builtin.effects import Effect, Vector3
+from sitl.builtin.trajectory import Environment
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuTruth:
+    """One inertial sensor.
+
+    The sensor gives ``raw = f / scale + offset``, so that the right INS_ACCSCAL and
+    INS_ACCOFFS are exactly ``scale`` and ``offset`` (m/s^2).  Noise densities are one-sided,
+    m/s^2/sqrt(Hz) and rad/s/sqrt(Hz); ``bias_walk`` is in m/s^2/sqrt(s).  ``vibration`` is the
+    amplitude of the motor tone per axis at hover or cruise throttle (m/s^2),
+    ``vibration_hz`` its frequency there; tones beyond 500 Hz fold into the 1 kHz samples by
+    themselves.  ``gyro_scale`` is the relative error of the gyroscope.
+    """
+
+    scale: Vector3 = (1.0, 1.0, 1.0)
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    accel_noise: float = 1.5e-3
+    bias_walk: float = 1.0e-4
+    vibration: Vector3 = (0.6, 0.6, 0.9)
+    vibration_hz: float = 130.0
+    broadband: float = 0.25
+    gyro_noise: float = 1.0e-4
+    gyro_bias: Vector3 = (0.002, -0.001, 0.0015)
+    gyro_walk: float = 1.5e-5
+    gyro_scale: Vector3 = (0.004, -0.004, 0.003)
+    position: Vector3 = (0.0, 0.0, 0.0)
+    temperature_start: float = 25.0
+    temperature_end: float = 45.0
+    temperature_time: float = 180.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GpsTruth:
+    """The receiver: how late, how noisy, where its antenna is.
+
+    ``delay`` is the mean time from validity of a fix to its arrival; the autopilot stamps a
+    fix ``stamped_early`` before its arrival, as ArduPilot does when it takes the transport
+    time off.  Noise: white and first-order coloured, per axis; ``vertical`` multiplies both.
+    """
+
+    rate: float = 5.0
+    delay: float = 0.14
+    stamped_early: float = 0.02
+    jitter: float = 0.008
+    smoothing: float = 0.0
+    antenna: Vector3 = (0.0, 0.0, 0.0)
+    velocity_noise: float = 0.03
+    velocity_coloured: float = 0.03
+    velocity_time: float = 15.0
+    position_noise: float = 0.02
+    position_coloured: float = 0.5
+    position_time: float = 100.0
+    vertical: float = 1.5
+    losses: tuple[tuple[float, float], ...] = ()
+    glitches: tuple[tuple[float, float, float, float], ...] = ()
+    jamming: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def net_delay(self) -> float:
+        """How late GPS_RAW_INT's stamp is, s."""
+        return self.delay - self.stamped_early
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompassTruth:
+    """Error of the magnetic heading: constant, with the heading, slowly wandering (rad)."""
+
+    constant: float = 0.0
+    per_heading: float = 0.006
+    wandering: float = 0.004
+    wandering_time: float = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """Everything that is true; ``attitude_errors=False`` reports the true attitude."""
+
+    imus: tuple[ImuTruth, ...] = (ImuTruth(),)
+    gps: GpsTruth = field(default_factory=GpsTruth)
+    compass: CompassTruth = field(default_factory=CompassTruth)
+    environment: Environment = field(default_factory=Environment)
+    effects: tuple[Effect, ...] = ()
+    attitude_errors: bool = True
+    orientation: int = 0
+    seed: int = 0
