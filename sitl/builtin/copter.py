@@ -28,12 +28,15 @@ HORIZONTAL_S = (1.5, 0.9, 0.5, 0.2)
 VERTICAL_S = (0.7, 0.6, 0.4, 0.2)
 YAW_S = (1.2, 0.6, 0.4, 0.2)
 SETTLING_S = sum(HORIZONTAL_S)
-GUST_S = (0.5, 0.35, 0.25, 0.15)
+GUST_S = (0.5, 0.35, 0.25, 0.15, 0.1)
 CLIMB = 2.5
 DESCENT = 1.5
 RANGE = 150.0
 FLOOR, CEILING = 12.0, 60.0
 HOVER_THROTTLE = 0.35
+LONGEST_S = 16.0
+"""A manoeuvre and coming down from where it may have climbed to."""
+DULL_GUSTS = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,9 +80,10 @@ def copter_trajectory(flight: CopterFlight, environment: Environment, start: Sta
         ]
     )
     aloft = trajectory.envelope(n, plan.lift_off + 0.5, plan.touch_down - 0.5, 2.0)
+    gusts = flight.gusts * (DULL_GUSTS if flight.dull else 1.0)
     for axis, share in enumerate((1.0, 1.0, 0.7)):
         rng = np.random.default_rng([flight.seed, 1, axis])
-        shake = band_limited_noise(rng, n, flight.gusts * share, GUST_S)
+        shake = band_limited_noise(rng, n, gusts * share, GUST_S)
         v_n[:, axis] += derivative(aloft * shake)
     yaw = smooth(staircase(n, plan.yaw_times, plan.yaw), YAW_S)
     return _body(flight, environment, start, v_n=v_n, yaw=yaw, aloft=aloft, plan=plan)
@@ -100,13 +104,15 @@ def _body(
     f_n = trajectory.specific_force_n(v_n, environment)
     air_n = v_n - np.outer(aloft, environment.wind_n)
     airspeed = np.linalg.norm(air_n, axis=1)
-    # Unequal drag along x and y has no closed form; two rounds converge far below a microradian.
-    R = rotation.about_z(yaw)
-    for _ in range(4):
-        air_b = rotation.rotate_back(R, air_n)
-        k = np.array([*flight.drag, 0.0]) + flight.drag_quadratic * airspeed[:, None]
-        k[:, 2] = 0.0
-        R = _thrust_frame(-(f_n + rotation.rotate(R, k * air_b)), yaw)
+    mean = 0.5 * sum(flight.drag)
+    unequal = np.array([flight.drag[0] - mean, flight.drag[1] - mean, 0.0])
+    along = f_n + (mean + flight.drag_quadratic * airspeed)[:, None] * air_n
+    R = _thrust_frame(-along, yaw)
+    # Only the difference between drag along x and y has no closed form; each round leaves
+    # a few per cent of what the one before left.
+    for _ in range(3):
+        remainder = unequal * rotation.rotate_back(R, air_n)
+        R = _thrust_frame(-(along + rotation.rotate(R, remainder)), yaw)
     f_b = rotation.rotate_back(R, f_n)
     t = np.arange(n) / RATE
     thrust = np.clip(-f_b[:, 2] / trajectory.STANDARD_GRAVITY, 0.0, None)
@@ -149,7 +155,7 @@ def _plan(flight: CopterFlight, start: Start) -> _Plan:
     heading = start.yaw
     last = flight.duration
     stop = np.inf if flight.stop_at is None else flight.stop_at
-    while t + 6.0 + _landing_time(height) < last and t < stop and not flight.dull:
+    while t + LONGEST_S + _landing_time(height) < last and t < stop and not flight.dull:
         hold = rng.uniform(2.2, 5.0)
         course = rng.uniform(-np.pi, np.pi)
         if np.linalg.norm(place) > RANGE:

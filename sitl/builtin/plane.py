@@ -28,7 +28,7 @@ BANK_S = (0.7, 0.6, 0.4, 0.2)
 CLIMB_S = (0.8, 0.6, 0.4, 0.2)
 SPEED_S = (3.0, 1.5, 0.8, 0.4)
 SLIP_S = (0.7, 0.5, 0.4, 0.2)
-GUST_S = (0.45, 0.35, 0.25, 0.15)
+GUST_S = (0.45, 0.35, 0.25, 0.15, 0.1)
 CRUISE = 20.0
 ROTATION = 17.0
 """Speed of take-off, m/s."""
@@ -41,6 +41,9 @@ SIDE_FORCE = 0.027
 ZERO_LIFT, LIFT_SLOPE = -0.02, 0.07
 """Angle of attack without lift, and what 1 g of lift adds at cruise speed, rad."""
 MAX_THRUST = 6.5
+LONGEST_S = 15.0
+"""A manoeuvre and coming down from where it may have climbed to."""
+DULL_GUSTS = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,17 +78,18 @@ def plane_trajectory(flight: PlaneFlight, environment: Environment, start: Start
     n = trajectory.whole_samples(min(flight.duration, plan.touch_down + 15.0))
     steps = np.array(plan.commands)
     aloft = trajectory.envelope(n, plan.lift_off + 1.0, plan.touch_down - 1.0, 3.0)
+    gusts = flight.gusts * (DULL_GUSTS if flight.dull else 1.0)
 
     def gust(sigma: float, signal: int) -> Array:
         rng = np.random.default_rng([flight.seed, 1, signal])
         return aloft * band_limited_noise(rng, n, sigma, GUST_S)
 
-    bank = smooth(staircase(n, plan.times, steps[:, 0]), BANK_S) + gust(0.2 * flight.gusts, 0)
+    bank = smooth(staircase(n, plan.times, steps[:, 0]), BANK_S) + gust(0.2 * gusts, 0)
     climb = smooth(staircase(n, plan.times, steps[:, 1]), CLIMB_S)
-    climb += derivative(gust(flight.gusts, 1))
+    climb += derivative(gust(gusts, 1))
     speed = smooth(staircase(n, plan.times, steps[:, 2]), SPEED_S)
-    speed += gust(1.5 * flight.gusts, 2)
-    slip = smooth(staircase(n, plan.times, steps[:, 3]), SLIP_S) + gust(0.15 * flight.gusts, 3)
+    speed += gust(1.5 * gusts, 2)
+    slip = smooth(staircase(n, plan.times, steps[:, 3]), SLIP_S) + gust(0.15 * gusts, 3)
     return _body(
         environment,
         start,
@@ -159,7 +163,7 @@ def _plan(flight: PlaneFlight) -> _Plan:
     side = 1.0 if rng.random() < 0.5 else -1.0
     last = flight.duration
     stop = np.inf if flight.stop_at is None else flight.stop_at
-    while not flight.dull and t < stop and t + 7.0 + _landing_time(height) < last:
+    while not flight.dull and t < stop and t + LONGEST_S + _landing_time(height) < last:
         for hold, command in _manoeuvre(rng, flight.max_bank, side):
             climb = command[1]
             if not FLOOR < height + climb * hold < CEILING:

@@ -127,12 +127,12 @@ def whole_samples(seconds: float) -> int:
 
 
 def envelope(n: int, begin_s: float, end_s: float, ramp_s: float) -> Array:
-    """(n,) 0 on the ground, 1 aloft, twice differentiable in between."""
+    """(n,) 0 on the ground, 1 aloft, three times differentiable in between."""
     t = np.arange(n) * DT
     rise = np.clip((t - begin_s) / ramp_s, 0.0, 1.0)
     fall = np.clip((end_s - t) / ramp_s, 0.0, 1.0)
     x = np.minimum(rise, fall)
-    out: Array = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    out: Array = x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3)
     return out
 
 

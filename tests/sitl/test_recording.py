@@ -181,7 +181,7 @@ def test_frames_are_the_messages(tmp_path):
             x, y = getattr(a, name), getattr(b, name)
             if isinstance(y, bytes):
                 y = y.decode()
-            assert x == y or np.isnan(x), (a, b)
+            assert np.array_equal(x, y, equal_nan=isinstance(x, float)), (a, b)
     assert record["vehicle"] == "plane"
 
 
