@@ -72,18 +72,6 @@ class SendParamRead:
 
 
 @dataclass(frozen=True, slots=True)
-class SendParamReadIndex:
-    """Send PARAM_REQUEST_READ by index (gap of a list)."""
-
-    index: int
-
-
-@dataclass(frozen=True, slots=True)
-class SendParamList:
-    """Send PARAM_REQUEST_LIST."""
-
-
-@dataclass(frozen=True, slots=True)
 class SendParamSet:
     """Send PARAM_SET; ``value`` is a float32 already."""
 
@@ -91,7 +79,7 @@ class SendParamSet:
     value: float
 
 
-SendAction: TypeAlias = SendParamRead | SendParamReadIndex | SendParamList | SendParamSet
+SendAction: TypeAlias = SendParamRead | SendParamSet
 
 
 def to_float32(value: float) -> float:
@@ -161,10 +149,6 @@ def parameter_message(
     match action:
         case SendParamRead(name):
             return mav.param_request_read_encode(system, component, name.encode(), -1)
-        case SendParamReadIndex(index):
-            return mav.param_request_read_encode(system, component, b"", index)
-        case SendParamList():
-            return mav.param_request_list_encode(system, component)
         case SendParamSet(name, value):
             return mav.param_set_encode(
                 system, component, name.encode(), value, MAV_PARAM_TYPE_REAL32

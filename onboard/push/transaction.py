@@ -27,8 +27,9 @@ and acts on the outputs strictly in their order:
     ``JournalFailed(sentence)`` on :class:`~onboard.errors.StateError`, before going on with
     the next output.
 ``Finished(outcome)``
-    the last output.  If ``outcome.open``, ask ``journal.recover()`` once the autopilot is
-    heard again.
+    the last output.  If ``outcome.open``, ask ``journal.recover()`` again: after a pause, or
+    once the link is back; after ``OTHER_VEHICLE`` not before the link has been to another
+    vehicle.
 
 Feed it every PARAM_VALUE, PARAM_ERROR and STATUSTEXT of the autopilot (others' too: that is how
 a concurrent change is seen), each change of armed state and EKF health, reboots and the
@@ -78,7 +79,8 @@ from onboard.push.entries import (
     Undoing,
     Writing,
 )
-from onboard.push.plan import PushPlan, offset_is_zero
+from onboard.push.plan import PushPlan
+from onboard.push.reading import Reading
 from onboard.push.signals import (
     Cancelled,
     Finished,
@@ -148,7 +150,7 @@ class PushTransaction:
         self._values: dict[str, float] = {}
         self._queue: list[str] = []
         self._written: set[str] = set()
-        self._left: dict[str, float] = {}
+        self._left: frozenset[str] = frozenset()
         self._undo_unsaved = False
         self._rounds = 0
         self._finishing = False
@@ -363,65 +365,49 @@ class PushTransaction:
             self._trouble(reason, sentence, now)
         elif self._state is State.UNDOING:
             if reason is Reason.CHANGED_BY_OTHER and value is not None:
-                self._left[name] = self._values[name] = value
+                self._left |= {name}
+                self._values[name] = value
                 self._write_next(now)
             else:
                 self._stuck(reason, sentence, now)
 
     def _all_read(self, now: float) -> None:
         """The six and the accelerometer's id were read: what do they say?"""
-        plan, values = self._plan, self._values
-        if values[plan.device_id_name] != plan.vehicle.device_id:
+        plan, reading = self._plan, Reading(self._plan, self._values)
+        if not reading.right_device:
             sentence = f"{plan.device_id_name} is another accelerometer's"
             if self._state in FORWARD:
                 self._trouble(Reason.OTHER_VEHICLE, sentence, now)
             else:
                 self._result = Result.OTHER_VEHICLE
                 self._stuck(Reason.OTHER_VEHICLE, sentence, now)
-            return
-        if self._state in FORWARD:
-            target = plan.before if self._state is State.COMPARING else plan.wanted
-            wrong = [n for n in plan.names if values[n] != target[n]]
+        elif self._state in FORWARD:
+            comparing = self._state is State.COMPARING
+            wrong = reading.unlike(plan.before if comparing else plan.wanted)
             if not wrong:
                 self._go(Trigger.AGREES, now)
-                return
-            foreign = self._state is State.COMPARING or self._foreign()
-            reason = Reason.CHANGED_BY_OTHER if foreign else Reason.REVERTED
-            told = ", ".join(f"{n} is {values[n]:.7g}, not {target[n]:.7g}" for n in wrong)
-            self._trouble(reason, told, now)
-            return
-        self._left = self._foreign()
-        if self._can_finish():
-            self._go(Trigger.ALL_NEW, now)
-        elif self._undo_order():
-            self._go(Trigger.DIFFERS, now)
-        elif self._undo_unsaved and self._state is State.UNDO_VERIFYING:
-            sentence = "the old values are in force, but not known to be stored"
-            self._stuck(Reason.NOT_SAVED, sentence, now)
+            elif comparing or reading.foreign:
+                self._trouble(Reason.CHANGED_BY_OTHER, wrong, now)
+            else:
+                self._trouble(Reason.REVERTED, wrong, now)
         else:
-            self._go(Trigger.AGREES, now)
+            self._left = reading.left
+            if self._can_finish(reading):
+                self._go(Trigger.ALL_NEW, now)
+            elif reading.undo_order:
+                self._queue = list(reading.undo_order)
+                self._go(Trigger.DIFFERS, now)
+            elif self._undo_unsaved and self._state is State.UNDO_VERIFYING:
+                sentence = "the old values are in force, but not known to be stored"
+                self._stuck(Reason.NOT_SAVED, sentence, now)
+            else:
+                self._go(Trigger.AGREES, now)
 
-    def _foreign(self) -> dict[str, float]:
-        """Values that are neither old nor new: somebody else's, not ours to touch."""
-        return {
-            c.name: self._values[c.name]
-            for c in self._plan.changes
-            if self._values[c.name] not in {c.before, c.wanted}
-        }
-
-    def _can_finish(self) -> bool:
+    def _can_finish(self, reading: Reading) -> bool:
         """Whether a resumed transaction needs nothing but its verification."""
         if self._turned or self._recovery is None or self._state is not State.INSPECTING:
             return False
-        wanted = self._plan.wanted
-        return self._recovery.all_confirmed and all(
-            self._values[n] == wanted[n] for n in self._plan.names
-        )
-
-    def _undo_order(self) -> tuple[str, ...]:
-        current = {n: self._values[n] for n in self._plan.names}
-        names = self._plan.write_order(current, undo=True)
-        return tuple(n for n in names if n not in self._left)
+        return self._recovery.all_confirmed and not reading.unlike(self._plan.wanted)
 
     # What is done on entering a state
 
@@ -472,37 +458,19 @@ class PushTransaction:
         if self._rounds > self._settings.undo_rounds:
             self._stuck(Reason.REVERTED, "what is undone does not stay undone", now)
             return
-        self._queue = list(self._undo_order())
         self._write_next(now)
 
     def _write_next(self, now: float) -> None:
         undo = self._state is State.UNDOING
         target = self._plan.before if undo else self._plan.wanted
-        while self._queue:
-            name = self._queue.pop(0)
-            if self._would_be_zero(name, target[name]):
-                if not undo:
-                    self._trouble(Reason.CHANGED_BY_OTHER, "all offsets would be zero", now)
-                    return
-                self._left[name] = self._values[name]
-                continue
-            previous = self._values[name]
-            self._written.add(name)
-            self._record(Writing(self._identifier, name, previous, target[name], undo))
-            self._absorb(self._client.set(name, target[name], now, before=previous), now)
+        if not self._queue:
+            self._go(Trigger.DONE, now)
             return
-        self._go(Trigger.DONE, now)
-
-    def _would_be_zero(self, name: str, value: float) -> bool:
-        """Whether this write would leave three zero offsets where there were none before.
-
-        The order of the writes rules it out; only somebody else's write in between can bring
-        it about.
-        """
-        offsets = self._plan.names[3:]
-        if name not in offsets or offset_is_zero(self._plan.six_before().offset):
-            return False
-        return offset_is_zero(tuple(value if n == name else self._values[n] for n in offsets))
+        name = self._queue.pop(0)
+        previous = self._values[name]
+        self._written.add(name)
+        self._record(Writing(self._identifier, name, previous, target[name], undo))
+        self._absorb(self._client.set(name, target[name], now, before=previous), now)
 
     def _close(self, previous: State) -> None:
         if previous is State.VERIFYING:
@@ -513,7 +481,7 @@ class PushTransaction:
         else:
             self._result = Result.ROLLED_BACK
             if self._left:
-                self._sentence += f"; {', '.join(self._left)} left as somebody else set it"
+                self._sentence += f"; {', '.join(sorted(self._left))} left as somebody else set it"
         values = {n: self._values[n] for n in self._plan.names}
         entry = Closed(self._identifier, self._result, self._reason.value, self._sentence, values)
         self._record(entry)
@@ -533,7 +501,7 @@ class PushTransaction:
             values=MappingProxyType(
                 {n: self._values[n] for n in self._plan.names if n in self._values}
             ),
-            left=tuple(self._left),
+            left=tuple(sorted(self._left)),
             open=still_open or (self._journal_broken and previous is not State.COMPARING),
         )
         self._out.append(Finished(self._outcome))

@@ -6,9 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from onboard.mavlink.parameter_messages import (
     ErrorReceived,
     ParameterErrorCode,
-    SendParamList,
     SendParamRead,
-    SendParamReadIndex,
     SendParamSet,
     TextReceived,
     ValueReceived,
@@ -83,10 +81,6 @@ def test_actions_are_what_an_autopilot_reads():
         "INS_ACC_ID",
         -1,
     )
-    gap = through_the_wire(OURS, parameter_message(SendParamReadIndex(12), OURS, system=7))
-    assert gap.param_index == 12
-    everything = through_the_wire(OURS, parameter_message(SendParamList(), OURS, system=7))
-    assert everything.get_type() == "PARAM_REQUEST_LIST"
 
 
 @pytest.mark.parametrize("value", [0.1, -3.5, 1.2, 0.0, 16777217.0])

@@ -47,10 +47,11 @@ class PushWorld(World):
         self.steps = 0
         self.journal = Journal(path)
         self.journal_broken_after = None
+        self.eager = False
         self.outcomes = []
-        self.first_write_seen = False
 
     def handle(self, outputs):
+        """As they come, and what a journal entry leads to either at once or after the rest."""
         queue = list(outputs)
         while queue:
             output = queue.pop(0)
@@ -58,7 +59,9 @@ class PushWorld(World):
             if isinstance(output, Record):
                 reply = self._append(output.entry)
                 self._step()
-                queue += self.client.feed(reply, self.now)
+                if self.client is not None:
+                    following = list(self.client.feed(reply, self.now))
+                    queue = following + queue if self.eager else queue + following
             elif isinstance(output, Finished):
                 self.outcomes.append(output.outcome)
                 self.client = None

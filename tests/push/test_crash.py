@@ -116,6 +116,7 @@ def _restart_that_dies(world, life):
     store_delay=st.sampled_from([0.02, 0.4]),
     trouble=st.sampled_from(["none", "arm", "reboot", "silent_reboot", "cut", "deny", "full"]),
     after=st.floats(0.0, 4.0),
+    eager=st.booleans(),
     offsets=st.sampled_from(
         [
             (OLD[1], NEW[1]),
@@ -127,7 +128,7 @@ def _restart_that_dies(world, life):
     ),
 )
 def test_whatever_happens_it_is_all_old_or_all_new_in_the_end(
-    *, seed, lives, loss, duplication, late, store_delay, trouble, after, offsets
+    *, seed, lives, loss, duplication, late, store_delay, trouble, after, eager, offsets
 ):
     plan = make_plan((OLD[0], offsets[0]), (NEW[0], offsets[1]))
     weather = Weather(loss=loss, duplication=duplication, late=late, latest=1.5)
@@ -141,6 +142,7 @@ def test_whatever_happens_it_is_all_old_or_all_new_in_the_end(
             lives[0] if lives else None,
             store_delay=store_delay,
         )
+        world.eager = eager
         _arrange(world, trouble, after)
         world.run_through(
             settings=TransactionSettings(client=ClientSettings(attempts=6), settle_s=4.0)

@@ -10,9 +10,10 @@ from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
 from onboard.push.transaction import PushTransaction
 
 
-@pytest.fixture
-def world(tmp_path):
+@pytest.fixture(params=["eager", "patient"])
+def world(tmp_path, request):
     w = PushWorld(tmp_path / "journal.jsonl")
+    w.eager = request.param == "eager"
     yield w
     w.journal.close()
 
@@ -410,3 +411,16 @@ def test_audit_leaves_a_whole_push_and_somebody_elses_values_alone(world):
     (planned,) = [e for _, e in world.journal.entries if isinstance(e, Planned)]
     assert audit(planned, world.autopilot.ram) is None
     assert audit(planned, world.plan.wanted | {"INS_ACCSCAL_X": 0.9}) is None
+
+
+def test_roll_back_beside_somebody_elses_zero_leaves_an_offset(tmp_path):
+    """Old (0.1, 0, 0); another station zeroes x meanwhile: undoing y would leave three zeros."""
+    world = PushWorld(
+        tmp_path / "j", make_plan((OLD[0], (0.1, 0.0, 0.0)), (NEW[0], (0.2, 0.3, 0.0)))
+    )
+    when_written(world, 4, lambda: world.autopilot.set_by_other("INS_ACCOFFS_X", 0.0, world.now))
+    outcome = finish(world)
+    assert outcome.result is Result.ROLLED_BACK
+    assert outcome.left == ("INS_ACCOFFS_X", "INS_ACCOFFS_Y")
+    scales = world.plan.names[:3]
+    assert all(world.autopilot.ram[n] == world.plan.before[n] for n in scales)
