@@ -213,6 +213,16 @@ class TestSet:
         w.run()
         assert results(w, SetDone) == [SetDone("INS_ACCSCAL_Y", float32(1.03), True)]
 
+    def test_in_force_without_an_announcement_is_announced_again_before_it_counts(self):
+        """A stale value hides the announcement: the set is repeated, not believed stored."""
+        value = to_float32(1.1)
+        client = ParameterClient()
+        client.set(NAME, 1.1, 0.0)
+        assert client.feed(ValueReceived(NAME, 1.0), 0.1) == (SendParamRead(NAME),)
+        assert client.feed(ValueReceived(NAME, value), 0.2) == (SendParamSet(NAME, value),)
+        assert client.feed(ValueReceived(NAME, value), 0.3) == (SendParamRead(NAME),)
+        assert client.feed(ValueReceived(NAME, value), 0.4) == (SetDone(NAME, value, saved=True),)
+
     def test_autopilot_that_reboots_meanwhile_gets_it_afterwards(self):
         w = world(store_delay=0.5)
         w.handle(w.client.set(NAME, 1.1, w.now))

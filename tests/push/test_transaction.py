@@ -5,7 +5,14 @@ from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import SendParamSet, ValueReceived
 from onboard.push.entries import Closed, Planned, Purpose, ReadBack, Result, Writing, audit
 from onboard.push.plan import UNCHANGED
-from onboard.push.signals import Cancelled, LinkLost, Reason, Rebooted, VehicleReport
+from onboard.push.signals import (
+    Cancelled,
+    JournalWritten,
+    LinkLost,
+    Reason,
+    Rebooted,
+    VehicleReport,
+)
 from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
 from onboard.push.transaction import PushTransaction
 
@@ -424,3 +431,54 @@ def test_roll_back_beside_somebody_elses_zero_leaves_an_offset(tmp_path):
     assert outcome.left == ("INS_ACCOFFS_X", "INS_ACCOFFS_Y")
     scales = world.plan.names[:3]
     assert all(world.autopilot.ram[n] == world.plan.before[n] for n in scales)
+
+
+def test_roll_back_that_had_begun_is_carried_on_even_where_all_six_are_new(world):
+    """Killed between the decision to go back and the first write back."""
+
+    def arm_and_die():
+        world.feed(VehicleReport(armed=True))
+        world.life = 0
+
+    when_written(world, 6, lambda: world.at(world.now + 1.0, arm_and_die))
+    assert not world.run_through()
+    assert world.holds() == "new"
+    (recovery,) = world.journal.recover()
+    assert recovery.undo
+    assert recovery.all_confirmed
+    world.restart()
+    assert world.holds() == world.journal_says() == "old"
+
+
+def test_crash_after_the_last_confirmation_is_finished_and_not_undone(world):
+    when_written(world, 6, lambda: world.at(world.now + 1.0, lambda: setattr(world, "life", 0)))
+    assert not world.run_through()
+    world.restart()
+    assert world.outcomes[-1].result is Result.COMPLETED
+    assert world.holds() == world.journal_says() == "new"
+
+
+def test_abort_before_the_first_write_ends_only_when_it_is_written_down(world):
+    transaction = PushTransaction(world.plan, identifier="t", system_id=1)
+    transaction.start(0.0)
+    for name in (*world.plan.names, world.plan.device_id_name):
+        transaction.feed(ValueReceived(name, world.autopilot.ram[name]), 0.1)
+    (record,) = transaction.feed(VehicleReport(armed=True), 0.2)
+    assert record.entry.result is Result.ABORTED
+    assert transaction.feed(JournalWritten(), 0.3) == ()  # of the plan
+    (finished,) = transaction.feed(JournalWritten(), 0.4)  # of the end
+    assert finished.outcome.result is Result.ABORTED
+    assert not finished.outcome.open
+
+
+def test_roll_back_that_is_not_stored_stays_open(world):
+    def arm_and_wear_out():
+        world.autopilot.full = True
+        world.autopilot.places.clear()
+        world.feed(VehicleReport(armed=True))
+
+    when_written(world, 3, lambda: world.at(world.now + 0.03, arm_and_wear_out))
+    outcome = finish(world)
+    assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
+    assert outcome.open
+    assert {n: world.autopilot.ram[n] for n in world.plan.names} == world.plan.before
