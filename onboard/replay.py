@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from onboard.core.accelerometer import parameter_names
-from onboard.core.result import Calibration
-from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.result import Calibration, Coverage, Status
+from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample, Vector3
 from onboard.document import RecordingDocument, ReplayDocument, imu_document
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.opening import open_recording
@@ -30,8 +30,11 @@ class Estimator(Protocol):
     def feed(self, sample: Sample) -> object:
         """Take a sample."""
 
+    def restart(self) -> object:
+        """Another recording of the same vehicle begins: states are forgotten, sums stay."""
+
     def finish(self) -> object:
-        """Process what is pending: the recording ends here."""
+        """Process what is pending: there are no more recordings."""
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -43,11 +46,15 @@ class Estimator(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Recordings and what they gave; ``counts`` are samples fed, ``imu <n>`` and ``gps``."""
+    """Recordings and what they gave.
+
+    ``counts`` are samples fed, ``imu <n>`` and ``gps``; ``notes`` says what is left out.
+    """
 
     recordings: tuple[Recording, ...]
     calibrations: tuple[Calibration, ...]
     counts: dict[str, int]
+    notes: tuple[str, ...] = ()
 
     @property
     def autopilot(self) -> str:
@@ -68,7 +75,8 @@ class Replay:
                 duration_s=self.duration_s,
                 samples=self.counts,
                 damage=[f"{r.path.name}: {note}" for r in self.recordings for note in r.damage],
-                notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes],
+                notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes]
+                + list(self.notes),
             ),
             imus=[imu_document(c, self.autopilot) for c in self.calibrations],
         )
@@ -85,7 +93,7 @@ def replay(
 
     Args:
         paths: at least one recording, all of the same vehicle.
-        estimator: a fresh one; it is finished after each file.
+        estimator: a fresh one; restarted between files, finished after the last.
         imu: answer for this accelerometer only.
         progress: called every few thousand samples.
 
@@ -101,20 +109,29 @@ def replay(
     vehicle = _Vehicle()
     fed = 0
     for recording in recordings:
+        if recording is not recordings[0]:
+            estimator.restart()
         for sample in recording.samples():
             vehicle.check(sample, recording)
             estimator.feed(sample)
             fed += 1
             if progress is not None and fed % PROGRESS_EVERY == 0:
                 progress(min(1.0, fed / total))
-        estimator.finish()
+    estimator.finish()
     if progress is not None:
         progress(1.0)
-    wanted = estimator.imus if imu is None else (imu,)
-    if imu is not None and imu not in estimator.imus:
-        there = ", ".join(map(str, estimator.imus)) or "none"
+    seen = vehicle.imus
+    if imu is not None and imu not in seen:
+        there = ", ".join(map(str, seen))
         raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
-    return Replay(recordings, tuple(estimator.calibration(n) for n in wanted), vehicle.counts)
+    answered = estimator.imus
+    # A stream too slow to calibrate from is not worth a table, unless asked for or alone.
+    wanted = (imu,) if imu is not None else answered or seen
+    calibrations = tuple(
+        estimator.calibration(n) if n in answered else vehicle.unanswered(n) for n in wanted
+    )
+    notes = () if imu is not None else tuple(map(vehicle.silence, sorted({*seen} - {*wanted})))
+    return Replay(recordings, calibrations, vehicle.counts, notes)
 
 
 def _refuse_mixture(recordings: Sequence[Recording]) -> None:
@@ -132,6 +149,7 @@ class _Vehicle:
 
     def __init__(self) -> None:
         self.counts: dict[str, int] = {}
+        self._parameters: dict[str, float] = {}
         self._device: dict[int, tuple[np.float32, Recording]] = {}
 
     def check(self, sample: Sample, recording: Recording) -> None:
@@ -139,16 +157,69 @@ class _Vehicle:
             self._count(f"imu {sample.imu}")
         elif isinstance(sample, GpsFix):
             self._count("gps")
-        elif isinstance(sample, ParameterValue) and sample.name in DEVICE_IDS and sample.value:
-            imu = DEVICE_IDS[sample.name]
-            # Logs and telemetry carry identifiers as single-precision numbers.
-            device = np.float32(sample.value)
-            known, where = self._device.setdefault(imu, (device, recording))
-            if known != device and where is not recording:
-                raise RecordingError(
-                    f"{recording.path}: of another vehicle than {where.path} "
-                    f"({sample.name} is {device:.0f}, there {known:.0f})"
-                )
+        elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
+            self._parameters[sample.name] = sample.value
+            if sample.name in DEVICE_IDS and sample.value:
+                self._check_device(sample, recording)
+
+    def _check_device(self, sample: ParameterValue, recording: Recording) -> None:
+        imu = DEVICE_IDS[sample.name]
+        # Logs and telemetry carry identifiers as single-precision numbers.
+        device = np.float32(sample.value)
+        known, where = self._device.setdefault(imu, (device, recording))
+        if known != device and where is not recording:
+            raise RecordingError(
+                f"{recording.path}: of another vehicle than {where.path} "
+                f"({sample.name} is {device:.0f}, there {known:.0f})"
+            )
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers that sent samples."""
+        return tuple(sorted(int(name[4:]) for name in self.counts if name.startswith("imu ")))
+
+    def silence(self, imu: int) -> str:
+        """Why an accelerometer has no answer."""
+        return (
+            f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples, never at 10 a second or "
+            "more together with attitude and trusted GPS"
+        )
+
+    def unanswered(self, imu: int) -> Calibration:
+        """What to say of an accelerometer of which the estimator could make nothing."""
+        names = parameter_names(imu)
+        scale, offset = self._three(names.scale, 1.0), self._three(names.offset, 0.0)
+        unknown = float("nan")
+        return Calibration(
+            imu=imu,
+            status=Status.INSUFFICIENT,
+            scale=scale,
+            offset=offset,
+            scale_sigma=(unknown,) * 3,
+            offset_sigma=(unknown,) * 3,
+            covariance=((unknown,) * 6,) * 6,
+            observable=(False,) * 6,
+            note=self.silence(imu),
+            in_force_scale=scale,
+            in_force_offset=offset,
+            parameters_known=all(name in self._parameters for name in names.six),
+            timing={},
+            trusted_s=0.0,
+            rejected={},
+            whitened_rms_before=unknown,
+            whitened_rms_after=unknown,
+            held_out_before=unknown,
+            held_out_after=unknown,
+            velocity_rms_before=unknown,
+            velocity_rms_after=unknown,
+            coverage=Coverage(
+                0.0, (0.0,) * 6, "", "record it at 25 Hz or more, with attitude and GPS"
+            ),
+        )
+
+    def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
+        x, y, z = (self._parameters.get(name, default) for name in names)
+        return x, y, z
 
     def _count(self, name: str) -> None:
         self.counts[name] = self.counts.get(name, 0) + 1

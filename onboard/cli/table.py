@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from rich import box
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -40,6 +41,7 @@ def _recordings(result: Replay) -> RenderableType:
         rows.append(("recording", f"{recording.path.name}: {kind}, {recording.duration_s:.0f} s"))
         rows += [("damage", note) for note in recording.damage]
         rows += [("note", note) for note in recording.notes]
+    rows += [("note", note) for note in result.notes]
     return _sentences(rows)
 
 
@@ -51,7 +53,7 @@ def _headline(calibration: Calibration) -> Text:
 def _six(calibration: Calibration, autopilot: str) -> Table:
     """The six numbers: in force, estimate, sigma, and the parameter that takes the estimate."""
     c = calibration
-    table = Table(pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
     for header in ("in force", "estimate", "sigma"):
         table.add_column(header, justify="right", no_wrap=True)
@@ -117,7 +119,7 @@ def _about(calibration: Calibration, autopilot: str) -> Iterator[tuple[str, str]
     if c.coverage.weakest:
         coverage += f", weakest: {c.coverage.weakest}"
     yield "coverage", coverage
-    if c.coverage.advice:
+    if c.coverage.advice and c.coverage.advice not in c.note:
         yield "advice", c.coverage.advice
     if c.note:
         yield "note", c.note
@@ -133,7 +135,7 @@ def _timing(timing: dict[str, Estimate]) -> Iterator[str]:
         estimate = timing.get(name)
         if estimate is not None and math.isfinite(estimate.value):
             spread = f" ± {1e3 * estimate.sigma:.0f}" if math.isfinite(estimate.sigma) else ""
-            yield phrase.format(f"{1e3 * estimate.value:.0f}{spread}")
+            yield phrase.format(f"{round(1e3 * estimate.value)}{spread}")
 
 
 def _sentences(rows: Iterable[tuple[str, str]]) -> Table:

@@ -31,6 +31,7 @@ from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, rec
 from onboard.recordings.dataflash_index import Format, Records
 
 SECONDS_PER_WEEK = 604800.0
+MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
 HDOP_UNKNOWN = 99.0
@@ -96,8 +97,8 @@ def imu(batch: Batch, _context: Context) -> Converted:
             (gx[k], gy[k], gz[k]),
             heat[k] or None,  # exactly 0: a sensor without a thermometer
         )
-        if ax[k] or ay[k] or az[k] or gx[k] or gy[k] or gz[k]
-        else None  # not a measurement: the sensor was not there yet
+        if (ax[k] or ay[k] or az[k] or gx[k] or gy[k] or gz[k]) and numbers[k] <= MOST_IMUS
+        else None  # not a measurement: the sensor was not there yet, or there is none such
         for k in range(len(t))
     ]
 

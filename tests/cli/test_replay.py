@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,8 @@ from dataflash_writer import DataflashWriter, modern_log
 from results import CALIBRATED
 from telemetry_writer import px4_log, telemetry
 
+from onboard.core.accelerometer import parameter_names
+from onboard.core.result import Status
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue
 from onboard.errors import RecordingError, UsageError
 from onboard.replay import replay
@@ -19,9 +22,13 @@ class Listener:
     def __init__(self) -> None:
         self.samples: list = []
         self.finished: list[int] = []
+        self.restarted: list[int] = []
 
     def feed(self, sample: object) -> None:
         self.samples.append(sample)
+
+    def restart(self) -> None:
+        self.restarted.append(len(self.samples))
 
     def finish(self) -> None:
         self.finished.append(len(self.samples))
@@ -64,16 +71,54 @@ def test_one_accelerometer_on_request_and_none_that_is_not_there(tmp_path):
         replay([path], Listener(), imu=3)
 
 
-def test_several_files_are_fed_to_one_estimator_which_is_finished_after_each(tmp_path):
+def test_several_files_are_fed_to_one_estimator_with_a_restart_between(tmp_path):
     first = saved(tmp_path, "a.tlog", telemetry(2))
     second = saved(tmp_path, "b.BIN", modern_log(1))
     listener = Listener()
     result = replay([first, second], listener)
     alone = Listener()
     replay([first], alone)
-    assert listener.finished == [len(alone.samples), len(listener.samples)]
+    assert (alone.restarted, alone.finished) == ([], [len(alone.samples)])
+    assert listener.restarted == [len(alone.samples)]
+    assert listener.finished == [len(listener.samples)]
     assert [r.path for r in result.recordings] == [first, second]
     assert result.document().recording.files == [str(first), str(second)]
+
+
+class OnlyTheFirst(Listener):
+    """An estimator that could make nothing of the other accelerometers."""
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        return (1,)
+
+
+class NoneAtAll(Listener):
+    @property
+    def imus(self) -> tuple[int, ...]:
+        return ()
+
+
+def test_accelerometers_without_an_answer_are_named(tmp_path):
+    path = saved(tmp_path, "a.BIN", modern_log(1))
+    result = replay([path], OnlyTheFirst())
+    assert [c.imu for c in result.calibrations] == [1]
+    assert "accelerometer 2: 25 samples" in result.document().recording.notes[0]
+    (asked,) = replay([path], OnlyTheFirst(), imu=2).calibrations
+    assert asked.status is Status.INSUFFICIENT
+
+
+def test_without_any_answer_each_accelerometer_is_insufficient(tmp_path):
+    log = modern_log(1)
+    for name in parameter_names(1).six:
+        log.add("PARM", 9_000_000, name, 1.01 if "SCAL" in name else 0.25, 0.0)
+    document = replay([saved(tmp_path, "a.BIN", log)], NoneAtAll()).document()
+    first, second = document.imus
+    assert (first.status, second.status) == ("insufficient", "insufficient")
+    assert first.in_force.offset == pytest.approx([0.25] * 3)
+    assert (first.parameters_known, second.parameters_known) == (True, False)
+    assert first.calibration.scale_sigma == [None] * 3
+    assert json.loads(document.to_json())["imus"][0]["trusted_s"] == 0.0
 
 
 def test_recordings_of_another_vehicle_are_refused(tmp_path):
