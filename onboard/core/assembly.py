@@ -1,0 +1,214 @@
+"""Assembles chunks of flight from the tracks of all streams."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.engine import Chunk
+from onboard.core.frames import untrimmed_rotation, untrimmed_rotation_dcm
+from onboard.core.parameters import ParametersInForce
+from onboard.core.samples import (
+    AirData,
+    AttitudeSample,
+    GpsFix,
+    ImuSample,
+    ImuSource,
+    Throttle,
+    Vibration,
+)
+from onboard.core.settings import EstimatorSettings
+from onboard.core.stretch import Fixes, Stretch
+from onboard.core.tracks import FixTrack, ImuTrack, SlowTrack
+
+Array = NDArray[np.float64]
+
+REACH_S = 0.8
+"""Inertial samples are needed this long before a fix's stamp (latency and averaging span)."""
+AHEAD_S = 0.4
+"""And this long after it."""
+IMU_GAP_S = 0.25
+"""Attitude changes too much over a longer gap to be interpolated."""
+
+
+class Assembly:
+    """Tracks of all streams, and the cutting of chunks out of them."""
+
+    def __init__(self, settings: EstimatorSettings) -> None:
+        """Take the settings."""
+        self._settings = settings
+        self._imus: dict[int, ImuTrack] = {}
+        self._attitude = SlowTrack()
+        self._slow: dict[str, SlowTrack] = {}
+        self._fixes = FixTrack()
+        self._over_mavlink = False
+        self._fresh: dict[int, float] = {}
+        self._R_bs: tuple[float, Array | None] = (0.0, None)
+
+    def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
+        """Take an inertial sample, raw by the parameters in force now."""
+        track = self._imus.get(sample.imu)
+        if track is None:
+            track = self._imus[sample.imu] = ImuTrack()
+        orientation = parameters.get("AHRS_ORIENTATION", default=0.0)
+        if orientation != self._R_bs[0]:
+            self._R_bs = (orientation, parameters.R_bs)
+        self._over_mavlink = sample.source is not ImuSource.LOG
+        track.add(sample, parameters.six(sample.imu), self._R_bs[1])
+
+    def attitude(self, sample: AttitudeSample) -> None:
+        """Take a recorded attitude."""
+        self._attitude.add(sample.t, (sample.roll, sample.pitch, sample.yaw))
+
+    def slow(self, sample: Vibration | Throttle | AirData) -> None:
+        """Take a signal that only diagnosis looks at."""
+        if isinstance(sample, Vibration):
+            name = "vibration" if sample.imu is None else f"vibration_{sample.imu}"
+            self._slow.setdefault(name, SlowTrack()).add(sample.t, sample.level)
+        elif isinstance(sample, Throttle):
+            self._slow.setdefault("throttle", SlowTrack()).add(sample.t, (sample.throttle,))
+        elif sample.airspeed is not None:
+            self._slow.setdefault("airspeed", SlowTrack()).add(sample.t, (sample.airspeed,))
+
+    def fix(self, fix: GpsFix, *, trusted: bool) -> bool:
+        """Take a GPS fix; False if it repeats one."""
+        return self._fixes.add(fix, trusted=trusted)
+
+    def refused(self, imu: int) -> Counter[str]:
+        """What was refused, by name."""
+        out = Counter(self._fixes.refused)
+        # A fix repeated by a faster stream is the normal case, not a loss.
+        del out["gps_repeated"]
+        if imu in self._imus:
+            out.update(self._imus[imu].refused)
+        return out
+
+    def clear(self) -> None:
+        """Forget all that waits (reboot)."""
+        for imu in self._imus:
+            highres = self._imus[imu].refused
+            self._imus[imu] = ImuTrack()
+            self._imus[imu].refused = highres
+        self._attitude = SlowTrack()
+        self._slow.clear()
+        self._fixes.clear()
+        self._fresh.clear()
+
+    def take(
+        self, parameters: ParametersInForce, *, everything: bool = False
+    ) -> dict[int, list[Chunk]]:
+        """Chunks that are complete, by accelerometer; empty most of the time."""
+        newest = max((track.last for track in self._imus.values()), default=-np.inf)
+        live = {i: x for i, x in self._imus.items() if newest - x.last < 2.0}
+        ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
+        if len(self._fixes) < 2:
+            return {}
+        waiting = min(ready, self._fixes.last) - self._fixes.first
+        if waiting < (0.5 if everything else self._settings.chunk_s):
+            return {}
+        fixes, trusted, t = self._fixes.take(ready)
+        if len(fixes) < 2:
+            return {}
+        even = Fixes(
+            t,
+            np.array([[f.v_n, f.v_e, np.nan if f.v_d is None else f.v_d] for f in fixes]),
+            np.array([f.altitude for f in fixes]),
+            np.array([f.latitude for f in fixes]),
+        )
+        out: dict[int, list[Chunk]] = {}
+        for imu, track in live.items():
+            chunks = self._cut(imu, track, even, trusted, parameters)
+            if chunks:
+                out[imu] = chunks
+        keep = float(t[-1]) - REACH_S - 0.3
+        for track in self._imus.values():
+            track.drop_before(keep)
+        for slow in (self._attitude, *self._slow.values()):
+            slow.drop_before(keep - 1.0)
+        return out
+
+    def _cut(
+        self,
+        imu: int,
+        track: ImuTrack,
+        fixes: Fixes,
+        trusted: NDArray[np.bool_],
+        parameters: ParametersInForce,
+    ) -> list[Chunk]:
+        """Chunks of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
+        stamps, rows = track.arrays()
+        if len(stamps) < 8 or len(self._attitude) < 2:
+            return []
+        if (len(stamps) - 1) / (stamps[-1] - stamps[0]) < self._settings.slowest_imu_hz:
+            return []
+        t = stamps - parameters.imu_delay
+        breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1
+        out: list[Chunk] = []
+        for piece in np.split(np.arange(len(t)), breaks):
+            if len(piece) < 8:
+                continue
+            begin, end = t[piece[0]], t[piece[-1]]
+            inside = np.flatnonzero((fixes.t >= begin + REACH_S - 0.1) & (fixes.t <= end - 0.3))
+            good = inside[trusted[inside]]
+            if len(good) == 0:
+                continue
+            fresh = self._fresh.get(imu) != float(fixes.t[inside[0]])
+            # A filter can only start where GPS is to be believed.
+            first = int(good[0]) if fresh else int(inside[0])
+            last = int(inside[-1])
+            if last - first < 2:
+                continue
+            chosen = fixes.between(first, last + 1)
+            out.append(
+                Chunk(
+                    self._stretch(t[piece], rows[piece], chosen, parameters, imu),
+                    chosen,
+                    trusted[first : last + 1],
+                    fresh,
+                )
+            )
+            self._fresh[imu] = float(fixes.t[last])
+        return out
+
+    def _stretch(
+        self, t: Array, rows: Array, fixes: Fixes, parameters: ParametersInForce, imu: int
+    ) -> Stretch:
+        cut = slice(
+            int(np.searchsorted(t, fixes.t[0] - REACH_S - 0.1)),
+            int(np.searchsorted(t, fixes.t[-1] + AHEAD_S)),
+        )
+        t, rows = t[cut], rows[cut]
+        w_b = rows[:, :3]
+        lag = parameters.gyro_lag
+        if abs(lag) > 2e-4:
+            shifted = np.clip(t + lag, t[0], t[-1])
+            w_b = np.stack([np.interp(shifted, t, w_b[:, j]) for j in range(3)], axis=-1)
+        t_attitude, angles = self._attitude.arrays()
+        slow = {name: s.arrays() for name, s in self._slow.items() if len(s) > 1}
+        flat = {n: (a, x[:, 0] if x.shape[1] == 1 else x) for n, (a, x) in slow.items()}
+        own = f"vibration_{imu}"
+        if own in flat:
+            flat["vibration"] = flat[own]
+        if np.all(np.isfinite(rows[:, 6])):
+            flat["temperature"] = (t[::10], rows[::10, 6])
+        return Stretch(
+            t,
+            w_b,
+            rows[:, 3:6],
+            t_attitude,
+            self._rotation(angles, parameters),
+            parameters.R_bs,
+            flat,
+        )
+
+    def _rotation(self, angles: Array, parameters: ParametersInForce) -> Array:
+        """Attitude of the accelerometer's body axes from what was reported."""
+        roll, pitch, yaw = angles.T
+        if parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
+            return untrimmed_rotation_dcm(roll, pitch, yaw, parameters.trim)
+        pitch_trim = 0.0
+        if self._over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
+            pitch_trim = float(np.deg2rad(parameters.get("PTCH_TRIM_DEG", default=0.0)))
+        return untrimmed_rotation(roll, pitch, yaw, parameters.trim, pitch_trim)

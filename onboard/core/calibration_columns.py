@@ -1,0 +1,168 @@
+"""The columns that are always there: the six numbers, timing, and what would hide in them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Direct, Family, Unknown
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.nodes import Around, Signals
+from onboard.core.smoothing import mean_slope
+
+Array = NDArray[np.float64]
+
+AXIS = "xyz"
+
+
+class Six(Family):
+    """Scale and ``beta = -scale * offset`` of the accelerometer: ``f_s = scale raw + beta``."""
+
+    name = "six"
+
+    def __init__(
+        self,
+        scale: Array | None = None,
+        beta: Array | None = None,
+        scale_sigma: float = 0.03,
+        beta_sigma: float = 0.5,
+    ) -> None:
+        """Take the prior: a factory-calibrated MEMS has 2-3 % and 0.5 m/s^2 (method.md, 4)."""
+        centre = np.ones(3) if scale is None else scale
+        shift = np.zeros(3) if beta is None else beta
+        self.unknowns = tuple(
+            Unknown(f"scale_{a}", "1", float(centre[i]), scale_sigma) for i, a in enumerate(AXIS)
+        ) + tuple(
+            Unknown(f"beta_{a}", "m/s^2", float(shift[i]), beta_sigma) for i, a in enumerate(AXIS)
+        )
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``R_bs e_j raw_j`` and ``R_bs e_j``."""
+        out = np.empty((*nodes.t.shape, 3, 6))
+        out[..., :3] = nodes.R_bs * nodes.raw_s[..., None, :]
+        out[..., 3:] = nodes.R_bs
+        return out
+
+
+class GpsLatency(Family):
+    """How late the receiver's velocity is: ``V(t - delay)``, first order about the delay taken."""
+
+    name = "gps_latency"
+
+    def __init__(self, taken: float, sigma: float = 0.5) -> None:
+        """Take the delay (s) of the linearisation, which is also the prior's centre."""
+        self.unknowns = (Unknown("gps_delay", "s", 0.0, sigma),)
+        self.taken = taken
+
+    def velocity(self, around: Around) -> Direct:
+        """``-a = -(R f + g)``."""
+        body = -around.now.f_b[..., None]
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = -STANDARD_GRAVITY
+        return Direct(body=body, ned=ned)
+
+    def position(self, around: Around) -> Direct:
+        """``-v``."""
+        return Direct(along_velocity=-np.ones((len(around.now.t), 1)))
+
+
+class HeightLatency(Family):
+    """Additional lateness of the reported height: receivers smooth positions by themselves."""
+
+    name = "height_latency"
+
+    def __init__(self, sigma: float = 0.1) -> None:
+        """Take the prior sigma, s."""
+        self.unknowns = (Unknown("height_delay", "s", 0.0, sigma),)
+
+    def position(self, around: Around) -> Direct:
+        """``-v``, for the height only."""
+        return Direct(along_velocity=-np.ones((len(around.now.t), 1)))
+
+
+class GpsSmoothing(Family):
+    """Averaging span of the receiver; the unknown is ``window^2`` less that of the linearisation."""
+
+    name = "gps_smoothing"
+
+    def __init__(self, taken: float, sigma: float = 0.2) -> None:
+        """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
+        self.unknowns = (Unknown("window_squared", "s^2", 0.0, sigma),)
+        self.taken = taken
+
+    def velocity(self, around: Around) -> Direct:
+        """Mean over the span less the value, per s^2 of ``window^2``."""
+        slope = mean_slope(around.offset, self.taken)
+        return Direct(body=np.einsum("j,kja->ka", slope, around.f_epoch)[..., None])
+
+    def position(self, around: Around) -> Direct:
+        """``a / 24``: the mean of a parabola over the span."""
+        body = around.now.f_b[..., None] / 24.0
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
+        return Direct(body=body, ned=ned)
+
+
+class ImuDelay(Family):
+    """How late the recorded attitude is stamped against the inertial samples."""
+
+    name = "imu_delay"
+
+    def __init__(self, taken: float = 0.0, sigma: float = 0.2) -> None:
+        """Take the delay of the linearisation, s."""
+        self.unknowns = (Unknown("attitude_delay", "s", 0.0, sigma),)
+        self.taken = taken
+
+    def attitude(self, around: Around) -> Direct:
+        """``R(t - d) R(t)^T = exp(-R w d)``."""
+        return Direct(body=-around.now.w_b[..., None])
+
+
+class GyroTiming(Family):
+    """Remaining delay between gyroscope and accelerometer: their filters need not be alike."""
+
+    name = "gyro_timing"
+
+    def __init__(self, sigma: float = 0.005) -> None:
+        """Take the prior sigma, s: streams send both in one message."""
+        self.unknowns = (Unknown("gyro_delay", "s", 0.0, sigma),)
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``R(t + d) f = R f + R (w x f) d``: a late gyroscope gives an attitude of the past."""
+        return np.cross(nodes.w_b, nodes.f_b)[..., None]
+
+
+class GyroScale(Family):
+    """Scale of the gyroscope, which nobody calibrates: a nuisance, 1 % by its data sheet."""
+
+    name = "gyro_scale"
+
+    def __init__(self, sigma: float = 0.01) -> None:
+        """Take the prior sigma."""
+        self.unknowns = tuple(Unknown(f"gyro_scale_{a}", "1", 0.0, sigma) for a in AXIS)
+
+    def rate(self, nodes: Signals) -> Array:
+        """``-e_j w_j``: the unknown is what the gyroscope reads too much."""
+        return -np.eye(3) * nodes.w_b[..., None, :]
+
+
+class AttitudeOffset(Family):
+    """Constant errors of the recorded attitude: tilt fixed in the body, heading fixed to north."""
+
+    name = "attitude_offset"
+
+    def __init__(self, tilt_sigma: float = 0.03, heading_sigma: float = 0.1) -> None:
+        """Take the prior sigmas, rad."""
+        self.unknowns = (
+            Unknown("tilt_roll", "rad", 0.0, tilt_sigma),
+            Unknown("tilt_pitch", "rad", 0.0, tilt_sigma),
+            Unknown("heading", "rad", 0.0, heading_sigma),
+        )
+
+    def attitude(self, around: Around) -> Direct:
+        """``R e_x``, ``R e_y`` and ``e_down``: how much too large the recorded angles are."""
+        K = len(around.now.t)
+        body, ned = np.zeros((K, 3, 3)), np.zeros((K, 3, 3))
+        body[:, 0, 0] = body[:, 1, 1] = 1.0
+        ned[:, 2, 2] = 1.0
+        return Direct(body=body, ned=ned)

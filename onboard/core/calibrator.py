@@ -1,0 +1,205 @@
+"""The door of the core: samples in, calibrations out.
+
+Live stream and recording go the same way: decoder, :meth:`Calibrator.feed`, chunks of about ten
+seconds, one :class:`~onboard.core.engine.Engine` per accelerometer.  Nothing here depends on when
+a sample is handed in, only on the order of samples and on their own times, so the result of a
+stream and of its recording are the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.assembly import Assembly
+from onboard.core.engine import Chunk, Engine
+from onboard.core.parameters import ParametersInForce
+from onboard.core.report import calibration_of
+from onboard.core.result import Calibration
+from onboard.core.samples import (
+    AirData,
+    AttitudeSample,
+    EkfBias,
+    GpsFix,
+    ImuSample,
+    ParameterValue,
+    Sample,
+    Throttle,
+    VehicleState,
+    Vibration,
+)
+from onboard.core.settings import EstimatorSettings
+from onboard.core.trust import TrustWindow, WindowClosed, WindowOpened
+
+Array = NDArray[np.float64]
+
+BACKWARDS_S = 1.0
+"""A clock that goes back by more is a reboot; by less, a message that was overtaken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """The autopilot's clock began anew: inertial states are gone, sums stay."""
+
+    t: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Advanced:
+    """A chunk of flight was processed: calibrations have changed."""
+
+    t: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlightEnded:
+    """Disarmed: the estimates were refined over the whole flight."""
+
+    t: float
+
+
+Event = WindowOpened | WindowClosed | Restarted | Advanced | FlightEnded
+
+
+class Calibrator:
+    """Estimates the six numbers of every accelerometer from a stream of samples."""
+
+    def __init__(self, settings: EstimatorSettings = EstimatorSettings()) -> None:
+        """Take the settings."""
+        self.settings = settings
+        self.parameters = ParametersInForce()
+        self._trust = TrustWindow(settings.trust)
+        self._assembly = Assembly(settings)
+        self._engines: dict[int, Engine] = {}
+        self._counts: Counter[str] = Counter()
+        self._newest = -np.inf
+        self._armed: bool | None = None
+        self._finished = False
+        self.ekf_bias: dict[int, EkfBias] = {}
+
+    @property
+    def trust(self) -> TrustWindow:
+        """The trust window."""
+        return self._trust
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers that are estimated, in order."""
+        return tuple(sorted(self._engines))
+
+    def engine(self, imu: int) -> Engine:
+        """The engine of one accelerometer (for diagnosis and benchmarks).
+
+        Raises:
+            KeyError: that accelerometer has not been seen.
+        """
+        return self._engines[imu]
+
+    def feed(self, sample: Sample) -> tuple[Event, ...]:
+        """Take one sample, in order of arrival.  Never raises on data: it counts."""
+        if isinstance(sample, ImuSample):
+            events = self._clock(sample.t) if sample.t > self._newest + 1.0 or (
+                sample.t < self._newest
+            ) else ()
+            self._newest = max(self._newest, sample.t)
+            self._assembly.imu(sample, self.parameters)
+            return events
+        if isinstance(sample, AttitudeSample):
+            self._assembly.attitude(sample)
+            return ()
+        if isinstance(sample, ParameterValue):
+            if np.isfinite(sample.value):
+                self.parameters.set(sample.name, sample.value)
+            return ()
+        if isinstance(sample, GpsFix):
+            return self._fix(sample)
+        if isinstance(sample, Vibration | Throttle | AirData):
+            self._assembly.slow(sample)
+            return ()
+        if isinstance(sample, EkfBias):
+            self.ekf_bias[sample.core] = sample
+            return ()
+        events = tuple(self._trust.feed(sample))
+        if isinstance(sample, VehicleState):
+            events += self._vehicle(sample)
+        return events
+
+    def finish(self) -> tuple[Event, ...]:
+        """End of the recording or of the window: process what is pending, refine."""
+        events = self._advance(everything=True)
+        for engine in self._engines.values():
+            engine.finish()
+        self._finished = True
+        return (*events, *self._trust.finish())
+
+    def calibration(self, imu: int) -> Calibration:
+        """What is known of accelerometer ``imu`` now.
+
+        Raises:
+            KeyError: that accelerometer has not been seen.
+        """
+        rejected = Counter(self._trust.rejected)
+        rejected.update(self._assembly.refused(imu))
+        rejected.update(self._counts)
+        return calibration_of(
+            imu,
+            self._engines[imu],
+            self.parameters,
+            finished=self._finished,
+            rejected={k: n for k, n in rejected.items() if n},
+        )
+
+    def _clock(self, t: float) -> tuple[Event, ...]:
+        """Notice a reboot."""
+        if not t < self._newest - BACKWARDS_S:
+            return ()
+        events = self._advance(everything=True)
+        self._counts["reboots"] += 1
+        self._newest = t
+        self._assembly.clear()
+        return (*events, *self._trust.restart(t), Restarted(t, "reboot"))
+
+    def _fix(self, fix: GpsFix) -> tuple[Event, ...]:
+        if fix.t < self._newest - 60.0:
+            # Its clock is not the boot clock (another source, or garbage); a reboot shows in the
+            # inertial samples first.
+            self._counts["gps_other_clock"] += 1
+            return ()
+        events = tuple(self._trust.feed(fix))
+        if self._trust.receiver not in (None, fix.receiver):
+            return events
+        if self._assembly.fix(fix, trusted=self._trust.is_open):
+            self._finished = False
+            return (*events, *self._advance())
+        return events
+
+    def _vehicle(self, state: VehicleState) -> tuple[Event, ...]:
+        if state.armed is None:
+            return ()
+        before, self._armed = self._armed, state.armed
+        if not (before and not state.armed):
+            return ()
+        events = self._advance(everything=True)
+        for engine in self._engines.values():
+            engine.finish()
+        return (*events, FlightEnded(state.t))
+
+    def _advance(self, *, everything: bool = False) -> tuple[Event, ...]:
+        made: dict[int, list[Chunk]] = self._assembly.take(self.parameters, everything=everything)
+        newest = -np.inf
+        for imu, chunks in made.items():
+            if imu not in self._engines:
+                self._engines[imu] = Engine(self.settings, self._prior(imu))
+            for chunk in chunks:
+                self._engines[imu].add(chunk)
+                newest = max(newest, float(chunk.fixes.t[-1]))
+        return (Advanced(float(newest)),) if np.isfinite(newest) else ()
+
+    def _prior(self, imu: int) -> Array:
+        six = self.parameters.six(imu)
+        scale, offset = np.array(six.scale), np.array(six.offset)
+        return np.concatenate([scale, -scale * offset])

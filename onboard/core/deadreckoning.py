@@ -1,0 +1,153 @@
+"""How far velocity drifts when it is only integrated: the parameters in force against the estimate.
+
+Starts from the filter's state at an epoch, goes on with gyroscope and accelerometer alone, and is
+compared with GPS where GPS is there to tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.frames import rotation_from_vector
+from onboard.core.nodes import NodeMaker
+from onboard.core.passes import EpochState, Linearisation
+from onboard.core.stretch import Fixes, Stretch
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Drift (m/s) per window at its end, and root mean square inside, for several sets of six."""
+
+    horizon_s: float
+    end: Array
+    rms: Array
+    windows: int
+
+
+def free_drift(
+    pieces: Sequence[tuple[Stretch, Fixes]],
+    states: Sequence[EpochState],
+    sixes: Sequence[Array],
+    point: Linearisation,
+    *,
+    horizon_s: float,
+    most: int = 6,
+) -> Drift | None:
+    """Integrate freely over windows spread over the flight.
+
+    Args:
+        pieces: chunks of flight in order of time, each with its fixes.
+        states: filter states at epochs.
+        sixes: sets of (6,) scale, beta to compare.
+        point: linearisation (GPS latency, averaging span).
+        horizon_s: length of a window.
+        most: windows at the most.
+
+    Returns:
+        Median over windows per set; None if no window fits.
+    """
+    intervals = [_Interval.of_piece(s, f, point) for s, f in pieces]
+    chain = [x for part in intervals for x in part]
+    if not chain or not states:
+        return None
+    start = np.array([x.start for x in chain])
+    end = np.array([x.end for x in chain])
+    ends, squares = [], []
+    last = -np.inf
+    span = chain[-1].end - chain[0].start
+    spacing = max(horizon_s, span / most)
+    for state in states:
+        if state.t < last + spacing:
+            continue
+        k = int(np.searchsorted(start, state.t - 1e-6))
+        if k >= len(chain) or abs(start[k] - state.t) > 1e-3:
+            continue
+        stop = int(np.searchsorted(end, state.t + horizon_s, side="right"))
+        if stop - k < 3 or end[stop - 1] - state.t < 0.97 * horizon_s:
+            continue
+        if np.any(np.abs(start[k + 1 : stop] - end[k : stop - 1]) > 1e-6):
+            continue
+        got = _drift(chain[k:stop], state, sixes)
+        if got is None:
+            continue
+        ends.append(got[0])
+        squares.append(got[1])
+        last = state.t
+        if len(ends) == most:
+            break
+    if not ends:
+        return None
+    return Drift(
+        horizon_s,
+        np.median(np.array(ends), axis=0),
+        np.sqrt(np.median(np.array(squares), axis=0)),
+        len(ends),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Interval:
+    """Integrals of one interval between epochs, body axes of its start."""
+
+    start: float
+    end: float
+    turn: Array
+    by_scale: Array
+    by_offset: Array
+    by_bias: Array
+    velocity: Array
+
+    @staticmethod
+    def of_piece(stretch: Stretch, fixes: Fixes, point: Linearisation) -> list[_Interval]:
+        t = fixes.t - point.delay
+        if len(t) < 2:
+            return []
+        nodes = NodeMaker(stretch, np.zeros(3), point.six).intervals(t[:-1], t[1:])
+        by_scale = nodes.integrals(stretch.R_bs * nodes.signals.raw_s[..., None, :])[0]
+        eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
+        whole = nodes.integrals(eye)[0]
+        return [
+            _Interval(
+                float(t[k]),
+                float(t[k + 1]),
+                nodes.P[k, -1],
+                by_scale[k],
+                whole[k] @ stretch.R_bs,
+                whole[k],
+                fixes.v_n[k + 1],
+            )
+            for k in range(len(t) - 1)
+        ]
+
+
+def _drift(
+    chain: Sequence[_Interval], state: EpochState, sixes: Sequence[Array]
+) -> tuple[Array, Array] | None:
+    """Drift at the end and mean square inside for each set; None without GPS at the end."""
+    R = state.R_nb
+    v = np.tile(state.v_n, (len(sixes), 1))
+    square = np.zeros(len(sixes))
+    count = 0
+    error = np.full((len(sixes), 3), np.nan)
+    for x in chain:
+        T = x.end - x.start
+        # The bias turns the interval's increments by R(-b T) to first order.
+        for i, six in enumerate(sixes):
+            v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:])
+            v[i, 2] += STANDARD_GRAVITY * T
+        R = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+        seen = np.isfinite(x.velocity)
+        if seen[0]:
+            error = np.where(seen, v - x.velocity, 0.0)
+            square += np.sum(error**2, axis=1)
+            count += 1
+    if count == 0 or np.any(np.isnan(error)):
+        return None
+    return np.linalg.norm(error, axis=1), square / count

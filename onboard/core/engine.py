@@ -1,0 +1,233 @@
+"""One accelerometer's estimator: buffered chunks of flight, passes over them, one solution.
+
+Sums are only as good as the point about which latency, averaging span and noise were taken.  So
+the last minutes of flight are kept; after :attr:`EstimatorSettings.refine_at_s` of trusted
+flight, and when the recording ends, timing and noise are estimated from the buffer and the sums
+made anew from it.  Flight that has left the buffer stays in the sums as it was taken.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.calibration_columns import (
+    AttitudeOffset,
+    GpsLatency,
+    GpsSmoothing,
+    GyroScale,
+    GyroTiming,
+    HeightLatency,
+    ImuDelay,
+    Six,
+)
+from onboard.core.columns import Family, Model
+from onboard.core.noise import NoiseLevels, distance, star, stepped
+from onboard.core.passes import EpochState, Linearisation, Pass, PassResult, Portion
+from onboard.core.settings import EstimatorSettings
+from onboard.core.solution import Solution, solve, total
+from onboard.core.stretch import Fixes, Stretch
+from onboard.core.whitening import Uses
+
+Array = NDArray[np.float64]
+
+ROUNDS = 4
+"""Rounds of a refinement: latency is found to a millisecond in two, noise within 10 % in three."""
+MOST_STATES = 12000
+"""Epochs whose state is kept for certificates: 20 minutes at 10 Hz."""
+LONGEST_WINDOW_S = 0.45
+DELAY_RANGE_S = (-0.1, 0.45)
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some seconds of flight.  ``fresh`` if the filter must not continue from the one before."""
+
+    stretch: Stretch
+    fixes: Fixes
+    trusted: NDArray[np.bool_]
+    fresh: bool
+
+    @property
+    def duration(self) -> float:
+        """Length between first and last epoch, s."""
+        return float(self.fixes.t[-1] - self.fixes.t[0])
+
+
+def calibration_model(
+    point: Linearisation,
+    prior: Array | None = None,
+    settings: EstimatorSettings | None = None,
+    more: tuple[Family, ...] = (),
+) -> Model:
+    """The six, timing and nuisances about ``point``; ``prior`` is (6,) scale, beta."""
+    needs = (settings or EstimatorSettings()).needs
+    centre = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) if prior is None else prior
+    return Model(
+        [
+            Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
+            GpsLatency(point.delay),
+            GpsSmoothing(point.window),
+            ImuDelay(point.attitude_delay),
+            HeightLatency(),
+            GyroTiming(),
+            GyroScale(),
+            AttitudeOffset(),
+            *more,
+        ]
+    )
+
+
+def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
+    """The linearisation that ``theta`` asks for."""
+    i = model.index
+    square = point.window**2 + theta[i["window_squared"]]
+    return Linearisation(
+        scale=tuple(float(x) for x in theta[0:3]),  # type: ignore[arg-type] # three by construction
+        beta=tuple(float(x) for x in theta[3:6]),  # type: ignore[arg-type] # three by construction
+        delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
+        window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
+        attitude_delay=point.attitude_delay,
+    )
+
+
+class Engine:
+    """Sums and solution of one accelerometer."""
+
+    def __init__(
+        self,
+        settings: EstimatorSettings,
+        prior: Array | None = None,
+        point: Linearisation | None = None,
+        noise: NoiseLevels | None = None,
+        uses: Uses | None = None,
+    ) -> None:
+        """Take the settings, the prior six (scale, beta) and where to start."""
+        self.settings = settings
+        self.prior = prior
+        self.point = point or Linearisation()
+        self.noise = noise or NoiseLevels()
+        self.uses = uses or Uses()
+        self.chunks: list[Chunk] = []
+        self.aged: list[Portion] = []
+        self.portions: list[Portion] = []
+        self.refused: Counter[str] = Counter()
+        self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
+        self.trusted_s = 0.0
+        self._buffered_s = 0.0
+        self._refined_s = 0.0
+        self._frozen = False
+        self.model = self._model()
+        self._pass = self._new_pass()
+        self._solution: Solution | None = None
+
+    def _model(self) -> Model:
+        return calibration_model(self.point, self.prior, self.settings)
+
+    def _new_pass(self) -> Pass:
+        return Pass(self.model, self.point, (self.noise,), uses=self.uses)
+
+    @property
+    def latest(self) -> float:
+        """Trusted seconds since the last refinement."""
+        return self.trusted_s - self._refined_s
+
+    def add(self, chunk: Chunk) -> None:
+        """Process a chunk; refine when it is time."""
+        self.chunks.append(chunk)
+        self._buffered_s += chunk.duration
+        trusted = chunk.duration * float(np.mean(chunk.trusted))
+        before, self.trusted_s = self.trusted_s, self.trusted_s + trusted
+        self._run(chunk)
+        if any(before < s <= self.trusted_s for s in self.settings.refine_at_s):
+            self.refine()
+        self._age()
+
+    def _run(self, chunk: Chunk) -> None:
+        result = self._through(self._pass, chunk)
+        self.portions.append(result.portion)
+        self.refused.update(result.refused)
+        self.states.extend(result.states)
+        self._solution = None
+
+    def _through(self, made: Pass, chunk: Chunk) -> PassResult:
+        """One chunk through a pass; a filter that coasted too long begins anew."""
+        if chunk.fresh or chunk.fixes.t[0] - made.coasting_since > self.settings.coast_s:
+            made.restart()
+        return made.process(chunk.stretch, chunk.fixes, chunk.trusted)
+
+    def _age(self) -> None:
+        """Let flight leave the buffer; forget slowly what has left it."""
+        while self._buffered_s > self.settings.buffer_s and len(self.chunks) > 1:
+            if not self._frozen:
+                self.refine()
+                self._frozen = True
+            gone = self.chunks.pop(0)
+            self._buffered_s -= gone.duration
+            self.aged.append(self.portions.pop(0))
+            keep = float(np.exp(-gone.duration / self.settings.memory_s))
+            self.aged = [Portion(p.start, p.end, p.sums.scaled(keep)) for p in self.aged]
+            # A few dozen portions are enough for folds and clusters.
+            if len(self.aged) > 24:
+                self.aged = [
+                    Portion(a.start, b.end, a.sums + b.sums)
+                    for a, b in zip(self.aged[::2], self.aged[1::2], strict=False)
+                ]
+
+    def refine(self) -> None:
+        """Estimate timing and noise from the buffer and make its sums anew."""
+        if not self.chunks or self._frozen:
+            return
+        levels = self.noise
+        for turn in range(ROUNDS):
+            members = star(levels)
+            made = Pass(self.model, self.point, members, uses=self.uses)
+            portions = self._over_buffer(made)
+            point = moved(self.point, self.model, solve(portions, self.model).theta)
+            next_levels = stepped(levels, made.log_likelihoods())
+            settled = (
+                distance(levels, next_levels) < 0.15
+                and abs(point.delay - self.point.delay) < 5e-4
+                and abs(point.window**2 - self.point.window**2) < 2e-3
+            )
+            self._move(point, next_levels)
+            levels = next_levels
+            if settled and turn > 0:
+                break
+        self._pass = self._new_pass()
+        self.refused.clear()
+        self.states.clear()
+        self.portions = []
+        for chunk in self.chunks:
+            self._run(chunk)
+        self._refined_s = self.trusted_s
+
+    def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
+        self.point, self.noise = point, levels
+        self.model = self._model()
+
+    def _over_buffer(self, made: Pass) -> list[Portion]:
+        return [self._through(made, chunk).portion for chunk in self.chunks]
+
+    def finish(self) -> None:
+        """End of a recording or a flight: refine once more if there is something new."""
+        if self.latest > 0.05 * self.trusted_s and not self._frozen:
+            self.refine()
+
+    @property
+    def all_portions(self) -> list[Portion]:
+        """Aged and buffered portions, in order of time."""
+        return [*self.aged, *self.portions]
+
+    def solution(self) -> Solution | None:
+        """Solve the sums; None before the first chunk."""
+        if self._solution is None and self.all_portions:
+            self._solution = solve(self.all_portions, self.model)
+        return self._solution
+
+    def total_rows(self) -> float:
+        """Rows behind the solution."""
+        return total(self.all_portions).rows if self.all_portions else 0.0

@@ -1,0 +1,123 @@
+"""Noise levels of the whitening filter and their estimation from the data.
+
+The levels are found by maximum likelihood: one pass over the data runs the filter for a *star*
+of levels (the centre, and every level up and down by a factor) side by side, a parabola through
+each triple of log-likelihoods gives the step.  Constant factors here, not tuned numbers: only
+ratios of the order of one matter for the estimate, and honesty of the sigmas is checked again by
+the residuals (:mod:`onboard.core.solution`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseLevels:
+    """Standard deviations and random-walk densities that the whitening filter assumes.
+
+    Attributes:
+        velocity: white noise of a GPS velocity component, m/s.
+        velocity_colour: coloured part (time constant :data:`COLOUR_TIME_S`), m/s.
+        height: white noise of GPS height, m.
+        height_walk: wander of GPS height, m/sqrt(s).
+        force_walk: velocity random walk from accelerometer noise and all that is like it,
+            m/s/sqrt(s).
+        tilt_walk: angle random walk of the gyroscope, rad/sqrt(s).
+        bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
+        attitude: slow error of the recorded tilt (time constant :data:`ATTITUDE_TIME_S`), rad.
+        heading: slow error of the recorded heading, rad.
+    """
+
+    velocity: float = 0.05
+    velocity_colour: float = 0.02
+    height: float = 0.2
+    height_walk: float = 0.05
+    force_walk: float = 0.02
+    tilt_walk: float = 3e-4
+    bias_walk: float = 3e-5
+    attitude: float = 0.01
+    heading: float = 0.03
+
+    def scaled(self, name: str, factor: float) -> NoiseLevels:
+        """One level times ``factor``, inside its limits."""
+        low, high = LIMITS[name]
+        return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
+
+
+COLOUR_TIME_S = 3.0
+"""Receivers filter their velocity over a second or two, multipath lasts some seconds."""
+ATTITUDE_TIME_S = 10.0
+"""An EKF that weighs GPS against gyroscopes forgets a tilt error in some tens of seconds."""
+
+LIMITS: dict[str, tuple[float, float]] = {
+    "velocity": (0.02, 2.0),
+    "velocity_colour": (0.005, 1.0),
+    "height": (0.05, 10.0),
+    "height_walk": (0.01, 2.0),
+    "force_walk": (0.01, 3.0),
+    "tilt_walk": (1e-4, 0.03),
+    "bias_walk": (1e-5, 3e-4),
+    "attitude": (0.01, 0.2),
+    "heading": (0.015, 0.5),
+}
+"""No sensor on a small vehicle is better than the lower ends; a noiseless simulation must not make
+the filter believe that timing, interpolation and filters are modelled to the last digit."""
+
+ESTIMATED = (
+    "velocity",
+    "velocity_colour",
+    "height",
+    "height_walk",
+    "force_walk",
+    "tilt_walk",
+    "bias_walk",
+    "attitude",
+    "heading",
+)
+
+STAR_FACTOR = 2.0
+
+
+def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
+    """The centre, then each estimated level down and up by :data:`STAR_FACTOR`."""
+    return (
+        centre,
+        *(
+            centre.scaled(name, factor)
+            for name in ESTIMATED
+            for factor in (1.0 / STAR_FACTOR, STAR_FACTOR)
+        ),
+    )
+
+
+def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels:
+    """Next centre from the log-likelihoods of :func:`star`: a parabola in each log-level.
+
+    The step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex the better
+    end is taken.
+    """
+    reach = np.log(STAR_FACTOR)
+    here = log_likelihood[0]
+    levels = centre
+    for i, name in enumerate(ESTIMATED):
+        down, up = log_likelihood[1 + 2 * i], log_likelihood[2 + 2 * i]
+        slope = (up - down) / (2.0 * reach)
+        curve = (up - 2.0 * here + down) / reach**2
+        step = -slope / curve if curve < -1e-6 else 2.0 * reach * float(np.sign(slope))
+        step = float(np.clip(step, -2.0 * reach, 2.0 * reach))
+        levels = levels.scaled(name, float(np.exp(step)))
+    return levels
+
+
+def distance(a: NoiseLevels, b: NoiseLevels) -> float:
+    """Largest absolute log ratio of any level."""
+    return max(
+        abs(float(np.log(getattr(a, f.name) / getattr(b, f.name)))) for f in fields(NoiseLevels)
+    )

@@ -1,0 +1,361 @@
+"""One pass of the whitening filter over stretches of flight: columns in, sums out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Model, StretchColumns
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.nodes import Around, Intervals, NodeMaker
+from onboard.core.noise import NoiseLevels
+from onboard.core.smoothing import mean_weights
+from onboard.core.stretch import Fixes, Stretch
+from onboard.core.sums import NormalSums
+from onboard.core.whitening import Epoch, Rows, Step, Uses, WhiteningFilter
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP_S = 0.26
+"""Longer intervals (GPS at 1 Hz) are predicted in steps: attitude errors must stay first order."""
+TILT_START = 0.06
+HEADING_START = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Linearisation:
+    """The point about which the non-linear unknowns are expanded.
+
+    Attributes:
+        scale: (3,) of the accelerometer.
+        beta: (3,) ``-scale * offset``, m/s^2.
+        delay: GPS latency, s.
+        window: averaging span of the receiver, s.
+        attitude_delay: lateness of the recorded attitude, s.
+    """
+
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    beta: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    delay: float = 0.1
+    window: float = 0.0
+    attitude_delay: float = 0.0
+
+    @property
+    def six(self) -> Array:
+        """(6,) scale, beta."""
+        return np.array(self.scale + self.beta)
+
+
+@dataclass(frozen=True, slots=True)
+class EpochState:
+    """Filter's state after an epoch: where dead reckoning may start.  ``innovation`` as below."""
+
+    t: float
+    innovation: Array
+    R_nb: Array
+    v_n: Array
+    bias_b: Array
+
+
+@dataclass(frozen=True, slots=True)
+class EpochTrace:
+    """What one epoch left: for plots, gates and localisation.  ``innovation`` is NED, m/s."""
+
+    t: float
+    innovation: Array
+    y: Array
+    h: Array
+    velocities: int
+    height: bool
+    refused: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Portion:
+    """Sums of one portion of flight."""
+
+    start: float
+    end: float
+    sums: NormalSums
+
+
+@dataclass(slots=True)
+class PassResult:
+    """What :meth:`Pass.process` adds for one stretch."""
+
+    portion: Portion
+    states: list[EpochState] = field(default_factory=list)
+    traces: list[EpochTrace] = field(default_factory=list)
+    refused: dict[str, int] = field(default_factory=dict)
+    epochs: int = 0
+
+
+class Pass:
+    """Runs a filter through consecutive stretches; keeps its state between them."""
+
+    def __init__(
+        self,
+        model: Model,
+        point: Linearisation,
+        bank: tuple[NoiseLevels, ...],
+        *,
+        uses: Uses | None = None,
+        traces: bool = False,
+        theta: Array | None = None,
+        covariance: Array | None = None,
+    ) -> None:
+        """Take the model, the linearisation and the noise.
+
+        Args:
+            model: families of columns.
+            point: linearisation.
+            bank: noise levels; member 0 is the one whose sums count.
+            uses: measurements to use.
+            traces: keep the rows of each epoch (offline).
+            theta: (m,) held estimate for gates and attitude feedback; None: estimate as it goes.
+            covariance: (m, m) of it.
+        """
+        self.model = model
+        self.point = point
+        self.uses = uses or Uses()
+        self.filter = WhiteningFilter(model.size, bank, self.uses)
+        self._keep = traces
+        self._held = theta is not None
+        self._information = np.diag(1.0 / model.prior_sigma**2)
+        self._prior_b = self._information @ model.prior
+        self.theta = model.prior.copy() if theta is None else theta
+        self.covariance = np.diag(model.prior_sigma**2) if covariance is None else covariance
+        B, m = len(bank), model.size
+        self.N = np.zeros((B, m, m))
+        self.b = np.zeros((B, m))
+        self.s = np.zeros(B)
+        self.log_det = np.zeros(B)
+        self.rows = 0
+        self.bias_b = np.zeros(3)
+        self._running = False
+        self._since_solve = 0
+        self._epochs = 0
+        self._last_velocity_t = -np.inf
+
+    @property
+    def running(self) -> bool:
+        """True while the filter holds a state that the next stretch continues."""
+        return self._running
+
+    @property
+    def coasting_since(self) -> float:
+        """Time of the last epoch whose velocity was accepted."""
+        return self._last_velocity_t
+
+    def restart(self) -> None:
+        """Forget the filter's state (a gap): the next stretch begins a new one.  Sums stay."""
+        self._running = False
+
+    def log_likelihoods(self) -> list[float]:
+        """Log-likelihood of each member, the unknowns integrated out with their prior."""
+        out = []
+        prior = float(self.model.prior @ self._prior_b)
+        for i in range(len(self.s)):
+            A = self.N[i] + self._information
+            c = self.b[i] + self._prior_b
+            theta = np.linalg.solve(A, c)
+            chi2 = float(self.s[i] + prior - c @ theta)
+            out.append(-0.5 * (self.log_det[i] + chi2 + float(np.linalg.slogdet(A)[1])))
+        return out
+
+    def process(self, stretch: Stretch, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
+        """Go through the epochs ``fixes``; when running, the first is the last one of before.
+
+        Args:
+            stretch: samples that cover the epochs and 0.3 s to either side.
+            fixes: GPS epochs on the boot clock as stamped (delay not removed).
+            trusted: (n,) whether the receiver is to be believed there.
+        """
+        epoch_t = fixes.t - self.point.delay
+        maker = NodeMaker(
+            stretch, self.bias_b, self.point.six, recorded_attitude=self.uses.recorded_attitude
+        )
+        start, end, measured = _subdivide(epoch_t)
+        intervals = maker.intervals(start, end)
+        around = maker.around(epoch_t)
+        columns = self.model.columns(intervals, around)
+        epochs = self._epoch_list(stretch, fixes, trusted, around, columns)
+        result = PassResult(Portion(float(epoch_t[0]), float(epoch_t[-1]), NormalSums.zeros(0)))
+        before = (self.N[0].copy(), self.b[0].copy(), self.s[0], self.log_det[0], self.rows)
+        gram = self.filter.noise_gram.copy()
+        if not self._running:
+            first = epochs[0]
+            R0 = stretch.attitude_at(epoch_t[:1])[0][0]
+            self.filter.start(first, R0, TILT_START, HEADING_START)
+            self._running = True
+            self._last_velocity_t = first.t
+        f1, f2, A = _force_integrals(intervals)
+        for k in range(len(start)):
+            step = Step(
+                float(intervals.duration[k]),
+                intervals.P[k, -1],
+                f1[k],
+                f2[k],
+                A[k],
+                columns.force1[k],
+                columns.force2[k],
+                columns.turn[k],
+            )
+            e = int(measured[k])
+            self.filter.predict(step, self.theta, float(fixes.latitude[max(e, 0)]))
+            if e < 0:
+                continue
+            if self.uses.recorded_attitude:
+                self.filter.R_nb = stretch.attitude_at(epoch_t[e : e + 1])[0][0]
+            rows = self.filter.update(epochs[e], self.theta, self.covariance)
+            result.epochs += 1
+            if rows is not None:
+                self._take(rows, result)
+                if rows.velocities:
+                    result.states.append(self._state(rows))
+        bias0, bias_columns = self.filter.bias_estimate
+        if not self.uses.recorded_attitude:
+            shift = bias0 + bias_columns @ self.theta
+            self.bias_b = self.bias_b + shift
+            self.filter.shift_bias(shift)
+        sums = NormalSums.zeros(self.model.size)
+        sums.N = self.N[0] - before[0]
+        sums.b = self.b[0] - before[1]
+        sums.s = float(self.s[0] - before[2])
+        sums.log_det = float(self.log_det[0] - before[3])
+        sums.rows = float(self.rows - before[4])
+        self._noise_in_columns(sums, stretch, self.filter.noise_gram - gram)
+        result.portion.sums = sums
+        return result
+
+    def _state(self, rows: Rows) -> EpochState:
+        innovation = np.full(3, np.nan)
+        innovation[: len(rows.innovation)] = rows.innovation
+        return EpochState(
+            rows.t,
+            innovation,
+            self.filter.R_nb,
+            self.filter.velocity(self.theta),
+            self.bias_b,
+        )
+
+    def _take(self, rows: Rows, result: PassResult) -> None:
+        for name in rows.refused:
+            result.refused[name] = result.refused.get(name, 0) + 1
+        if rows.velocities:
+            self._last_velocity_t = rows.t
+        y, h = rows.y, rows.h
+        ht = np.swapaxes(h, -1, -2)
+        self.N += ht @ h
+        self.b += (ht @ y[:, :, None])[:, :, 0]
+        self.s += np.einsum("br,br->b", y, y)
+        self.log_det += rows.log_det
+        self.rows += y.shape[1]
+        if self._keep:
+            result.traces.append(
+                EpochTrace(
+                    rows.t, rows.innovation, y[0], h[0], rows.velocities, rows.height, rows.refused
+                )
+            )
+        self._epochs += 1
+        self._since_solve += 1
+        if not self._held and self._since_solve >= (1 if self._epochs < 60 else 5):
+            self._since_solve = 0
+            self.covariance = np.linalg.inv(self.N[0] + self._information)
+            self.theta = self.covariance @ (self.b[0] + self._prior_b)
+
+    def _noise_in_columns(self, sums: NormalSums, stretch: Stretch, gram: Array) -> None:
+        """Expected Gram of accelerometer noise in the scale columns (errors in variables)."""
+        if "six" not in self.model.slices:
+            return
+        density = sample_noise_density(stretch.t, stretch.raw_s)
+        at = self.model.slices["six"].start
+        # Axis columns of the Gram are body axes; the sensor's are permuted or mixed by R_bs.
+        sensor = (stretch.R_bs**2).T @ gram
+        for j in range(3):
+            sums.G[at + j, at + j] = density[j] * sensor[j]
+
+    def _epoch_list(
+        self,
+        stretch: Stretch,
+        fixes: Fixes,
+        trusted: NDArray[np.bool_],
+        around: Around,
+        c: StretchColumns,
+    ) -> list[Epoch]:
+        R_att, near = stretch.attitude_at(around.now.t)
+        kappa = mean_weights(around.offset, self.point.window)
+        smooth = np.einsum("j,kja->ka", kappa, around.f_epoch)
+        a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
+        smooth_height = -a_down * self.point.window**2 / 24.0
+        out = []
+        for e in range(len(fixes)):
+            out.append(
+                Epoch(
+                    float(around.now.t[e]),
+                    fixes.v_n[e],
+                    float(fixes.height[e]),
+                    float(fixes.latitude[e]),
+                    R_att[e] if near[e] else None,
+                    smooth[e],
+                    float(smooth_height[e]),
+                    c.velocity_body[e],
+                    c.velocity_ned[e],
+                    c.position_body[e],
+                    c.position_ned[e],
+                    c.along_velocity[e],
+                    c.attitude_body[e],
+                    c.attitude_ned[e],
+                    bool(trusted[e]),
+                )
+            )
+        return out
+
+
+def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Starts, ends and measured epoch (or -1) of prediction steps between epochs."""
+    start: list[float] = []
+    end: list[float] = []
+    measured: list[int] = []
+    for k in range(len(epoch_t) - 1):
+        parts = max(1, int(np.ceil((epoch_t[k + 1] - epoch_t[k]) / LONGEST_STEP_S)))
+        edges = np.linspace(epoch_t[k], epoch_t[k + 1], parts + 1)
+        start.extend(edges[:-1])
+        end.extend(edges[1:])
+        measured.extend([-1] * (parts - 1) + [k + 1])
+    return np.array(start), np.array(end), np.array(measured)
+
+
+def _force_integrals(intervals: Intervals) -> tuple[Array, Array, Array]:
+    """``integral f``, ``integral (T - tau) f`` (K, 3) and ``integral P`` (K, 3, 3)."""
+    f1, f2 = intervals.integrals(intervals.signals.f_b[..., None])
+    A = np.einsum("ki,kiab->kab", intervals.weight, intervals.P)
+    return f1[..., 0], f2[..., 0], A
+
+
+def sample_noise_density(t: Array, raw: Array) -> Array:
+    """Density (m/s^2)^2 s of what looks like white noise in each axis' samples.
+
+    Samples are averaged to blocks of 50 ms (vehicles do not manoeuvre faster), third differences
+    of the blocks take the manoeuvre out (white noise: 20 times its variance), and the median
+    absolute deviation ignores the few jerks that are left.
+
+    Args:
+        t: (n,) s.
+        raw: (n, 3).
+
+    Returns:
+        (3,).
+    """
+    step = (t[-1] - t[0]) / max(len(t) - 1, 1)
+    size = max(1, round(0.05 / step))
+    count = len(t) // size
+    if count < 8:
+        return np.zeros(3)
+    blocks = raw[: count * size].reshape(count, size, 3).mean(axis=1)
+    third = np.diff(blocks, n=3, axis=0)
+    sigma = np.median(np.abs(third - np.median(third, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
+    out: Array = sigma**2 * size * step
+    return out

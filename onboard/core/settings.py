@@ -1,0 +1,36 @@
+"""Settings of the estimator: every number that a user may want to change, with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from onboard.core.observability import Needs
+from onboard.core.trust import TrustLimits
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorSettings:
+    """How the calibrator works.
+
+    Attributes:
+        chunk_s: length of flight that is processed at once, s.
+        buffer_s: flight that is kept for re-linearisation, s; older flight stays in the sums.
+        memory_s: time constant with which older flight is forgotten once the buffer is full, s
+            (an accelerometer's offset wanders with temperature and age).
+        refine_at_s: trusted seconds after which timing and noise are estimated anew.
+        minimum_s: trusted seconds below which nothing is called calibrated.
+        coast_s: longest stretch without an accepted fix that is bridged inertially, s.
+        slowest_imu_hz: inertial streams below this rate cannot be integrated.
+        needs: what was known before and what is needed.
+        trust: limits of the trust window.
+    """
+
+    chunk_s: float = 10.0
+    buffer_s: float = 600.0
+    memory_s: float = 1800.0
+    refine_at_s: tuple[float, ...] = (30.0, 120.0, 480.0)
+    minimum_s: float = 45.0
+    coast_s: float = 30.0
+    slowest_imu_hz: float = 9.0
+    needs: Needs = field(default_factory=Needs)
+    trust: TrustLimits = field(default_factory=TrustLimits)

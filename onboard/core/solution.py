@@ -1,0 +1,173 @@
+"""From sums to numbers: estimate, honest covariance, held-out residuals.
+
+The whitened rows are independent only as far as the noise model is right.  Residuals of real
+flights are coloured, so the inverse of the sums alone is optimistic; the scatter of the score
+(``b_i - N_i theta``) over portions of the flight says by how much (Huber 1967, White 1980;
+clustered by time), and the data are weakened against the prior by that factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Model
+from onboard.core.passes import Portion
+from onboard.core.sums import NormalSums
+
+Array = NDArray[np.float64]
+
+FOLDS = 8
+GRAM_DOUBT = 0.5
+"""Relative uncertainty of the noise that was taken out of the columns: its spectrum is a guess."""
+MOST_NOISE = 0.9
+"""Share of a column's information that noise may claim; past it there is nothing left to see."""
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Estimate of all unknowns of a model.
+
+    Attributes:
+        theta: (m,) estimate with the prior.
+        covariance: (m, m) of it, inflated for coloured residuals.
+        information: (m, m) of the data alone, deflated by the same factor.
+        inflation: factor on the variance, at least 1.
+        chi2: mean square of the whitened residual.
+        rows: number of rows behind it.
+    """
+
+    theta: Array
+    covariance: Array
+    information: Array
+    inflation: float
+    chi2: float
+    rows: float
+
+
+def total(portions: Sequence[Portion]) -> NormalSums:
+    """Sum over portions (at least one)."""
+    return reduce(lambda a, b: a + b, (p.sums for p in portions))
+
+
+def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
+    """The noise Gram, limited so that what is left stays positive definite."""
+    G = sums.G
+    if not np.any(G):
+        return G
+    A = sums.N + prior_information
+    # Largest share of any direction that the noise claims.
+    L = np.linalg.cholesky(A)
+    scaled = np.linalg.solve(L, np.linalg.solve(L, G).T)
+    share = float(np.linalg.eigvalsh((scaled + scaled.T) / 2).max())
+    return G if share <= MOST_NOISE else G * (MOST_NOISE / share)
+
+
+def solve(portions: Sequence[Portion], model: Model) -> Solution:
+    """Maximum a posteriori estimate with a covariance that the residuals confirm."""
+    sums = total(portions)
+    prior = np.diag(1.0 / model.prior_sigma**2)
+    G = _limited_gram(sums, prior)
+    share = np.divide(
+        np.diag(G), np.diag(sums.G), out=np.zeros(sums.size), where=np.diag(sums.G) > 0
+    )
+    D = sums.N - G
+    theta = np.linalg.solve(D + prior, sums.b + prior @ model.prior)
+    chi2 = sums.residual(theta) / max(sums.rows, 1.0)
+    inflation = max(1.0, chi2, _cluster_factor(portions, share, theta, D + prior, model))
+    A = D / inflation + prior
+    theta = np.linalg.solve(A, sums.b / inflation + prior @ model.prior)
+    inverse = np.linalg.inv(A)
+    # Sandwich: the rows carry D + G of information, of which G is not signal.
+    doubt = (GRAM_DOUBT * G) / inflation
+    spread = (D + G) / inflation + prior + doubt @ np.diag(theta**2) @ doubt
+    covariance = inverse @ spread @ inverse
+    middle = np.linalg.pinv(spread - prior, hermitian=True)
+    information = (D / inflation) @ middle @ (D / inflation)
+    return Solution(
+        theta,
+        (covariance + covariance.T) / 2,
+        (information + information.T) / 2,
+        inflation,
+        chi2,
+        sums.rows,
+    )
+
+
+def _cluster_factor(
+    portions: Sequence[Portion], share: Array, theta: Array, A: Array, model: Model
+) -> float:
+    """How much wider the scatter of the portions' scores is than the sums say.
+
+    Median over the six of the ratio of clustered to plain variance; 1 while there are fewer than
+    six portions (three degrees of freedom say nothing).
+    """
+    if len(portions) < 6 or "six" not in model.slices:
+        return 1.0
+    inverse = np.linalg.inv(A)
+    meat = np.zeros_like(A)
+    plain = np.zeros_like(A)
+    for p in portions:
+        score = p.sums.b - (p.sums.N - np.diag(share * np.diag(p.sums.G))) @ theta
+        meat += np.outer(score, score)
+        plain += p.sums.N
+    n = len(portions)
+    meat *= n / max(n - 6.0, 1.0)
+    six = model.slices["six"]
+    wide = np.diag(inverse @ meat @ inverse)[six]
+    narrow = np.diag(inverse @ plain @ inverse)[six]
+    return float(np.median(wide / np.maximum(narrow, 1e-30)))
+
+
+def held_out(
+    portions: Sequence[Portion], model: Model, fixed: dict[int, float] | None = None
+) -> float:
+    """Root mean square whitened residual on portions that the fit did not see.
+
+    Args:
+        portions: in order of time.
+        model: with its prior.
+        fixed: unknowns held at a value instead of fitted (the parameters in force).
+
+    Returns:
+        Dimensionless; NaN with fewer than two portions.
+    """
+    if len(portions) < 2:
+        return float("nan")
+    everything = total(portions)
+    prior = np.diag(1.0 / model.prior_sigma**2)
+    free = [i for i in range(model.size) if not fixed or i not in fixed]
+    held = np.zeros(model.size)
+    for i, value in (fixed or {}).items():
+        held[i] = value
+    square, rows = 0.0, 0.0
+    for fold in np.array_split(np.arange(len(portions)), min(FOLDS, len(portions))):
+        out = total([portions[i] for i in fold])
+        rest = everything - out
+        theta = held.copy()
+        A = (rest.N - rest.G + prior)[np.ix_(free, free)]
+        c = rest.b + prior @ model.prior - (rest.N @ held)
+        theta[free] = np.linalg.solve(A, c[free])
+        square += out.residual(theta)
+        rows += out.rows
+    return float(np.sqrt(max(square, 0.0) / max(rows, 1.0)))
+
+
+def fitted_rms(
+    portions: Sequence[Portion], model: Model, fixed: dict[int, float] | None = None
+) -> float:
+    """Root mean square whitened residual of the fit itself, some unknowns held if wanted."""
+    sums = total(portions)
+    prior = np.diag(1.0 / model.prior_sigma**2)
+    free = [i for i in range(model.size) if not fixed or i not in fixed]
+    theta = np.zeros(model.size)
+    for i, value in (fixed or {}).items():
+        theta[i] = value
+    A = (sums.N - sums.G + prior)[np.ix_(free, free)]
+    c = sums.b + prior @ model.prior - sums.N @ theta
+    theta[free] = np.linalg.solve(A, c[free])
+    return float(np.sqrt(max(sums.residual(theta), 0.0) / max(sums.rows, 1.0)))

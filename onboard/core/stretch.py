@@ -1,0 +1,77 @@
+"""A stretch of flight: the samples of one accelerometer between two moments, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.frames import interpolate_rotation
+from onboard.core.interpolation import Hermite
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Fixes:
+    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed."""
+
+    t: Array
+    v_n: Array
+    height: Array
+    latitude: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start: int, stop: int) -> Fixes:
+        """Epochs ``start:stop``."""
+        cut = slice(start, stop)
+        return Fixes(self.t[cut], self.v_n[cut], self.height[cut], self.latitude[cut])
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Inertial samples, attitude and slow signals, all on the boot clock, delays removed.
+
+    Attributes:
+        t: (n,) sample times of the accelerometer, corrected for its declared low-pass, s.
+        w_b: (n, 3) rad/s.
+        raw_s: (n, 3) raw specific force, sensor axes, m/s^2.
+        t_attitude: (k,) s.
+        R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
+        R_bs: (3, 3) board orientation.
+        slow: other signals by name: times (j,) and values (j,) or (j, 3).
+    """
+
+    t: Array
+    w_b: Array
+    raw_s: Array
+    t_attitude: Array
+    R_attitude: Array
+    R_bs: Array
+    slow: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+
+    def interpolant(self) -> Hermite:
+        """Interpolant of (rate, raw) stacked to (n, 6)."""
+        return Hermite(self.t, np.hstack([self.w_b, self.raw_s]))
+
+    def slow_at(self, name: str, at: Array) -> Array | None:
+        """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""
+        if name not in self.slow:
+            return None
+        t, x = self.slow[name]
+        if x.ndim == 1:
+            return np.interp(at, t, x)
+        return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
+
+    def attitude_at(self, at: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Recorded attitude at ``at`` (m,), and where samples within 0.3 s bracket it."""
+        R = interpolate_rotation(at, self.t_attitude, self.R_attitude)
+        i = np.clip(np.searchsorted(self.t_attitude, at) - 1, 0, max(len(self.t_attitude) - 2, 0))
+        if len(self.t_attitude) < 2:
+            return R, np.zeros(len(at), dtype=bool)
+        t0, t1 = self.t_attitude[i], self.t_attitude[i + 1]
+        near = (t1 - t0 < 0.3) & (at >= t0) & (at <= t1)
+        return R, near
