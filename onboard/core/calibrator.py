@@ -102,9 +102,11 @@ class Calibrator:
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
         if isinstance(sample, ImuSample):
-            events = self._clock(sample.t) if sample.t > self._newest + 1.0 or (
-                sample.t < self._newest
-            ) else ()
+            events = (
+                self._clock(sample.t)
+                if sample.t > self._newest + 1.0 or (sample.t < self._newest)
+                else ()
+            )
             self._newest = max(self._newest, sample.t)
             self._assembly.imu(sample, self.parameters)
             return events

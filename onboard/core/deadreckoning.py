@@ -1,12 +1,13 @@
 """How far velocity drifts when it is only integrated: the parameters in force against the estimate.
 
-Starts from the filter's state at an epoch, goes on with gyroscope and accelerometer alone, and is
+Starts from the filter's velocity at an epoch and integrates the accelerometer alone along the
+filter's attitude, so that what is left is the accelerometer's error and not the gyroscope's drift;
 compared with GPS where GPS is there to tell.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,18 +64,19 @@ def free_drift(
     last = -np.inf
     span = chain[-1].end - chain[0].start
     spacing = max(horizon_s, span / most)
+    attitude = {round(state.t, 3): state.R_nb for state in states}
     for state in states:
         if state.t < last + spacing:
             continue
-        k = int(np.searchsorted(start, state.t - 1e-6))
+        k = int(np.searchsorted(start, state.t - 1e-3))
         if k >= len(chain) or abs(start[k] - state.t) > 1e-3:
             continue
-        stop = int(np.searchsorted(end, state.t + horizon_s, side="right"))
+        stop = int(np.searchsorted(end, state.t + horizon_s + 1e-3, side="right"))
         if stop - k < 3 or end[stop - 1] - state.t < 0.97 * horizon_s:
             continue
         if np.any(np.abs(start[k + 1 : stop] - end[k : stop - 1]) > 1e-6):
             continue
-        got = _drift(chain[k:stop], state, sixes)
+        got = _drift(chain[k:stop], state, sixes, attitude)
         if got is None:
             continue
         ends.append(got[0])
@@ -128,7 +130,10 @@ class _Interval:
 
 
 def _drift(
-    chain: Sequence[_Interval], state: EpochState, sixes: Sequence[Array]
+    chain: Sequence[_Interval],
+    state: EpochState,
+    sixes: Sequence[Array],
+    attitude: Mapping[float, Array],
 ) -> tuple[Array, Array] | None:
     """Drift at the end and mean square inside for each set; None without GPS at the end."""
     R = state.R_nb
@@ -142,7 +147,8 @@ def _drift(
         for i, six in enumerate(sixes):
             v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:])
             v[i, 2] += STANDARD_GRAVITY * T
-        R = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+        turned = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+        R = attitude.get(round(x.end, 3), turned)
         seen = np.isfinite(x.velocity)
         if seen[0]:
             error = np.where(seen, v - x.velocity, 0.0)

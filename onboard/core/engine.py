@@ -121,14 +121,31 @@ class Engine:
         self._refined_s = 0.0
         self._frozen = False
         self.model = self._model()
+        self._seed: Solution | None = None
         self._pass = self._new_pass()
         self._solution: Solution | None = None
 
     def _model(self) -> Model:
         return calibration_model(self.point, self.prior, self.settings)
 
-    def _new_pass(self) -> Pass:
-        return Pass(self.model, self.point, (self.noise,), uses=self.uses)
+    def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
+        """A pass whose gates know the last solution: an outlier at the start must not pass."""
+        solution = self._seed
+        return Pass(
+            self.model,
+            self.point,
+            members or (self.noise,),
+            uses=self.uses,
+            theta=None if solution is None else self._about_point(solution.theta),
+            covariance=None if solution is None else solution.covariance,
+        )
+
+    def _about_point(self, theta: Array) -> Array:
+        """``theta`` of an older linearisation as unknowns about the present one."""
+        out = theta.copy()
+        out[self.model.index["gps_delay"]] = 0.0
+        out[self.model.index["window_squared"]] = 0.0
+        return out
 
     @property
     def latest(self) -> float:
@@ -184,9 +201,10 @@ class Engine:
         levels = self.noise
         for turn in range(ROUNDS):
             members = star(levels)
-            made = Pass(self.model, self.point, members, uses=self.uses)
+            made = self._new_pass(members)
             portions = self._over_buffer(made)
-            point = moved(self.point, self.model, solve(portions, self.model).theta)
+            self._seed = solve(portions, self.model)
+            point = moved(self.point, self.model, self._seed.theta)
             next_levels = stepped(levels, made.log_likelihoods())
             settled = (
                 distance(levels, next_levels) < 0.15
@@ -203,6 +221,7 @@ class Engine:
         self.portions = []
         for chunk in self.chunks:
             self._run(chunk)
+        self._pass.release()
         self._refined_s = self.trusted_s
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:

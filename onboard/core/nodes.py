@@ -195,9 +195,7 @@ class NodeMaker:
         """Nodes around ``epoch`` (K,)."""
         J = AROUND_COUNT
         offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
-        fine = self.signals(
-            epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1)
-        )
+        fine = self.signals(epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1))
         nodes = Signals(
             fine.t[:, ::2],
             fine.w_b[:, ::2],
@@ -221,7 +219,5 @@ class NodeMaker:
         return Around(offset, nodes, f_epoch, now)
 
     def _attitude(self, t: Array) -> Array:
-        flat = interpolate_rotation(
-            t.ravel(), self._stretch.t_attitude, self._stretch.R_attitude
-        )
+        flat = interpolate_rotation(t.ravel(), self._stretch.t_attitude, self._stretch.R_attitude)
         return flat.reshape(*t.shape, 3, 3)

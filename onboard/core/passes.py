@@ -114,7 +114,8 @@ class Pass:
             bank: noise levels; member 0 is the one whose sums count.
             uses: measurements to use.
             traces: keep the rows of each epoch (offline).
-            theta: (m,) held estimate for gates and attitude feedback; None: estimate as it goes.
+            theta: (m,) estimate held for gates and attitude feedback until :meth:`release`; None:
+                estimate as it goes.
             covariance: (m, m) of it.
         """
         self.model = model
@@ -152,6 +153,10 @@ class Pass:
     def restart(self) -> None:
         """Forget the filter's state (a gap): the next stretch begins a new one.  Sums stay."""
         self._running = False
+
+    def release(self) -> None:
+        """From now on gates and feedback follow the pass's own sums."""
+        self._held = False
 
     def log_likelihoods(self) -> list[float]:
         """Log-likelihood of each member, the unknowns integrated out with their prior."""
@@ -270,7 +275,11 @@ class Pass:
         """Expected Gram of accelerometer noise in the scale columns (errors in variables)."""
         if "six" not in self.model.slices:
             return
-        density = sample_noise_density(stretch.t, stretch.raw_s)
+        # What looks like noise sample by sample may be a tone that integrates to nothing; the
+        # velocity's random walk, found from the residuals, is all that it can amount to.
+        density = np.minimum(
+            sample_noise_density(stretch.t, stretch.raw_s), self.filter.bank[0].force_walk ** 2
+        )
         at = self.model.slices["six"].start
         # Axis columns of the Gram are body axes; the sensor's are permuted or mixed by R_bs.
         sensor = (stretch.R_bs**2).T @ gram

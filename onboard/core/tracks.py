@@ -184,8 +184,9 @@ class FixTrack:
         fixes = [f for f, _ in taken]
         t = even_times(
             np.array([f.t for f in fixes]),
-            None if any(f.t_receiver is None for f in fixes) else
-            np.array([f.t_receiver for f in fixes], dtype=np.float64),
+            None
+            if any(f.t_receiver is None for f in fixes)
+            else np.array([f.t_receiver for f in fixes], dtype=np.float64),
         )
         if np.isfinite(self._last_even) and len(t) > 1:
             # The first was the last of before: its time must not move under the filter's feet.
@@ -224,7 +225,9 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
     else:
         period = float(np.median(np.diff(t)))
         # Whole milliseconds: receivers run at 1, 2, 4, 5, 8, 10 ... Hz.
-        period = round(period * 1e3) * 1e-3 if abs(period * 1e3 - round(period * 1e3)) < 0.3 else period
+        period = (
+            round(period * 1e3) * 1e-3 if abs(period * 1e3 - round(period * 1e3)) < 0.3 else period
+        )
         if period <= 0.0:
             return t.copy()
         count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])

@@ -152,7 +152,9 @@ class Uses:
 class WhiteningFilter:
     """Runs through epochs; owns the mean, its columns, the covariances and the attitude."""
 
-    def __init__(self, unknowns: int, bank: Sequence[NoiseLevels], uses: Uses | None = None) -> None:
+    def __init__(
+        self, unknowns: int, bank: Sequence[NoiseLevels], uses: Uses | None = None
+    ) -> None:
         """Take the number of unknowns and the noise levels of each member."""
         self.m = unknowns
         self.bank = tuple(bank)
@@ -388,9 +390,7 @@ class WhiteningFilter:
         out: Array = self._row_var[:, columns, None] * np.eye(len(columns))
         return out
 
-    def _gate(
-        self, t: float, kinds: str, y: Array, h: Array, theta: Array, C: Array
-    ) -> str | None:
+    def _gate(self, t: float, kinds: str, y: Array, h: Array, theta: Array, C: Array) -> str | None:
         """Name of the first group whose innovation is impossible, given all uncertainty."""
         if not self.uses.gates:
             return None
@@ -435,9 +435,7 @@ class WhiteningFilter:
             self._attitude_off = None
         return False
 
-    def _noise_rows(
-        self, L: Array, back: Array, index: tuple[list[int], list[int]]
-    ) -> None:
+    def _noise_rows(self, L: Array, back: Array, index: tuple[list[int], list[int]]) -> None:
         """Expected square of what unit white noise on each accelerometer axis leaves in the rows."""
         first, second = index
         picked = self._Xi[:, first] + self._Xi[:, second]
