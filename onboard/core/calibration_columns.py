@@ -81,7 +81,7 @@ class HeightLatency(Family):
 
 
 class GpsSmoothing(Family):
-    """Averaging span of the receiver; the unknown is ``window^2`` less that of the linearisation."""
+    """Averaging span of the receiver; the unknown is ``window^2`` less that taken."""
 
     name = "gps_smoothing"
 

@@ -31,6 +31,7 @@ from onboard.core.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.core.saving import SavedEngine, dump, load, merged
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import TrustWindow, WindowClosed, WindowOpened
 
@@ -68,13 +69,14 @@ Event = WindowOpened | WindowClosed | Restarted | Advanced | FlightEnded
 class Calibrator:
     """Estimates the six numbers of every accelerometer from a stream of samples."""
 
-    def __init__(self, settings: EstimatorSettings = EstimatorSettings()) -> None:
+    def __init__(self, settings: EstimatorSettings | None = None) -> None:
         """Take the settings."""
-        self.settings = settings
+        self.settings = settings = settings or EstimatorSettings()
         self.parameters = ParametersInForce()
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings)
         self._engines: dict[int, Engine] = {}
+        self._waiting: dict[int, SavedEngine] = {}
         self._counts: Counter[str] = Counter()
         self._newest = -np.inf
         self._armed: bool | None = None
@@ -155,6 +157,58 @@ class Calibrator:
             rejected={k: n for k, n in rejected.items() if n},
         )
 
+    def to_bytes(self) -> bytes:
+        """Sums of every accelerometer, to go on with after a restart."""
+        saved = []
+        for imu, engine in sorted(self._engines.items()):
+            portions = merged(engine.all_portions)
+            if portions:
+                prior = engine.model.prior[:6]
+                saved.append(
+                    SavedEngine(
+                        imu,
+                        self.parameters.device_id(imu),
+                        tuple(float(x) for x in prior),
+                        engine.point,
+                        engine.noise,
+                        engine.trusted_s,
+                        tuple(portions),
+                    )
+                )
+        # Those that wait for their accelerometer to show up are not lost by a short run.
+        saved.extend(x for imu, x in self._waiting.items() if imu not in self._engines)
+        return dump(saved)
+
+    @classmethod
+    def from_bytes(cls, data: bytes, settings: EstimatorSettings | None = None) -> Calibrator:
+        """A calibrator that goes on where another stopped.
+
+        Raises:
+            StateError: damaged, or of another version.
+        """
+        made = cls(settings)
+        made._waiting = {e.imu: e for e in load(data)}
+        return made
+
+    def _engine_of(self, imu: int) -> Engine:
+        """The engine, new or with the sums that were saved for this very sensor."""
+        if imu in self._engines:
+            return self._engines[imu]
+        saved = self._waiting.pop(imu, None)
+        identity = self.parameters.device_id(imu)
+        if saved is not None and saved.device_id in (None, identity):
+            engine = Engine(self.settings, np.array(saved.prior), saved.point, saved.noise)
+            sizes = {p.sums.size for p in saved.portions}
+            if sizes == {engine.model.size}:
+                engine.restore(list(saved.portions), saved.trusted_s)
+                self._counts["restored"] += 1
+                self._engines[imu] = engine
+                return engine
+        if saved is not None:
+            self._counts["saved_of_another_sensor"] += 1
+        self._engines[imu] = Engine(self.settings, self._prior(imu))
+        return self._engines[imu]
+
     def _clock(self, t: float) -> tuple[Event, ...]:
         """Notice a reboot."""
         if not t < self._newest - BACKWARDS_S:
@@ -194,10 +248,8 @@ class Calibrator:
         made: dict[int, list[Chunk]] = self._assembly.take(self.parameters, everything=everything)
         newest = -np.inf
         for imu, chunks in made.items():
-            if imu not in self._engines:
-                self._engines[imu] = Engine(self.settings, self._prior(imu))
             for chunk in chunks:
-                self._engines[imu].add(chunk)
+                self._engine_of(imu).add(chunk)
                 newest = max(newest, float(chunk.fixes.t[-1]))
         return (Advanced(float(newest)),) if np.isfinite(newest) else ()
 

@@ -225,11 +225,24 @@ class Engine:
         self._refined_s = self.trusted_s
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
+        shift = np.zeros(self.model.size)
+        shift[self.model.index["gps_delay"]] = point.delay - self.point.delay
+        shift[self.model.index["window_squared"]] = point.window**2 - self.point.window**2
+        self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
         self.point, self.noise = point, levels
         self.model = self._model()
 
     def _over_buffer(self, made: Pass) -> list[Portion]:
         return [self._through(made, chunk).portion for chunk in self.chunks]
+
+    def restore(self, portions: list[Portion], trusted_s: float) -> None:
+        """Take sums of earlier flights, made about this engine's point."""
+        self.aged = [*portions, *self.aged]
+        self.trusted_s += trusted_s
+        self._refined_s += trusted_s
+        self._seed = self._solution = solve(self.all_portions, self.model)
+        self._pass = self._new_pass()
+        self._pass.release()
 
     def finish(self) -> None:
         """End of a recording or a flight: refine once more if there is something new."""

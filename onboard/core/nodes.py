@@ -87,7 +87,7 @@ class Intervals:
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """Nodes around K epochs, ``offset`` (2 J + 1,) s before and after, for what a receiver averages.
+    """Nodes around K epochs, for what a receiver averages.
 
     Attributes:
         offset: (2 J + 1,) s.

@@ -100,8 +100,8 @@ def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
 def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels:
     """Next centre from the log-likelihoods of :func:`star`: a parabola in each log-level.
 
-    The step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex the better
-    end is taken.
+    The step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex the
+    better end is taken.
     """
     reach = np.log(STAR_FACTOR)
     here = log_likelihood[0]

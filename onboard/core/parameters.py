@@ -45,6 +45,10 @@ class ParametersInForce:
         """True if all six of this accelerometer were reported."""
         return all(name in self.values for name in parameter_names(imu).six)
 
+    def device_id(self, imu: int) -> float | None:
+        """INS_ACCn_ID as reported; None if it was not."""
+        return self.values.get(parameter_names(imu).device_id)
+
     def six(self, imu: int) -> SixParameters:
         """Scale and offset in force; one and zero where they were never reported."""
         names = parameter_names(imu)

@@ -299,28 +299,26 @@ class Pass:
         smooth = np.einsum("j,kja->ka", kappa, around.f_epoch)
         a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
         smooth_height = -a_down * self.point.window**2 / 24.0
-        out = []
-        for e in range(len(fixes)):
-            out.append(
-                Epoch(
-                    float(around.now.t[e]),
-                    fixes.v_n[e],
-                    float(fixes.height[e]),
-                    float(fixes.latitude[e]),
-                    R_att[e] if near[e] else None,
-                    smooth[e],
-                    float(smooth_height[e]),
-                    c.velocity_body[e],
-                    c.velocity_ned[e],
-                    c.position_body[e],
-                    c.position_ned[e],
-                    c.along_velocity[e],
-                    c.attitude_body[e],
-                    c.attitude_ned[e],
-                    bool(trusted[e]),
-                )
+        return [
+            Epoch(
+                float(around.now.t[e]),
+                fixes.v_n[e],
+                float(fixes.height[e]),
+                float(fixes.latitude[e]),
+                R_att[e] if near[e] else None,
+                smooth[e],
+                float(smooth_height[e]),
+                c.velocity_body[e],
+                c.velocity_ned[e],
+                c.position_body[e],
+                c.position_ned[e],
+                c.along_velocity[e],
+                c.attitude_body[e],
+                c.attitude_ned[e],
+                bool(trusted[e]),
             )
-        return out
+            for e in range(len(fixes))
+        ]
 
 
 def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:

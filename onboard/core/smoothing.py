@@ -54,9 +54,11 @@ def mean_slope(offset: Array, window: float) -> Array:
     # estimate from these nodes is that over a span which is.
     resolved = max(window, 4.0 * (offset[1] - offset[0]))
     if window < resolved:
-        return mean_weights(offset, resolved) / resolved**2
+        limit: Array = mean_weights(offset, resolved) / resolved**2
+        return limit
     step = 0.02 * window
     above = mean_weights(offset, min(window + step, 2.0 * offset[-1]))
     below = mean_weights(offset, window - step)
     high = min(window + step, 2.0 * offset[-1])
-    return (above - below) / (high**2 - (window - step) ** 2)
+    slope: Array = (above - below) / (high**2 - (window - step) ** 2)
+    return slope

@@ -91,7 +91,7 @@ class NormalSums:
         )
 
     def shifted(self, theta: Array) -> NormalSums:
-        """Sums of the same rows about ``theta`` (m,): unknowns become ``theta' = theta - shift``."""
+        """Sums of the same rows with unknowns counted from ``theta`` (m,)."""
         return NormalSums(
             self.N.copy(),
             self.b - self.N @ theta,

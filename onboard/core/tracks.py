@@ -250,4 +250,5 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
         residual = np.abs(offset - line)
         scale = max(float(np.median(residual)), 1e-4)
         weight = 1.0 / np.maximum(1.0, residual / (2.0 * scale))
-    return t[0] + clock + line
+    even: Array = t[0] + clock + line
+    return even

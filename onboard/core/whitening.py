@@ -52,7 +52,7 @@ GATE_VELOCITY = 30.0
 GATE_HEIGHT = 30.0
 GATE_ATTITUDE = 60.0
 HEIGHT_PATIENCE_S = 3.0
-"""A height that stays off is a new reference (a jump of the geoid, a new satellite), not a fault."""
+"""A height that stays off is a new reference (a new satellite), not a fault."""
 ATTITUDE_PATIENCE_S = 5.0
 
 
@@ -135,7 +135,8 @@ def _angle(R: Array) -> Array:
     if s < 1e-9:
         return v
     c = 0.5 * (float(np.trace(R)) - 1.0)
-    return v * (np.arctan2(s, c) / s)
+    out: Array = v * (np.arctan2(s, c) / s)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -436,7 +437,7 @@ class WhiteningFilter:
         return False
 
     def _noise_rows(self, L: Array, back: Array, index: tuple[list[int], list[int]]) -> None:
-        """Expected square of what unit white noise on each accelerometer axis leaves in the rows."""
+        """What unit white noise on each accelerometer axis leaves in the rows, squared."""
         first, second = index
         picked = self._Xi[:, first] + self._Xi[:, second]
         W = np.linalg.solve(L, picked)
