@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from sitl.builtin import gps
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.effects import Effect
-from sitl.builtin.messages import Message
+from sitl.builtin.messages import Message, packed
 from sitl.builtin.trajectory import Environment
 from sitl.builtin.truth import CompassTruth, GpsTruth, ImuTruth, Truth
 from sitl.builtin.world import Piece, Vehicle
@@ -119,12 +119,15 @@ def run(spec: FlightSpec) -> Flight:
 def fly(spec: FlightSpec) -> list[tuple[int, bytes]]:
     """Flies it; (unix time in us, MAVLink 2 frame) in the order of sending."""
     packer = mav.MAVLink(None, srcSystem=1, srcComponent=1)
-    return [(unix_us, _packed(message, packer)) for unix_us, message in run(spec).messages]
+    return [(unix_us, packed(message, packer)) for unix_us, message in run(spec).messages]
 
 
 def fly_messages(spec: FlightSpec) -> Iterator[tuple[int, Message]]:
-    """Flies it; (unix time in us, pymavlink message), not packed and parsed again."""
-    yield from run(spec).messages
+    """Flies it; (unix time in us, pymavlink message), not parsed from bytes."""
+    packer = mav.MAVLink(None, srcSystem=1, srcComponent=1)
+    for unix_us, message in run(spec).messages:
+        packed(message, packer)  # gives the message its header: sender and sequence
+        yield unix_us, message
 
 
 def write_tlog(spec: FlightSpec, path: str | Path) -> dict[str, Any]:
@@ -168,7 +171,3 @@ def _rate(spec: FlightSpec, name: str) -> float:
     if name in DEFAULT_RATES:
         return DEFAULT_RATES[name]
     return spec.rates.get("RAW_IMU", DEFAULT_RATES["RAW_IMU"])
-
-
-def _packed(message: Message, packer: Message) -> bytes:
-    return bytes(message.pack(packer))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.builtin import messages, streams
+from sitl.builtin import commands, messages, streams
 from sitl.builtin.arming import refusals
 from sitl.builtin.attitude import STEP, AttitudeFilter
 from sitl.builtin.defaults import initial_parameters, truth_in_force
@@ -33,7 +33,8 @@ SENDING = 4e-4
 BETWEEN = 3e-5
 ALIGNMENT_BLOCKS = 25
 HEADING_EVERY = 5
-PARAMETERS_PER_LOOP = 2
+PARAMETERS_PER_SECOND = 200.0
+"""Speed of a parameter list, as on a fast telemetry link."""
 ASSUMED_GPS_DELAY = 0.1
 """What the attitude filter takes where GPS1_DELAY_MS is 0, s."""
 IDLE_DISARM = 10.0
@@ -61,7 +62,7 @@ class Link:
 
     schedule: streams.Schedule = field(default_factory=streams.Schedule)
     outbox: list[tuple[float, Message]] = field(default_factory=list)
-    listing: int | None = None
+    listing: float | None = None
 
 
 class Autopilot:
@@ -99,6 +100,7 @@ class Autopilot:
 
     def _boot(self, start: Start) -> None:
         """Power on: clock at zero, filters fresh, intervals from the stream rates."""
+        self._rebooting = False
         self.now = 0.0
         self._booted_at = self.clock
         self._loops = 0
@@ -108,6 +110,7 @@ class Autopilot:
         self.world = World(
             self.vehicle, self.truth, filters=self._filters(), dull=self._dull, start=start
         )
+        self.world.ensure(1.0)
         self.corrections = Corrections(self.parameters, len(self.truth.imus))
         self.ahrs = AttitudeFilter()
         self.barometer = Barometer(self.truth.seed)
@@ -126,9 +129,9 @@ class Autopilot:
 
     # -- links -----------------------------------------------------------------------------
 
-    def connect(self) -> Link:
+    def connect(self, link: Link | None = None) -> Link:
         """A new client; it gets a heartbeat and the stream rates of the parameters."""
-        link = Link()
+        link = link or Link()
         self.links.append(link)
         self._default_intervals(link)
         return link
@@ -141,26 +144,40 @@ class Autopilot:
         link.schedule = streams.Schedule()
         link.listing = None
         link.schedule.set("HEARTBEAT", 1000, self.now * 1e3)
+        for names in streams.STREAMS.values():
+            for name in names:
+                self.set_interval(link, name, self.default_interval(name))
+
+    def default_interval(self, name: str) -> int:
+        """Interval that the stream rates in the parameters give a message, ms; 0 is never."""
+        if name == "HEARTBEAT":
+            return 1000
         for stream, names in streams.STREAMS.items():
             rate = self.parameters[f"MAV1_{stream}"]
-            for name in names:
-                self._set_interval(link, name, round(1000.0 / rate) if rate > 0 else 0)
+            if name in names and rate > 0:
+                return round(1000.0 / rate)
+        return 0
 
     def set_rate(self, link: Link, name: str, rate_hz: float) -> bool:
         """Rate of a message on a link; 0 stops it.  False where ArduPilot refuses."""
-        return self._set_interval(link, name, round(1000.0 / rate_hz) if rate_hz > 0 else 0)
+        return self.set_interval(link, name, int(1000.0 / rate_hz) if rate_hz > 0 else 0)
 
     def request_parameters(self, link: Link) -> None:
         """As PARAM_REQUEST_LIST does."""
-        link.listing = 0
+        link.listing = 0.0
 
-    def _set_interval(self, link: Link, name: str, interval: int) -> bool:
+    def set_interval(self, link: Link, name: str, interval: int) -> bool:
+        """Interval of a message on a link, ms; 0 stops it.  False where ArduPilot refuses."""
         if interval and streams.too_fast(interval, self.parameters["SCHED_LOOP_RATE"]):
             return False
         link.schedule.set(name, interval, self.now * 1e3)
         return True
 
     # -- time ------------------------------------------------------------------------------
+
+    def receive(self, link: Link, message: Message) -> None:
+        """Takes a message that a client has sent."""
+        commands.receive(self, link, message)
 
     def advance(self, seconds: float) -> None:
         """Runs the main loop for so long; messages appear in the links' outboxes."""
@@ -169,6 +186,8 @@ class Autopilot:
             self._loop()
 
     def _loop(self) -> None:
+        if self._rebooting:
+            self._reboot()
         self._loops += 1
         self.now = self._loops * self._period
         self.clock = self._booted_at + self.now
@@ -181,14 +200,14 @@ class Autopilot:
         while (self._block + 1) * STEP <= self.now:
             self._filter_step()
         for value in self.parameters.poll(self.now):
-            self._say(value)
+            self.say(value)
         now_ms = self.now * 1e3
         instant: Instant | None = None
         for link in self.links:
             if link.schedule.next_due <= now_ms:
                 instant = instant or self.instant()
                 for name in link.schedule.due(now_ms):
-                    self._send(link, messages.BUILDERS[name](instant))
+                    self.send(link, messages.BUILDERS[name](instant))
             if link.listing is not None:
                 self._list(link)
 
@@ -285,11 +304,11 @@ class Autopilot:
         row = piece.index(self.now)
         reasons = [] if force else refusals(self.parameters, self.corrections, piece, row, gps=gps)
         for reason in reasons:
-            self._say(Notice(f"Arm: {reason}", 2))
+            self.say(Notice(f"Arm: {reason}", 2))
         if not reasons:
             self.armed = True
             self._armed_since = self.now
-            self._say(Notice("Arming motors", 6))
+            self.say(Notice("Arming motors", 6))
         return reasons
 
     def disarm(self) -> bool:
@@ -299,7 +318,7 @@ class Autopilot:
             return False
         if self.armed:
             self.armed = False
-            self._say(Notice("Disarming motors", 6))
+            self.say(Notice("Disarming motors", 6))
         return True
 
     def take_off(self, duration: float) -> bool:
@@ -329,13 +348,26 @@ class Autopilot:
         if self.armed and not self.flying and idle:
             self.disarm()
 
-    def reboot(self) -> bool:
-        """Starts afresh; refused while armed.  Parameters stay, everything else goes."""
+    def set_mode(self, mode: int) -> None:
+        """A mode asked for by a client; those that come home end a flight."""
+        if self.flying:
+            if mode in MODES[self.vehicle].stop:
+                self.land()
+        else:
+            self._mode = mode
+
+    def request_reboot(self) -> bool:
+        """Reboots in the next loop, so that the answer still goes out; refused while armed."""
         if self.armed:
             return False
-        start = self.world.at(self.now).trajectory.end
-        self._boot(start)
+        self._rebooting = True
         return True
+
+    def _reboot(self) -> None:
+        """Starts afresh: parameters stay, everything else goes."""
+        start = self.world.at(self.now).trajectory.end
+        self.parameters.count_boot()
+        self._boot(start)
 
     # -- parameters ------------------------------------------------------------------------
 
@@ -350,33 +382,38 @@ class Autopilot:
 
     def _list(self, link: Link) -> None:
         """The next few lines of a parameter list."""
-        for _ in range(PARAMETERS_PER_LOOP):
-            if link.listing is None or link.listing >= len(self.parameters):
+        if link.listing is None:
+            return
+        following = link.listing + PARAMETERS_PER_SECOND * self._period
+        for index in range(math.ceil(link.listing), math.ceil(following)):
+            if index >= len(self.parameters):
                 link.listing = None
                 return
-            self._send(link, _parameter(self.parameters.by_index(link.listing)))
-            link.listing += 1
+            self.send(link, parameter_message(self.parameters.by_index(index)))
+        link.listing = following
 
     # -- sending ---------------------------------------------------------------------------
 
-    def _send(self, link: Link, message: Message) -> None:
+    def send(self, link: Link, message: Message) -> None:
+        """Puts a message into a link's outbox; None is left out."""
         if message is not None:
             last = link.outbox[-1][0] if link.outbox else 0.0
             link.outbox.append((max(self.clock + SENDING, last + BETWEEN), message))
 
-    def _say(self, item: Value | Notice, link: Link | None = None) -> None:
+    def say(self, item: Value | Notice, link: Link | None = None) -> None:
         """Notices and broadcasts to everyone, answers to one link."""
         if isinstance(item, Notice):
             message = mav.MAVLink_statustext_message(item.severity, item.text.encode(), 0, 0)
         else:
-            message = _parameter(item)
+            message = parameter_message(item)
         everyone = link is None or isinstance(item, Notice) or item.broadcast
         for target in self.links if everyone else [link]:
             if target is not None:
-                self._send(target, message)
+                self.send(target, message)
 
 
-def _parameter(value: Value) -> Message:
+def parameter_message(value: Value) -> Message:
+    """PARAM_VALUE."""
     return mav.MAVLink_param_value_message(
         value.name.encode(), value.value, int(value.kind), value.count, value.index
     )

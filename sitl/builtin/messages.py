@@ -28,6 +28,13 @@ AUTOPILOT_CUSTOM = 1
 ARMED = 128
 
 
+def packed(message: Message, packer: Message) -> bytes:
+    """MAVLink 2 frame; pymavlink counts the sequence only in its own ``send``."""
+    frame = bytes(message.pack(packer))
+    packer.seq = (packer.seq + 1) % 256
+    return frame
+
+
 def truncated(x: float) -> int:
     """A C cast of float to int16: toward zero."""
     return max(-32768, min(32767, int(x)))

@@ -114,6 +114,11 @@ class ParameterStore:
             self._table[name].value = _cast(value, self._table[name].kind)
             self._on_change(name)
 
+    def count_boot(self) -> None:
+        """One more start; what was not yet saved is saved now, unannounced."""
+        self._table["STAT_BOOTCNT"].value += 1.0
+        self._saving.clear()
+
     def set(self, now: float, name: str, value: float) -> tuple[Value | Notice, ...]:
         """PARAM_SET; what has to be sent at once (a saved value follows from :meth:`poll`)."""
         parameter = self._table.get(name)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from sitl.builtin.effects import Effect, Vector3
 from sitl.builtin.trajectory import Environment
 
@@ -91,3 +93,22 @@ class Truth:
     attitude_errors: bool = True
     orientation: int = 0
     seed: int = 0
+
+
+def random_imus(seed: int, count: int = 1) -> tuple[ImuTruth, ...]:
+    """Accelerometers that are clearly off: scales by 1.2 to 3.5 %, offsets by 0.12 to 0.34 m/s^2.
+
+    Each number is off by more than an estimate may err, so that finding it says something; two
+    such accelerometers still agree well enough for arming.
+    """
+    rng = np.random.default_rng([seed, 61])
+
+    def off(low: float, high: float) -> Vector3:
+        x, y, z = rng.uniform(low, high, 3) * rng.choice([-1.0, 1.0], 3)
+        return (round(float(x), 4), round(float(y), 4), round(float(z), 4))
+
+    def imu() -> ImuTruth:
+        sx, sy, sz = off(0.012, 0.035)
+        return ImuTruth(scale=(1.0 + sx, 1.0 + sy, 1.0 + sz), offset=off(0.12, 0.34))
+
+    return tuple(imu() for _ in range(count))

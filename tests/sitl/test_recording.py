@@ -195,3 +195,11 @@ def test_every_effect_of_the_catalogue_has_its_name():
     names = [effect.name for effect in ALL]
     assert len(set(names)) == len(names) == 20
     assert all(names)
+
+
+def test_frames_are_counted_and_signed_with_the_sender():
+    frames = recording.fly(FlightSpec(duration=20.0))
+    parser = mav.MAVLink(None)
+    messages = [m for _, frame in frames for m in parser.parse_buffer(frame)]
+    assert [m.get_seq() for m in messages] == [i % 256 for i in range(len(messages))]
+    assert {(m.get_srcSystem(), m.get_srcComponent()) for m in messages} == {(1, 1)}
