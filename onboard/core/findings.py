@@ -1,0 +1,160 @@
+"""What a diagnosis says: frozen records behind ``onboard explain`` (effects.md's document).
+
+The words are the controlled vocabulary of effects; numbers are SI; times are seconds since the
+first inertial sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.result import Calibration, Estimate
+
+Array = NDArray[np.float64]
+
+
+class Verdict(Enum):
+    """The answer in one word."""
+
+    CLEAN = "clean"
+    EXPLAINED = "explained"
+    PARTLY_EXPLAINED = "partly_explained"
+    UNEXPLAINED = "unexplained"
+    INSUFFICIENT = "insufficient"
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """A place where the mismatch lives: interval, axis, flight regime, share of the whole."""
+
+    start_s: float
+    end_s: float
+    axis: str
+    regime: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One unknown of an effect: value, sigma, unit."""
+
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """Another effect that could stand for this one, and how much worse it does."""
+
+    name: str
+    delta_bic: float
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One accepted effect with its evidence.
+
+    ``parameters`` are the autopilot parameters to set and their values; ``cure`` says in words what
+    to do where no parameter helps.
+    """
+
+    name: str
+    unknowns: dict[str, Quantity]
+    share_of_mismatch: float
+    delta_bic: float
+    held_out_before: float
+    held_out_after: float
+    parameters: dict[str, float]
+    cure: str
+    where: tuple[Where, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    intervals: tuple[tuple[float, float], ...] = ()
+    formula: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Ambiguity:
+    """Effects that this flight cannot tell apart, and the manoeuvre that would."""
+
+    names: tuple[str, ...]
+    tell_apart: str
+
+
+@dataclass(frozen=True, slots=True)
+class NotTestable:
+    """An effect that this recording cannot speak about, and why."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One step of the ladder of models: what was added, and its residuals."""
+
+    name: str
+    whitened_rms: float
+    held_out: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """The residual of the six numbers and timing thresholds alone, and after all effects."""
+
+    detected: bool
+    whitened_rms_before: float
+    whitened_rms_after: float
+    p_value: float
+    velocity_rms_before: float
+    velocity_rms_after: float
+    held_out_before: float
+    held_out_after: float
+    where: tuple[Where, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Time series for plots, epochs in order: velocity residual NED (m/s) before and after.
+
+    ``t`` (n,) s since the first inertial sample; ``before`` and ``after`` (n, 3), NaN where a
+    component was not measured; ``refused`` (n,) True where the fix was not used.
+    """
+
+    t: Array
+    before: Array
+    after: Array
+    refused: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class RegimeResidual:
+    """Whitened residual in one flight regime, before and after."""
+
+    regime: str
+    seconds: float
+    rms_before: float
+    rms_after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Everything about one accelerometer's recording."""
+
+    imu: int
+    verdict: Verdict
+    calibration: Calibration
+    timing: dict[str, Estimate]
+    mismatch: Mismatch
+    effects: tuple[Effect, ...]
+    ambiguous: tuple[Ambiguity, ...]
+    not_testable: tuple[NotTestable, ...]
+    ladder: tuple[Rung, ...]
+    regimes: tuple[RegimeResidual, ...]
+    series: Series
+    note: str
+    curves: dict[str, tuple[Array, Array]] = field(default_factory=dict)
