@@ -77,9 +77,21 @@ class PushSettings(Section, frozen=True, kw_only=True):
 
 
 class EstimatorSettings(Section, frozen=True, kw_only=True):
-    """What the estimator is told beforehand; the rest it finds in the data."""
+    """What the estimator is told beforehand; the rest it finds in the data.
 
-    minimum_trusted_s: NotNegative = 60.0
+    ``window_s`` ends the trust window so long after its first opening (0: never);
+    ``satellites_min``, ``hdop_max`` and ``speed_accuracy_max`` (m/s) are what a fix must have.
+    ``buffer_s`` of flight are kept for second passes, older flight is forgotten with the time
+    constant ``memory_s``.
+    """
+
+    minimum_trusted_s: NotNegative = 45.0
+    window_s: NotNegative = 0.0
+    satellites_min: Annotated[int, Meta(ge=0, le=50)] = 6
+    hdop_max: Positive = 2.5
+    speed_accuracy_max: Positive = 1.5
+    buffer_s: Annotated[float, Meta(ge=60.0, le=3600.0)] = 600.0
+    memory_s: Annotated[float, Meta(ge=60.0)] = 1800.0
     save_every_s: Positive = 60.0
 
 
@@ -181,15 +193,23 @@ def load(path: Path) -> Configuration:
     Raises:
         ConfigurationError: it cannot be read, is not TOML, or has a wrong key or value.
     """
+    return from_mapping(read(path), source=str(path))
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Read a file as it stands, nothing checked but that it is TOML.
+
+    Raises:
+        ConfigurationError: it cannot be read or is not TOML.
+    """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path}: not UTF-8 text at byte {error.start}") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path}: not TOML: {error}") from None
-    return from_mapping(document, source=str(path))
 
 
 def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:

@@ -7,10 +7,11 @@ seconds since the epoch, ages and durations in seconds.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 
+Three: TypeAlias = tuple[float | None, float | None, float | None]
 SCHEMA = "onboard.state/1"
 
 
@@ -19,20 +20,29 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class MessageRate(Record, frozen=True, kw_only=True):
-    """One message type of the link: how many came, how often, and what was asked for."""
+    """One message type of the link: how many came, how often, what was asked for and granted."""
 
     count: int
     rate_hz: float
     wanted_hz: float | None = None
+    granted_hz: float | None = None
+    stream: str | None = None
+
+
+class EndpointView(Record, frozen=True, kw_only=True):
+    """One endpoint: its connection's state and the last error, empty if there was none."""
+
+    endpoint: str
+    state: str
+    reason: str
 
 
 class LinkView(Record, frozen=True, kw_only=True):
     """Health of the link and identity of the autopilot behind it."""
 
     state: str
-    endpoints: tuple[str, ...]
+    endpoints: tuple[EndpointView, ...]
     signed: bool
-    heartbeat_age_s: float | None
     system_id: int | None
     component_id: int | None
     autopilot: str | None
@@ -46,7 +56,9 @@ class LinkView(Record, frozen=True, kw_only=True):
 class TrustView(Record, frozen=True, kw_only=True):
     """The trust window: whether GPS may teach us now, and by name why not."""
 
+    phase: str
     open: bool
+    reason: str | None
     reasons: tuple[str, ...]
     windows: int
     trusted_s: float
@@ -56,8 +68,8 @@ class TrustView(Record, frozen=True, kw_only=True):
 class Number(Record, frozen=True, kw_only=True):
     """A value with its standard deviation, same unit."""
 
-    value: float
-    sigma: float
+    value: float | None
+    sigma: float | None
 
 
 class CoverageView(Record, frozen=True, kw_only=True):
@@ -69,17 +81,26 @@ class CoverageView(Record, frozen=True, kw_only=True):
     advice: str
 
 
-class ImuView(Record, frozen=True, kw_only=True):
-    """One accelerometer.
+class CalibrationView(Record, frozen=True, kw_only=True):
+    """The six numbers; the same object that ``onboard replay`` and ``explain`` write."""
 
-    ``calibration`` is the calibration object that replay and explain write too.
-    """
+    scale: Three
+    offset: Three
+    scale_sigma: Three
+    offset_sigma: Three
+    parameters: dict[str, float]
+    observable: tuple[bool, ...]
+    note: str
+
+
+class ImuView(Record, frozen=True, kw_only=True):
+    """One accelerometer; ``None`` where a number is not known (yet)."""
 
     imu: int
     status: str
-    calibration: dict[str, Any]
-    in_force_scale: tuple[float, float, float]
-    in_force_offset: tuple[float, float, float]
+    calibration: CalibrationView
+    in_force_scale: Three
+    in_force_offset: Three
     parameters_known: bool
     timing: dict[str, Number]
     trusted_s: float
@@ -91,32 +112,41 @@ class ImuView(Record, frozen=True, kw_only=True):
     velocity_rms_before_m_s: float | None
     velocity_rms_after_m_s: float | None
     coverage: CoverageView
-    certificate: dict[str, float] | None
-    dead_reckoning: dict[str, float] | None
+    certificate: dict[str, float | None] | None
+    dead_reckoning: dict[str, float | None] | None
     temperature: Number | None
-    advice: str
 
 
 class ChangeView(Record, frozen=True, kw_only=True):
-    """One parameter that would be (or was) written."""
+    """One parameter that would be written; ``kept``: not shown by the flight, stays as it is."""
 
     name: str
-    before: float | None
+    before: float
     after: float
-    sigma: float | None = None
+    sigma: float
+    kept: bool = False
 
 
 class ProposalView(Record, frozen=True, kw_only=True):
-    """What would be written for one accelerometer, and by name what still holds it back."""
+    """What would be written for one accelerometer.
+
+    ``held_back`` is every reason why it is not written now, by name, with a sentence; empty: it
+    is about to be.  ``approved``: a person has allowed it; ``rejected``: has refused it.
+    """
 
     imu: int
     changes: tuple[ChangeView, ...]
-    held_back: tuple[str, ...]
+    held_back: dict[str, str]
     approved: bool
+    rejected: bool
 
 
 class PushView(Record, frozen=True, kw_only=True):
-    """Policy, state of the transaction, proposals and the last outcome."""
+    """Policy, proposals, the transaction under way and the outcome of the last.
+
+    ``approval_needed``: some proposal waits for a person and for nothing else.
+    ``can_roll_back``: accelerometers whose last push is still in force.
+    """
 
     policy: str
     approval_required: bool
@@ -126,6 +156,25 @@ class PushView(Record, frozen=True, kw_only=True):
     proposals: tuple[ProposalView, ...]
     last_outcome: str | None
     can_roll_back: tuple[int, ...]
+
+
+class JournalLine(Record, frozen=True, kw_only=True):
+    """One fact of the journal for people; ``at`` is Unix time."""
+
+    at: float
+    kind: str
+    transaction: str
+    imu: int | None
+    text: str
+
+
+class Notice(Record, frozen=True, kw_only=True):
+    """Something that happened; ``at`` is Unix time, ``kind`` a name for programs."""
+
+    at: float
+    kind: str
+    text: str
+    warning: bool = False
 
 
 class Snapshot(Record, frozen=True, kw_only=True):
@@ -142,7 +191,8 @@ class Snapshot(Record, frozen=True, kw_only=True):
     imus: tuple[ImuView, ...]
     push: PushView
     parameters: dict[str, float]
-    journal: tuple[dict[str, Any], ...]
+    journal: tuple[JournalLine, ...]
+    notices: tuple[Notice, ...]
     counters: dict[str, int]
     diagnosis: dict[str, Any] | None = None
     schema: str = SCHEMA

@@ -13,9 +13,8 @@ def blank_snapshot(*, uptime_s: float = 0.0) -> Snapshot:
         mode_reason="",
         link=LinkView(
             state="connecting",
-            endpoints=("udpin:127.0.0.1:14550",),
+            endpoints=(),
             signed=False,
-            heartbeat_age_s=None,
             system_id=None,
             component_id=None,
             autopilot=None,
@@ -25,7 +24,15 @@ def blank_snapshot(*, uptime_s: float = 0.0) -> Snapshot:
             messages={},
             counters={},
         ),
-        trust=TrustView(open=False, reasons=(), windows=0, trusted_s=0.0, rejected={}),
+        trust=TrustView(
+            phase="waiting",
+            open=False,
+            reason=None,
+            reasons=(),
+            windows=0,
+            trusted_s=0.0,
+            rejected={},
+        ),
         imus=(),
         push=PushView(
             policy="landed",
@@ -39,5 +46,6 @@ def blank_snapshot(*, uptime_s: float = 0.0) -> Snapshot:
         ),
         parameters={},
         journal=(),
+        notices=(),
         counters={},
     )

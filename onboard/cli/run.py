@@ -1,0 +1,87 @@
+"""``onboard run``: the daemon, in the foreground."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from onboard.daemon.configuration import Configuration
+
+
+@click.command()
+@click.option("--config", metavar="F.toml", help="Configuration file.")
+@click.option(
+    "--endpoint",
+    "endpoints",
+    multiple=True,
+    metavar="E",
+    help="Where the autopilot is: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or "
+    "serial:DEVICE:BAUD; may be repeated.  Takes the place of [link] endpoints.",
+)
+@click.option("--state", metavar="DIR", help="Takes the place of [state] directory.")
+@click.option(
+    "--policy",
+    type=click.Choice(["never", "landed", "in_flight"]),
+    help="Takes the place of [push] policy.",
+)
+@click.option("--check", is_flag=True, help="Only read the configuration, and say what is wrong.")
+@click.option("--verbose", is_flag=True, help="Log every step.")
+def run(
+    config: str | None,
+    endpoints: tuple[str, ...],
+    state: str | None,
+    policy: str | None,
+    *,
+    check: bool,
+    verbose: bool,
+) -> None:
+    """Calibrate the autopilot's accelerometers while it flies.
+
+    Serves until SIGTERM or Ctrl-C.  Without --config the defaults listen on UDP port 14550 of
+    this machine and write only when the vehicle is disarmed.
+    """
+    from onboard.daemon import configuration, settings
+
+    document = {} if config is None else configuration.read(Path(config))
+    for section, key, value in (
+        ("link", "endpoints", list(endpoints)),
+        ("state", "directory", state),
+        ("push", "policy", policy),
+    ):
+        if value:
+            document[section] = {**document.get(section, {}), key: value}
+    chosen = configuration.from_mapping(document, source=config or "command line")
+    settings.endpoints(chosen.link)
+    if check:
+        click.echo("configuration is valid")
+        return
+    _log(verbose=verbose)
+    stopped_by = asyncio.run(_serve(chosen))
+    if stopped_by is signal.SIGINT:
+        sys.exit(130)
+
+
+async def _serve(configuration: Configuration) -> signal.Signals | None:
+    from onboard.daemon.service import Service
+
+    service = Service(configuration)
+    await service.run(handle_signals=True)
+    return service.stopped_by
+
+
+def _log(*, verbose: bool) -> None:
+    """To stderr; under systemd without time stamps, which the journal has itself."""
+    stamp = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
+    logging.basicConfig(
+        level=logging.DEBUG if verbose else logging.INFO,
+        format=f"{stamp}%(levelname)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )

@@ -1,0 +1,170 @@
+"""``onboard status``, ``approve``, ``reject``, ``rollback``, ``reset``: talk to the daemon."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import click
+
+from onboard.errors import LinkError, RefusedError, UsageError
+
+if TYPE_CHECKING:
+    from onboard.daemon.snapshot import Snapshot
+
+TIMEOUT_S = 10.0
+WATCH_INTERVAL_S = 1.0
+
+
+class Client:
+    """The daemon's control API, one short connection per request."""
+
+    def __init__(self, url: str, token: str | None) -> None:
+        parts = urlsplit(url)
+        if parts.scheme != "http" or not parts.hostname:
+            raise UsageError(f"{url}: expected http://HOST:PORT")
+        self._url = url
+        self._host = parts.hostname
+        self._port = parts.port or 80
+        self._token = token
+
+    def snapshot(self) -> Snapshot:
+        """What the daemon shows now.
+
+        Raises:
+            LinkError: nobody answers there, or it is not the daemon.
+        """
+        import msgspec
+
+        from onboard.daemon.snapshot import Snapshot
+
+        try:
+            return Snapshot.from_json(self._request("GET", "/api/snapshot", b""))
+        except msgspec.DecodeError as error:
+            raise LinkError(
+                f"{self._url}: not the onboard service of this version: {error}"
+            ) from None
+
+    def act(self, action: str, imus: tuple[int, ...]) -> str:
+        """Ask for a change; the daemon's sentence about what it did.
+
+        Raises:
+            RefusedError: the daemon will not, and says why.
+            LinkError: nobody answers there.
+        """
+        import msgspec
+
+        answer = self._request("POST", f"/api/{action}", msgspec.json.encode({"imus": imus}))
+        return str(msgspec.json.decode(answer)["done"])
+
+    def _request(self, method: str, path: str, body: bytes) -> bytes:
+        headers = {"Content-Type": "application/json"}
+        if self._token is not None:
+            headers["Authorization"] = f"Bearer {self._token}"
+        connection = http.client.HTTPConnection(self._host, self._port, timeout=TIMEOUT_S)
+        try:
+            connection.request(method, path, body, headers)
+            response = connection.getresponse()
+            answer = response.read()
+        except (OSError, http.client.HTTPException) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise LinkError(f"{self._url}: no onboard service answers: {reason}") from None
+        finally:
+            connection.close()
+        if response.status != 200:
+            raise RefusedError(_reason(response.status, answer))
+        return answer
+
+
+def _reason(status: int, answer: bytes) -> str:
+    import msgspec
+
+    try:
+        return str(msgspec.json.decode(answer)["error"]["message"])
+    except (msgspec.DecodeError, KeyError, TypeError):
+        return f"the service answered with status {status}"
+
+
+def _client(url: str | None, config: str | None, token_file: str | None) -> Client:
+    """Where the daemon listens: --url, else what its configuration says."""
+    from onboard.daemon import configuration
+
+    settings = configuration.Configuration()
+    if config is not None:
+        settings = configuration.load(Path(config))
+    token = os.environ.get("ONBOARD_TOKEN") or settings.http.token
+    if token_file is not None:
+        token = configuration.read_secret(token_file, key="--token-file")
+    elif token is None and settings.http.token_file is not None:
+        token = configuration.read_secret(settings.http.token_file, key="[http] token_file")
+    host = settings.http.address
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - replaced, not bound
+    bracketed = f"[{host}]" if ":" in host else host
+    return Client(url or f"http://{bracketed}:{settings.http.port}", token)
+
+
+def _where(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options that say which daemon is meant."""
+    command = click.option(
+        "--token-file", metavar="FILE", help="File with the token (or ONBOARD_TOKEN)."
+    )(command)
+    command = click.option(
+        "--config", metavar="F.toml", help="The daemon's configuration, for its address and token."
+    )(command)
+    return click.option(
+        "--url", metavar="URL", envvar="ONBOARD_URL", help="Default: http://127.0.0.1:8191."
+    )(command)
+
+
+@click.command()
+@_where
+@click.option("--watch", is_flag=True, help="Go on showing it until Ctrl-C.")
+@click.option("--json", "as_json", is_flag=True, help="The snapshot as JSON.")
+def status(
+    url: str | None, config: str | None, token_file: str | None, *, watch: bool, as_json: bool
+) -> None:
+    """Show what the running daemon sees, has learned, and would write."""
+    client = _client(url, config, token_file)
+    if as_json:
+        click.echo(client.snapshot().to_json())
+        return
+    from rich.console import Console
+
+    from onboard.cli.panel import panel
+
+    console = Console(highlight=False)
+    if not watch:
+        console.print(panel(client.snapshot()))
+        return
+    from rich.live import Live
+
+    with Live(panel(client.snapshot()), console=console, auto_refresh=False) as live:
+        while True:
+            time.sleep(WATCH_INTERVAL_S)
+            try:
+                live.update(panel(client.snapshot()), refresh=True)
+            except LinkError as error:  # the daemon restarts: go on watching
+                live.update(str(error), refresh=True)
+
+
+def _action(name: str, text: str) -> click.Command:
+    @click.command(name, help=text)
+    @_where
+    @click.argument("imus", nargs=-1, type=click.IntRange(1, 5), metavar="[IMU]...")
+    def command(
+        url: str | None, config: str | None, token_file: str | None, imus: tuple[int, ...]
+    ) -> None:
+        click.echo(_client(url, config, token_file).act(name, imus))
+
+    return command
+
+
+approve = _action("approve", "Allow the proposed parameters to be written (default: of every IMU).")
+reject = _action("reject", "Refuse the proposed parameters.")
+rollback = _action("rollback", "Write back the values that were in force before the last push.")
+reset = _action("reset", "Forget what was learned; the autopilot is left as it is.")

@@ -1,0 +1,359 @@
+"""The pusher: drives one transaction at a time, and remembers what earlier ones still ask for.
+
+Participant of the link.  The transaction is sans-IO (:mod:`onboard.push.transaction`); here are
+its clock, its journal and the decision to start one.  Journal entries are written where the
+transaction asks for them, in the loop: the order of writes is what the guarantee rests on, and
+a push is six writes after a flight.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import uuid
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from onboard.core.result import Calibration
+from onboard.daemon.notices import Notices
+from onboard.daemon.proposals import Proposals, named
+from onboard.daemon.snapshot import PushView
+from onboard.daemon.witness import Witness
+from onboard.errors import RefusedError, StateError
+from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
+from onboard.mavlink.dialect import COMPONENT, Message, mavlink
+from onboard.mavlink.parameter_messages import SendAction, parameter_event, parameter_message
+from onboard.push.entries import Entry, Planned, Purpose, Recovery, Result, Verdict, Watched
+from onboard.push.journal import Journal
+from onboard.push.plan import PushPlan
+from onboard.push.policy import Mode, VehicleCondition, ekf_healthy, moment
+from onboard.push.signals import (
+    Finished,
+    JournalFailed,
+    JournalWritten,
+    LinkLost,
+    Outcome,
+    Reason,
+    Rebooted,
+    Record,
+    TransactionEvent,
+    TransactionOutput,
+    VehicleReport,
+)
+from onboard.push.transaction import PushTransaction, TransactionSettings
+
+logger = logging.getLogger(__name__)
+
+PATIENCE = TransactionSettings()
+
+
+class Pusher:
+    """One per daemon; ``now`` is a monotonic clock, ``wall_clock`` Unix time for the journal.
+
+    Raises:
+        StateError: an open transaction in the journal has lost its plan.
+    """
+
+    names = ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")
+
+    def __init__(
+        self,
+        journal: Journal,
+        proposals: Proposals,
+        witness: Witness,
+        notices: Notices,
+        *,
+        wall_clock: Callable[[], float],
+    ) -> None:
+        self.counters: Counter[str] = Counter()
+        self.last_outcome: Outcome | None = None
+        self._journal = journal
+        self._proposals = proposals
+        self._witness = witness
+        self._notices = notices
+        self._wall_clock = wall_clock
+        self._codec = mavlink.MAVLink(None)
+        self._target: tuple[int, int] | None = None
+        self._transaction: PushTransaction | None = None
+        self._in_flight_since: float | None = None
+        self._report = VehicleReport()
+        self._condition = VehicleCondition()
+        self._outbox: list[Message] = []
+        self._recoveries: list[Recovery] = []
+        self._condemned: dict[int, Planned] = {}
+        self._closing = False
+        self.idle = asyncio.Event()
+        self.idle.set()
+        self._read_journal()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a transaction is under way."""
+        return self._transaction is not None
+
+    # What the link calls
+
+    def start(self, system: int, component: int, now: float) -> None:  # noqa: ARG002 - the participants' signature
+        """An autopilot is there (again): open transactions may be taken up."""
+        self._target = (system, component)
+        self._read_journal()
+
+    def feed(self, message: Message, now: float) -> Sequence[Message]:
+        """Take the autopilot's word on a parameter."""
+        if self._transaction is not None and self._target is not None:
+            system, component = self._target
+            event = parameter_event(
+                message,
+                system=system,
+                component=component,
+                own_system=system,
+                own_component=COMPONENT,
+            )
+            if event is not None:
+                self._tell(event, now)
+        return self._take_outbox()
+
+    def poll(self, now: float) -> Sequence[Message]:
+        """Let time pass for the transaction; messages that are due."""
+        if self._transaction is not None:
+            deadline = self._transaction.next_deadline()
+            if deadline is not None and deadline <= now:
+                self._act(self._transaction.tick(now), now)
+        return self._take_outbox()
+
+    def on_event(self, now: float, event: LinkEvent) -> None:
+        """What happens to the autopilot in the middle of a transaction."""
+        match event:
+            case AutopilotRebooted():
+                self._tell(Rebooted(), now)
+            case AutopilotSilent():
+                self._tell(LinkLost(), now)
+            case _:
+                pass
+
+    # What the service's tick calls
+
+    def consider(
+        self,
+        now: float,
+        *,
+        calibrations: Mapping[int, Calibration],
+        parameters: Mapping[str, float],
+        condition: VehicleCondition,
+    ) -> None:
+        """Propose anew; start what nothing holds back: unfinished business first."""
+        self._condition = condition
+        report = VehicleReport(
+            condition.armed,
+            None if condition.ekf_flags is None else ekf_healthy(condition.ekf_flags),
+        )
+        if report != self._report:
+            self._report = report
+            self._tell(report, now)
+        if self._target is None:
+            return
+        proposals = self._proposals
+        proposals.update(
+            now,
+            system_id=self._target[0],
+            calibrations=calibrations,
+            parameters=parameters,
+            condition=condition,
+        )
+        if self._transaction is not None or self._closing or proposals.forbidden:
+            return
+        if self._recoveries:
+            if not self._against_now():
+                self._resume(self._recoveries.pop(0), now)
+        elif self._condemned:
+            imu, planned = next(iter(self._condemned.items()))
+            if not self._against_now() and now >= proposals.standing(imu).not_before:
+                self._begin(planned.plan.reversed(), Purpose.ROLL_BACK, now)
+        else:
+            plan = proposals.ready()
+            if plan is not None:
+                self._begin(plan, Purpose.PUSH, now, in_flight=bool(condition.armed))
+
+    def judge(self, verdicts: Sequence[Watched]) -> None:
+        """What the flight after a push says; one that made it worse is taken back."""
+        for verdict in verdicts:
+            self._append(verdict)
+            self.counters[f"verdict_{verdict.verdict.value}"] += 1
+            self._notices.post(
+                f"push_{verdict.verdict.value}",
+                f"the flight after the push: {verdict.sentence}",
+                warning=verdict.verdict is Verdict.WORSE,
+            )
+        if verdicts:
+            self._read_journal()
+
+    def close(self) -> None:
+        """No new transaction from here on; one that has not finished stays open on disk."""
+        self._closing = True
+
+    # What people call
+
+    def roll_back(self, imus: tuple[int, ...], now: float) -> str:
+        """Write back what was in force before the last push of one accelerometer.
+
+        Raises:
+            RefusedError: there is no push in force, or now is not the moment.
+        """
+        in_force = {i: p for i in range(1, 6) if (p := self._journal.last_completed(i))}
+        chosen = [imu for imu in imus or in_force if imu in in_force]
+        if not chosen:
+            raise RefusedError("no push is in force that could be rolled back")
+        if len(chosen) > 1:
+            raise RefusedError(f"pushes of {named(chosen)} are in force: one at a time")
+        if self._target is None or self._proposals.forbidden:
+            raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
+        if self._transaction is not None or self._recoveries:
+            raise RefusedError("another transaction is under way")
+        against = self._against_now()
+        if against:
+            raise RefusedError(against)
+        imu = chosen[0]
+        self._proposals.refuse(imu, "a person rolled the last push back")
+        self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
+        return f"rolling back IMU {imu}"
+
+    def view(self) -> PushView:
+        """For the snapshot."""
+        proposals = self._proposals
+        state = "interrupted" if self._recoveries else "idle"
+        return PushView(
+            policy=proposals.settings.mode.value,
+            approval_required=proposals.approval,
+            approval_needed=any(
+                p.held_back.keys() == {"approval"} for p in proposals.current.values()
+            ),
+            state=state if self._transaction is None else self._transaction.state.value,
+            active_imu=None if self._transaction is None else self._transaction.plan.imu,
+            proposals=proposals.view(),
+            last_outcome=None if self.last_outcome is None else _told(self.last_outcome),
+            can_roll_back=tuple(i for i in range(1, 6) if self._journal.last_completed(i)),
+        )
+
+    # How
+
+    def _against_now(self) -> str:
+        """Objections to the way back at this moment; the policy 'never' is none."""
+        settings = replace(self._proposals.settings, mode=Mode.LANDED)
+        return "; ".join(refusal.sentence for refusal in moment(self._condition, settings))
+
+    def _read_journal(self) -> None:
+        """What earlier transactions still ask for: to be resumed, a verdict, or the way back."""
+        if self._transaction is None:
+            self._recoveries = list(self._journal.recover())
+        verdicts = {e.transaction: e for _, e in self._journal.entries if isinstance(e, Watched)}
+        self._condemned.clear()
+        for imu in range(1, 6):
+            planned = self._journal.last_completed(imu)
+            if planned is None:
+                self._witness.drop(imu)
+                continue
+            verdict = verdicts.get(planned.transaction)
+            if verdict is None:
+                self._witness.watch(planned, in_flight_since=self._in_flight_since)
+                continue
+            self._witness.drop(imu)
+            if verdict.verdict is Verdict.WORSE:
+                self._condemned[imu] = planned
+                self._proposals.refuse(imu, f"after the last push {verdict.sentence}")
+
+    def _begin(
+        self, plan: PushPlan, purpose: Purpose, now: float, *, in_flight: bool = False
+    ) -> None:
+        if self._target is None:
+            return
+        self.counters["pushes" if purpose is Purpose.PUSH else "roll_backs"] += 1
+        what = "push" if purpose is Purpose.PUSH else "roll-back"
+        self._notices.post(f"{purpose.value}_begins", f"IMU {plan.imu}: {what} begins")
+        self._in_flight_since = now if in_flight else None
+        self._run(
+            PushTransaction(
+                plan,
+                identifier=uuid.uuid4().hex,
+                system_id=self._target[0],
+                allow_armed=in_flight,
+                purpose=purpose,
+                settings=PATIENCE,
+            ),
+            now,
+        )
+
+    def _resume(self, recovery: Recovery, now: float) -> None:
+        if self._target is None:
+            return
+        self.counters["resumed"] += 1
+        text = f"IMU {recovery.plan.imu}: an interrupted push is taken up"
+        self._notices.post("push_resumed", text, warning=True)
+        self._in_flight_since = None
+        self._run(
+            PushTransaction.resume(recovery, system_id=self._target[0], settings=PATIENCE), now
+        )
+
+    def _run(self, transaction: PushTransaction, now: float) -> None:
+        self._transaction = transaction
+        self.idle.clear()
+        self._act(transaction.start(now), now)
+
+    def _tell(self, event: TransactionEvent, now: float) -> None:
+        if self._transaction is not None:
+            self._act(self._transaction.feed(event, now), now)
+
+    def _act(self, outputs: Sequence[TransactionOutput], now: float) -> None:
+        """Carry out the outputs in their order, what a journal entry leads to included."""
+        for output in outputs:
+            match output:
+                case Record(entry):
+                    self._tell(self._append(entry), now)
+                case Finished(outcome):
+                    self._finished(outcome, now)
+                case _ if isinstance(output, SendAction):
+                    system, component = self._target or (0, 0)
+                    self._outbox.append(
+                        parameter_message(output, self._codec, system=system, component=component)
+                    )
+
+    def _append(self, entry: Entry) -> JournalWritten | JournalFailed:
+        try:
+            self._journal.append(entry, self._wall_clock())
+        except StateError as error:
+            self.counters["journal_failed"] += 1
+            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            return JournalFailed(str(error))
+        return JournalWritten()
+
+    def _finished(self, outcome: Outcome, now: float) -> None:
+        self._transaction = None
+        self.idle.set()
+        self.last_outcome = outcome
+        self.counters[f"outcome_{outcome.result.value}"] += 1
+        self._notices.post(
+            f"{outcome.purpose.value}_{outcome.result.value}",
+            _told(outcome),
+            warning=outcome.result is not Result.COMPLETED,
+        )
+        imu = outcome.plan.imu
+        if outcome.result is Result.COMPLETED:
+            self._proposals.succeeded(imu)
+        else:
+            self._proposals.failed(imu, now)
+        condemned = self._condemned.get(imu)
+        if condemned is not None and outcome.reason is Reason.CHANGED_BY_OTHER:
+            sentence = "not taken back: somebody has changed the parameters since"
+            self._append(Watched(condemned.transaction, Verdict.SUPERSEDED, sentence))
+        self._read_journal()
+
+    def _take_outbox(self) -> Sequence[Message]:
+        messages, self._outbox = self._outbox, []
+        return messages
+
+
+def _told(outcome: Outcome) -> str:
+    """One sentence about how a transaction ended."""
+    what = "push" if outcome.purpose is Purpose.PUSH else "roll-back"
+    how = outcome.result.value.replace("_", " ")
+    return f"IMU {outcome.plan.imu}: {what} {how}: {outcome.sentence}"

@@ -1,0 +1,415 @@
+"""The service's life: startup, main loop, tick, shutdown, read from top to bottom.
+
+Everything runs on one loop: the link hands each message to :meth:`Service.on_message`, which
+learns from it at once; once a second :meth:`Service.on_tick` solves, judges, saves and tells.
+A tick that does not come is what the watchdog is for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import signal
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from onboard import __version__
+from onboard.core.result import Calibration
+from onboard.daemon import settings
+from onboard.daemon.condition import Observed
+from onboard.daemon.configuration import Configuration, read_secret
+from onboard.daemon.learner import Learner
+from onboard.daemon.notices import Notices
+from onboard.daemon.notify import Notifier
+from onboard.daemon.parameters import ParameterWatch
+from onboard.daemon.proposals import Proposals
+from onboard.daemon.pusher import Pusher
+from onboard.daemon.recording import RollingRecorder
+from onboard.daemon.snapshot import Snapshot
+from onboard.daemon.store import Store
+from onboard.daemon.traffic import Traffic
+from onboard.daemon.view import finite_values, imu_view, journal_view, link_view, trust_view
+from onboard.daemon.witness import Witness
+from onboard.errors import OnboardError, StateError
+from onboard.mavlink.autopilot import (
+    AutopilotFound,
+    AutopilotRebooted,
+    AutopilotReturned,
+    AutopilotSilent,
+    ConnectionChanged,
+    LinkEvent,
+)
+from onboard.mavlink.decode import Decoder
+from onboard.mavlink.dialect import Message
+from onboard.mavlink.link import Link
+from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.streams import Streams
+from onboard.mavlink.timesync import TimeSync
+from onboard.push.journal import Journal
+from onboard.push.policy import Mode
+
+if TYPE_CHECKING:
+    from onboard.daemon.control import ControlServer, Page
+
+logger = logging.getLogger(__name__)
+
+TICK_S = 1.0
+FINISH_PUSH_S = 8.0
+"""A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
+JOURNAL_SHOWN = 50
+
+
+class Service:
+    """One daemon for one vehicle.
+
+    Args:
+        configuration: what.
+        pages: further handlers for the HTTP server.
+        clock: monotonic time, s.
+        wall_clock: Unix time, s.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        *,
+        pages: Iterable[Page] = (),
+        clock: Callable[[], float] = time.monotonic,
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
+        self.configuration = configuration
+        self.phase = "starting"
+        self.mode = "active"
+        self.mode_reason = ""
+        self.stopped_by: signal.Signals | None = None
+        self.counters: Counter[str] = Counter()
+        self._pages = tuple(pages)
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._started = clock()
+        self._notifier = Notifier.from_environment()
+        self.ready = asyncio.Event()
+        self._stopping = asyncio.Event()
+        self._expecting: asyncio.Task[None] | None = None
+        self._observed = Observed()
+        self._calibrations: dict[int, Calibration] = {}
+        self._next_save = 0.0
+        self.notices = Notices(wall_clock)
+        link = configuration.link
+        endpoints = settings.endpoints(link)
+        signing = settings.signing(link, wall_clock)
+        estimator = settings.estimator_settings(configuration.estimator)
+        push = configuration.push
+        directory = configuration.state.path()
+        self._recorder = self._make_recorder(directory)
+        self._learner = Learner(Store(directory), estimator, self.notices)
+        self._witness = Witness(estimator)
+        self._proposals = Proposals(
+            settings.policy_settings(push), approval=push.approval, imus=push.imus
+        )
+        self._journal = Journal(directory / "journal.jsonl")
+        self._pusher = Pusher(
+            self._journal, self._proposals, self._witness, self.notices, wall_clock=wall_clock
+        )
+        self._parameters = ParameterWatch()
+        self._streams = Streams(settings.stream_requests(link.rates))
+        self._timesync = TimeSync()
+        self._traffic = Traffic()
+        self.link = Link(
+            endpoints,
+            system=link.system_id or None,
+            signing=signing,
+            recorder=self._recorder,
+            clock=clock,
+            wall_clock=wall_clock,
+        )
+        self.server: ControlServer | None = None
+
+    # Life
+
+    async def run(self, *, handle_signals: bool = False) -> None:
+        """Serve until :meth:`stop` or, with ``handle_signals``, SIGTERM or SIGINT.
+
+        Raises:
+            LinkError: no heartbeat in the time limit.
+            EndpointError: an endpoint cannot be opened.
+            ConfigurationError: the HTTP port is taken.
+        """
+        try:
+            with self._signals() if handle_signals else contextlib.nullcontext():
+                async with asyncio.TaskGroup() as group:
+                    await self._startup(group)
+                    await self._main_loop()
+                    await self._shutdown()
+        except BaseExceptionGroup as failures:
+            ours = failures.subgroup(OnboardError)
+            if ours is None:
+                raise
+            raise _first(ours) from None
+        finally:
+            await self._let_go()
+
+    def stop(self) -> None:
+        """Let :meth:`run` end in good order."""
+        self._stopping.set()
+
+    async def _startup(self, group: asyncio.TaskGroup) -> None:
+        self.link.subscribe_events(self.on_link_event)
+        self.link.subscribe(self.on_message, Decoder.names)
+        for participant in (self._streams, self._timesync, self._parameters, self._pusher):
+            self.link.attach(participant)
+        if self.configuration.http.enabled:
+            self.server = self._make_server()
+            await self.server.start()
+            logger.info("status and control at %s", self.server.url)
+        group.create_task(self.link.run(), name="link")
+        self._expecting = group.create_task(self._expect_autopilot(), name="expect autopilot")
+        self.phase = "searching"
+        self.ready.set()
+        self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
+
+    async def _main_loop(self) -> None:
+        due = self._clock() + TICK_S
+        while not self._stopping.is_set():
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(max(0.0, due - self._clock())):
+                    await self._stopping.wait()
+            await self.on_tick(self._clock())
+            # A tick that came late is not made up for: the watchdog would be told lies.
+            due = max(due + TICK_S, self._clock())
+
+    async def on_tick(self, now: float) -> None:
+        """Solve, judge, save, tell; the watchdog is fed last, when all that worked."""
+        condition = self._observed.condition(now)
+        self._traffic.tick(now)
+        self._calibrations = self._learner.calibrations()
+        self._pusher.judge(self._witness.tick(now, condition, self._learner.parameters))
+        if self._parameters.complete or self._pusher.busy:
+            self._pusher.consider(
+                now,
+                calibrations=self._calibrations,
+                parameters=self._parameters.values,
+                condition=condition,
+            )
+        if now >= self._next_save:
+            self._next_save = now + self.configuration.estimator.save_every_s
+            await self._save()
+        if self.server is not None:
+            self.server.publish()
+        self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
+
+    async def _shutdown(self) -> None:
+        """Stage by stage, each bounded: people, the push, the link, the sums."""
+        self.phase = "stopping"
+        self._notifier.send(STOPPING="1", STATUS="stopping")
+        if self._expecting is not None:
+            self._expecting.cancel()
+        self._pusher.close()
+        await self._finish_push()
+        if self.server is not None:
+            await self.server.stop()
+        self.link.close()
+        await self._save()
+
+    async def _finish_push(self) -> None:
+        try:
+            async with asyncio.timeout(FINISH_PUSH_S):
+                await self._pusher.idle.wait()
+        except TimeoutError:
+            logger.warning("a push is left open; it is finished or undone after the next start")
+
+    async def _let_go(self) -> None:
+        """Whatever way it ended: no port, file or lock stays behind."""
+        self.phase = "stopped"
+        self.link.close()
+        if self.server is not None:
+            await self.server.stop()
+        self._journal.close()
+
+    async def _expect_autopilot(self) -> None:
+        await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
+
+    # What comes in
+
+    def on_message(self, now: float, message: Message) -> None:
+        """Learn from one message of the link."""
+        source = self._learner.decoder.source
+        if source != (message.get_srcSystem(), message.get_srcComponent()):
+            return
+        self._traffic.count(message.get_type())
+        for sample in self._learner.take(message):
+            self._observed.feed(sample, now)
+            self._witness.feed(sample)
+
+    def on_link_event(self, now: float, event: LinkEvent) -> None:
+        """Take note of what happened to the autopilot or a connection."""
+        post = self.notices.post
+        match event:
+            case AutopilotFound(autopilot):
+                who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
+                post("autopilot_found", who)
+                self._learner.adopt(autopilot.system, autopilot.component)
+                self.phase = "running"
+                if not autopilot.is_ardupilot:
+                    self._advise_only(
+                        f"the autopilot is {autopilot.firmware_name}, not ArduPilot: "
+                        "nothing is written to it"
+                    )
+            case AutopilotSilent(silence):
+                self.counters["autopilot_silent"] += 1
+                self._observed.forget()
+                post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
+            case AutopilotReturned():
+                post("autopilot_returned", "heartbeats are back")
+            case AutopilotRebooted():
+                self.counters["autopilot_rebooted"] += 1
+                self._observed.forget()
+                post("autopilot_rebooted", "the autopilot rebooted", warning=True)
+            case ConnectionChanged(endpoint, state, reason):
+                logger.info("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
+        self._pusher.on_event(now, event)
+
+    def _advise_only(self, reason: str) -> None:
+        self.notices.post("advise_only", f"advise-only: {reason}", warning=True)
+        self.mode, self.mode_reason = "advise_only", reason
+        self._proposals.forbidden = reason
+        self._parameters.enabled = False
+
+    # What people ask for (onboard.daemon.control.Actions)
+
+    async def approve(self, imus: tuple[int, ...]) -> str:
+        """Allow the proposed push."""
+        return self._proposals.approve(imus)
+
+    async def reject(self, imus: tuple[int, ...]) -> str:
+        """Refuse the proposed push."""
+        return self._proposals.reject(imus)
+
+    async def rollback(self, imus: tuple[int, ...]) -> str:
+        """Write back what was in force before the last push."""
+        return self._pusher.roll_back(imus, self._clock())
+
+    async def reset(self, imus: tuple[int, ...]) -> str:
+        """Forget what was learned, of all accelerometers: they share the window."""
+        del imus
+        self._learner.reset()
+        self._proposals.forget()
+        self._calibrations = {}
+        self.counters["resets"] += 1
+        return "what was learned is forgotten; the autopilot's parameters are as they were"
+
+    def set_policy(self, mode: Mode) -> None:
+        """Change the push policy until the next start."""
+        self._proposals.settings = replace(self._proposals.settings, mode=mode)
+
+    def snapshot(self) -> Snapshot:
+        """Everything, now."""
+        now = self._clock()
+        learner = self._learner
+        return Snapshot(
+            version=__version__,
+            time=self._wall_clock(),
+            uptime_s=now - self._started,
+            phase=self.phase,
+            mode=self.mode,
+            mode_reason=self.mode_reason,
+            link=link_view(
+                self.link,
+                condition=self._observed.condition(now),
+                messages=self._traffic.view(self._streams.report()),
+                signed=self.configuration.link.signing_key_file is not None,
+            ),
+            trust=trust_view(learner.calibrator.trust, windows=learner.windows),
+            imus=tuple(imu_view(c) for c in self._calibrations.values()),
+            push=self._pusher.view(),
+            parameters=finite_values(self._parameters.values),
+            journal=journal_view(self._journal.entries[-JOURNAL_SHOWN:]),
+            notices=self.notices.kept,
+            counters=self._all_counters(),
+        )
+
+    # How
+
+    async def _save(self) -> None:
+        try:
+            await self._learner.save(self._wall_clock())
+        except StateError as error:
+            self.counters["save_failed"] += 1
+            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+
+    def _all_counters(self) -> dict[str, int]:
+        total = Counter(self.counters)
+        for part in (self._learner, self._parameters, self._proposals, self._pusher):
+            total.update(part.counters)
+        total.update({f"refused {name}": n for name, n in self._learner.decoder.refused.items()})
+        total["timesync_rejected"] = self._timesync.rejected
+        total["journal_damaged"] = self._journal.damaged
+        if self._recorder is not None:
+            total["recorded_frames"] = self._recorder.frames
+            total["recording_dropped"] = self._recorder.dropped
+        return dict(total)
+
+    def _sentence(self) -> str:
+        """One line for systemctl status."""
+        if self.link.autopilot is None:
+            return "waiting for an autopilot's heartbeat"
+        imus = ", ".join(
+            f"IMU {imu} {c.status.value} {c.coverage.percent:.0f} %"
+            for imu, c in self._calibrations.items()
+        )
+        trust = "trusted" if self._learner.calibrator.trust.is_open else "not trusted"
+        return f"{self.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}"
+
+    def _make_recorder(self, state: Path) -> Recorder | None:
+        recording = self.configuration.recording
+        if not recording.enabled:
+            return None
+        given = recording.directory
+        return RollingRecorder(
+            Path(given).expanduser() if given else state / "recordings",
+            keep=recording.keep_files,
+            file_bytes=int(recording.file_size_mb * 1e6),
+            wall_clock=self._wall_clock,
+        )
+
+    def _make_server(self) -> ControlServer:
+        from onboard.daemon.control import ControlServer  # noqa: PLC0415 - not all want its 15 MB
+
+        http = self.configuration.http
+        token = http.token
+        if http.token_file is not None:
+            token = read_secret(http.token_file, key="[http] token_file")
+        return ControlServer(
+            self, address=http.address, port=http.port, token=token, pages=self._pages
+        )
+
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        loop = asyncio.get_running_loop()
+        task = asyncio.current_task()
+
+        def on_signal(number: signal.Signals) -> None:
+            if self.stopped_by is not None and task is not None:
+                task.cancel()  # asked twice: no more stages
+            self.stopped_by = number
+            self.stop()
+
+        handled = (signal.SIGTERM, signal.SIGINT)
+        for number in handled:
+            loop.add_signal_handler(number, on_signal, number)
+        try:
+            yield
+        finally:
+            for number in handled:
+                loop.remove_signal_handler(number)
+
+
+def _first(failures: BaseExceptionGroup[OnboardError]) -> OnboardError:
+    """The error that a person is to read, of a group that may be nested."""
+    error = failures.exceptions[0]
+    return _first(error) if isinstance(error, BaseExceptionGroup) else error

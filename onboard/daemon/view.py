@@ -1,0 +1,191 @@
+"""Records of the core, the link and the push turned into those of the snapshot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from onboard.core.accelerometer import parameter_names
+from onboard.core.result import SIX_NAMES, Calibration, Estimate
+from onboard.core.trust import TrustWindow
+from onboard.daemon.snapshot import (
+    CalibrationView,
+    CoverageView,
+    EndpointView,
+    ImuView,
+    JournalLine,
+    LinkView,
+    MessageRate,
+    Number,
+    Three,
+    TrustView,
+)
+from onboard.mavlink.link import Link
+from onboard.push.entries import Closed, Entry, Planned, Purpose, Undoing, Watched, Writing
+from onboard.push.policy import VehicleCondition
+
+
+def imu_view(calibration: Calibration) -> ImuView:
+    """One accelerometer's answer for people; what is not finite becomes None."""
+    c = calibration
+    certificate = c.certificate
+    drift = c.dead_reckoning
+    names = parameter_names(c.imu).six
+    values = c.scale + c.offset
+    return ImuView(
+        imu=c.imu,
+        status=c.status.value,
+        calibration=CalibrationView(
+            scale=_three(c.scale),
+            offset=_three(c.offset),
+            scale_sigma=_three(c.scale_sigma),
+            offset_sigma=_three(c.offset_sigma),
+            parameters={
+                name: value
+                for name, value in zip(names, values, strict=True)
+                if math.isfinite(value)
+            },
+            observable=c.observable,
+            note=c.note,
+        ),
+        in_force_scale=_three(c.in_force_scale),
+        in_force_offset=_three(c.in_force_offset),
+        parameters_known=c.parameters_known,
+        timing={name: _number(estimate) for name, estimate in c.timing.items()},
+        trusted_s=c.trusted_s,
+        rejected=c.rejected,
+        whitened_rms_before=_finite(c.whitened_rms_before),
+        whitened_rms_after=_finite(c.whitened_rms_after),
+        held_out_before=_finite(c.held_out_before),
+        held_out_after=_finite(c.held_out_after),
+        velocity_rms_before_m_s=_finite(c.velocity_rms_before),
+        velocity_rms_after_m_s=_finite(c.velocity_rms_after),
+        coverage=CoverageView(
+            percent=c.coverage.percent,
+            per_parameter=dict(zip(SIX_NAMES, c.coverage.per_parameter, strict=True)),
+            weakest=c.coverage.weakest,
+            advice=c.coverage.advice,
+        ),
+        certificate=None
+        if certificate is None
+        else {
+            "window_s": _finite(certificate.window_s),
+            "residual_l2": _finite(certificate.residual_l2),
+            "acceleration_bound_m_s2": _finite(certificate.acceleration_bound),
+            "uniform_bound_m_s": _finite(certificate.uniform_bound),
+            "observed_max_m_s": _finite(certificate.observed_max),
+        },
+        dead_reckoning=None
+        if drift is None
+        else {
+            "horizon_s": _finite(drift.horizon_s),
+            "drift_before_m_s": _finite(drift.drift_before),
+            "drift_after_m_s": _finite(drift.drift_after),
+            "windows": drift.windows,
+        },
+        temperature=None if c.temperature is None else _number(c.temperature),
+    )
+
+
+def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...]:
+    """The journal for people, oldest first; read-backs go without saying."""
+    imus: dict[str, int] = {}
+    shown = []
+    for at, entry in lines:
+        match entry:
+            case Planned(transaction, plan, purpose):
+                imus[transaction] = plan.imu
+                changed = sum(change.differs for change in plan.changes)
+                what = "push" if purpose is Purpose.PUSH else "roll-back"
+                text = f"{what} of {changed} values begins"
+            case Writing(name=name, before=before, value=value, undo=undo):
+                text = f"{name}: {before:.6g} -> {value:.6g}{' (undo)' if undo else ''}"
+            case Undoing(sentence=sentence):
+                text = f"undoing: {sentence}"
+            case Closed(result=result, sentence=sentence):
+                text = f"{result.value.replace('_', ' ')}: {sentence}"
+            case Watched(verdict=verdict, sentence=sentence):
+                text = f"flight after the push: {verdict.value}: {sentence}"
+            case _:
+                continue
+        shown.append(
+            JournalLine(
+                at=at,
+                kind=type(entry).__name__.lower(),
+                transaction=entry.transaction,
+                imu=imus.get(entry.transaction),
+                text=text,
+            )
+        )
+    return tuple(shown)
+
+
+def trust_view(window: TrustWindow, *, windows: int) -> TrustView:
+    """The trust window; ``windows``: how often it has opened."""
+    return TrustView(
+        phase=window.phase.value,
+        open=window.is_open,
+        reason=window.reason.value if window.reason is not None else None,
+        reasons=tuple(reason.value for reason in window.reasons),
+        windows=windows,
+        trusted_s=window.trusted_s,
+        rejected=window.rejected,
+    )
+
+
+def link_view(
+    link: Link, *, condition: VehicleCondition, messages: dict[str, MessageRate], signed: bool
+) -> LinkView:
+    """Health of the link, and who is behind it."""
+    autopilot = link.autopilot
+    counters: dict[str, int] = {
+        "standby": link.standby,
+        "echoed": link.echoed,
+        "reboots": link.boot_clock.reboots,
+    }
+    for connection in link.connections:
+        statistics = connection.codec.statistics
+        for name in ("frames", "bad_bytes", "bad_frames", "bad_signatures", "unknown", "sent"):
+            counters[name] = counters.get(name, 0) + getattr(statistics, name)
+        for source in statistics.sources.values():
+            for name in ("lost", "late", "duplicated"):
+                counters[name] = counters.get(name, 0) + getattr(source, name)
+        counters["dropped"] = counters.get("dropped", 0) + connection.dropped
+    return LinkView(
+        state=link.state.value,
+        endpoints=tuple(
+            EndpointView(
+                endpoint=str(connection.endpoint),
+                state=connection.state.value,
+                reason=connection.last_error,
+            )
+            for connection in link.connections
+        ),
+        signed=signed,
+        system_id=autopilot.system if autopilot else None,
+        component_id=autopilot.component if autopilot else None,
+        autopilot=autopilot.firmware_name if autopilot else None,
+        vehicle=autopilot.vehicle if autopilot else None,
+        armed=condition.armed,
+        landed=condition.landed,
+        messages=messages,
+        counters=counters,
+    )
+
+
+def finite_values(values: Mapping[str, float]) -> dict[str, float]:
+    """The numbers that JSON can carry."""
+    return {name: value for name, value in values.items() if math.isfinite(value)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _three(values: tuple[float, float, float]) -> Three:
+    x, y, z = values
+    return (_finite(x), _finite(y), _finite(z))
+
+
+def _number(estimate: Estimate) -> Number:
+    return Number(value=_finite(estimate.value), sigma=_finite(estimate.sigma))
