@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+INTERRUPTED = 130
+
 if TYPE_CHECKING:
     from onboard.daemon.configuration import Configuration
 
@@ -66,7 +68,7 @@ def run(
     _log(verbose=verbose)
     stopped_by = asyncio.run(_serve(chosen))
     if stopped_by is signal.SIGINT:
-        sys.exit(130)
+        click.get_current_context().exit(INTERRUPTED)
 
 
 async def _serve(configuration: Configuration) -> signal.Signals | None:

@@ -1,0 +1,61 @@
+"""Recordings of bounded size: rolled over whole frames, the oldest deleted."""
+
+import asyncio
+import os
+
+import pytest
+from conftest import until
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from onboard.daemon.recording import RollingRecorder
+from onboard.errors import StateError
+
+FRAME = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3).pack(mavlink.MAVLink(None))
+
+
+async def record(directory, *, frames, file_bytes, keep, per_flush, monkeypatch):
+    monkeypatch.setattr("onboard.mavlink.recorder.FLUSH_INTERVAL_S", 0.001)
+    seconds = iter(range(1, 1_000_000))
+    recorder = RollingRecorder(
+        directory, keep=keep, file_bytes=file_bytes, wall_clock=lambda: float(next(seconds))
+    )
+    task = asyncio.create_task(recorder.run())
+    for _ in range(frames // per_flush):
+        for _ in range(per_flush):
+            recorder.write(1000.0, FRAME)
+        await until(lambda: not recorder._pending)
+        await asyncio.sleep(0.005)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    return sorted(directory.glob("*.tlog"))
+
+
+async def test_files_roll_over_between_frames_and_nothing_is_lost(tmp_path, monkeypatch):
+    line = 8 + len(FRAME)
+    files = await record(
+        tmp_path, frames=60, file_bytes=10 * line, keep=100, per_flush=5, monkeypatch=monkeypatch
+    )
+    sizes = [file.stat().st_size for file in files]
+    assert sum(sizes) == 60 * line
+    assert all(size % line == 0 for size in sizes)
+    assert len([size for size in sizes if size]) >= 5
+
+
+async def test_only_the_newest_are_kept(tmp_path, monkeypatch):
+    old = tmp_path / "19990101-000000-000.tlog"
+    old.write_bytes(b"x")
+    os.utime(old, (0, 0))
+    other = tmp_path / "notes.txt"
+    other.write_bytes(b"x")
+    files = await record(
+        tmp_path, frames=40, file_bytes=100, keep=3, per_flush=4, monkeypatch=monkeypatch
+    )
+    assert 1 <= len(files) <= 3
+    assert old not in files
+    assert other.exists()
+
+
+async def test_a_directory_that_cannot_be_made_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StateError):
+        RollingRecorder(tmp_path / "file" / "x", keep=1, file_bytes=1)
