@@ -233,6 +233,7 @@ class Pusher:
             proposals=proposals.view(),
             last_outcome=None if self.last_outcome is None else _told(self.last_outcome),
             can_roll_back=tuple(i for i in range(1, 6) if self._journal.last_completed(i)),
+            judged=tuple(self._witness.judged.values()),
         )
 
     # How

@@ -141,6 +141,18 @@ class ProposalView(Record, frozen=True, kw_only=True):
     rejected: bool
 
 
+class JudgedView(Record, frozen=True, kw_only=True):
+    """What the flight after the last push said; residuals with the parameters then in force."""
+
+    imu: int
+    verdict: str
+    sentence: str
+    held_out_before_push: float | None
+    held_out_after_push: float | None
+    velocity_rms_before_push_m_s: float | None
+    velocity_rms_after_push_m_s: float | None
+
+
 class PushView(Record, frozen=True, kw_only=True):
     """Policy, proposals, the transaction under way and the outcome of the last.
 
@@ -156,6 +168,7 @@ class PushView(Record, frozen=True, kw_only=True):
     proposals: tuple[ProposalView, ...]
     last_outcome: str | None
     can_roll_back: tuple[int, ...]
+    judged: tuple[JudgedView, ...] = ()
 
 
 class JournalLine(Record, frozen=True, kw_only=True):

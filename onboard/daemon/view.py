@@ -54,12 +54,12 @@ def imu_view(calibration: Calibration) -> ImuView:
         timing={name: _number(estimate) for name, estimate in c.timing.items()},
         trusted_s=c.trusted_s,
         rejected=c.rejected,
-        whitened_rms_before=_finite(c.whitened_rms_before),
-        whitened_rms_after=_finite(c.whitened_rms_after),
-        held_out_before=_finite(c.held_out_before),
-        held_out_after=_finite(c.held_out_after),
-        velocity_rms_before_m_s=_finite(c.velocity_rms_before),
-        velocity_rms_after_m_s=_finite(c.velocity_rms_after),
+        whitened_rms_before=finite(c.whitened_rms_before),
+        whitened_rms_after=finite(c.whitened_rms_after),
+        held_out_before=finite(c.held_out_before),
+        held_out_after=finite(c.held_out_after),
+        velocity_rms_before_m_s=finite(c.velocity_rms_before),
+        velocity_rms_after_m_s=finite(c.velocity_rms_after),
         coverage=CoverageView(
             percent=c.coverage.percent,
             per_parameter=dict(zip(SIX_NAMES, c.coverage.per_parameter, strict=True)),
@@ -69,18 +69,18 @@ def imu_view(calibration: Calibration) -> ImuView:
         certificate=None
         if certificate is None
         else {
-            "window_s": _finite(certificate.window_s),
-            "residual_l2": _finite(certificate.residual_l2),
-            "acceleration_bound_m_s2": _finite(certificate.acceleration_bound),
-            "uniform_bound_m_s": _finite(certificate.uniform_bound),
-            "observed_max_m_s": _finite(certificate.observed_max),
+            "window_s": finite(certificate.window_s),
+            "residual_l2": finite(certificate.residual_l2),
+            "acceleration_bound_m_s2": finite(certificate.acceleration_bound),
+            "uniform_bound_m_s": finite(certificate.uniform_bound),
+            "observed_max_m_s": finite(certificate.observed_max),
         },
         dead_reckoning=None
         if drift is None
         else {
-            "horizon_s": _finite(drift.horizon_s),
-            "drift_before_m_s": _finite(drift.drift_before),
-            "drift_after_m_s": _finite(drift.drift_after),
+            "horizon_s": finite(drift.horizon_s),
+            "drift_before_m_s": finite(drift.drift_before),
+            "drift_after_m_s": finite(drift.drift_after),
             "windows": drift.windows,
         },
         temperature=None if c.temperature is None else _number(c.temperature),
@@ -178,14 +178,15 @@ def finite_values(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if math.isfinite(value)}
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """The number, or None where there is none."""
     return value if math.isfinite(value) else None
 
 
 def _three(values: tuple[float, float, float]) -> Three:
     x, y, z = values
-    return (_finite(x), _finite(y), _finite(z))
+    return (finite(x), finite(y), finite(z))
 
 
 def _number(estimate: Estimate) -> Number:
-    return Number(value=_finite(estimate.value), sigma=_finite(estimate.sigma))
+    return Number(value=finite(estimate.value), sigma=finite(estimate.sigma))

@@ -13,6 +13,8 @@ from onboard.core.calibrator import Calibrator
 from onboard.core.result import Calibration
 from onboard.core.samples import ParameterValue, Sample
 from onboard.core.settings import EstimatorSettings
+from onboard.daemon.snapshot import JudgedView
+from onboard.daemon.view import finite
 from onboard.push.entries import Planned, Watched
 from onboard.push.policy import VehicleCondition, ekf_healthy
 from onboard.push.signals import VehicleReport
@@ -29,7 +31,8 @@ class Witness:
         self._calibrator: Calibrator | None = None
         self._armed = False
         self._in_flight: set[int] = set()
-        self.seen: dict[int, Calibration] = {}
+        self._flown: dict[int, Calibration] = {}
+        self.judged: dict[int, JudgedView] = {}
 
     def watch(self, pushed: Planned, *, in_flight_since: float | None = None) -> None:
         """Wait for the flight that judges this push."""
@@ -82,12 +85,27 @@ class Witness:
                 verdict = self._judge(imu, watch)
             if verdict is not None:
                 found.append(verdict)
+                self.judged[imu] = self._account(imu, watch, verdict)
                 self.drop(imu)
         return tuple(found)
 
     def _judge(self, imu: int, watch: PushWatch) -> Watched | None:
         if self._calibrator is None or imu not in self._calibrator.imus:
             return None
-        flown = self._calibrator.calibration(imu)
-        self.seen[imu] = flown
+        flown = self._flown[imu] = self._calibrator.calibration(imu)
         return watch.judge(flown)
+
+    def _account(self, imu: int, watch: PushWatch, verdict: Watched) -> JudgedView:
+        baseline = watch.plan.baseline
+        flown = self._flown.pop(imu, None)
+        return JudgedView(
+            imu=imu,
+            verdict=verdict.verdict.value,
+            sentence=verdict.sentence,
+            held_out_before_push=baseline.held_out_before,
+            held_out_after_push=None if flown is None else finite(flown.held_out_before),
+            velocity_rms_before_push_m_s=baseline.velocity_rms_before,
+            velocity_rms_after_push_m_s=None
+            if flown is None
+            else finite(flown.velocity_rms_before),
+        )

@@ -277,6 +277,7 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
             in_force_offset=tuple(in_force(vehicle)[3:]),
             held_out_before=9.0,
         )
+        service._witness._flown[1] = flown
         service._witness._judge = lambda _imu, watch: watch.judge(flown)
         vehicle.armed, vehicle.landed = True, False
         await until(lambda: service.snapshot().link.armed)
@@ -285,6 +286,9 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
         assert in_force(vehicle) == before
         kinds = [notice.kind for notice in service.snapshot().notices]
         assert "push_worse" in kinds
+        judged = service.snapshot().push.judged[0]
+        assert (judged.verdict, judged.held_out_before_push) == ("worse", 4.0)
+        assert judged.held_out_after_push == 9.0
         await until(lambda: "refused" in held_back(service))
 
 

@@ -1,0 +1,171 @@
+"""What the whole daemon costs: CPU and memory on a live stream, and over a simulated day.
+
+The load is the heaviest that it is made for: RAW_IMU at 200 Hz, ATTITUDE at 50 Hz, GPS at 10 Hz and
+the status messages, from a flight of the simulated autopilot, each message in its own datagram as
+it falls due.  ``python -m benchmarks.daemon --live S --day H`` chooses how long.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import multiprocessing
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from sitl.recording import FlightSpec, fly
+
+from onboard.daemon.configuration import from_mapping
+from onboard.daemon.service import Service
+from onboard.mavlink.autopilot import Autopilot, AutopilotFound
+from onboard.mavlink.codec import Codec
+from onboard.mavlink.dialect import Message
+
+RATES = {"RAW_IMU": 200.0, "ATTITUDE": 50.0, "GPS_RAW_INT": 10.0}
+DAY_RATES = {"RAW_IMU": 50.0, "ATTITUDE": 25.0, "GPS_RAW_INT": 5.0}
+LIVE_S = 90.0
+WARM_UP_S = 20.0
+DAY_H = 1.0
+FLIGHT_S = 300.0
+TICKS = os.sysconf("SC_CLK_TCK")
+PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 2**20
+EXECUTE = "from onboard.cli.main import main; main()"
+
+
+def play(port: int, seconds: float) -> None:
+    """In a process of its own: the flight in real time, a datagram per message."""
+    frames = fly(FlightSpec(vehicle="plane", duration=seconds, rates=RATES))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        began, first = time.monotonic(), frames[0][0]
+        for stamp, frame in frames:
+            wait = began + 1e-6 * (stamp - first) - time.monotonic()
+            if wait > 0.0:
+                time.sleep(wait)
+            sender.send(frame)
+
+
+def cpu_and_memory(pid: int) -> tuple[float, float]:
+    """CPU seconds used so far and resident memory (MB) of a process."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return (int(fields[11]) + int(fields[12])) / TICKS, pages * PAGE_MB
+
+
+def live(seconds: float) -> tuple[float, float]:
+    """CPU share and memory (MB) of ``onboard run`` under the load, after warming up."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with tempfile.TemporaryDirectory() as folder:
+        config = Path(folder) / "daemon.toml"
+        config.write_text(
+            f'[link]\nendpoints = ["udpin:127.0.0.1:{port}"]\nheartbeat_limit_s = 120\n'
+            f'[state]\ndirectory = "{folder}/state"\n[http]\nport = 0\n'
+        )
+        daemon = subprocess.Popen(  # noqa: S603 - our own program
+            [sys.executable, "-c", EXECUTE, "run", "--config", str(config)],
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        )
+        autopilot = multiprocessing.get_context("spawn").Process(
+            target=play, args=(port, seconds + WARM_UP_S + 10.0)
+        )
+        autopilot.start()
+        try:
+            for line in daemon.stderr or ():
+                if "ardupilot" in line:
+                    break
+            time.sleep(WARM_UP_S)
+            began, (before, _) = time.monotonic(), cpu_and_memory(daemon.pid)
+            time.sleep(seconds)
+            after, memory = cpu_and_memory(daemon.pid)
+            share = (after - before) / (time.monotonic() - began)
+        finally:
+            autopilot.kill()
+            daemon.terminate()
+            daemon.communicate()
+            autopilot.join()
+    return share, memory
+
+
+def decoded(spec: FlightSpec) -> list[tuple[float, Message]]:
+    """(seconds from the start, message) of a flight, as the link would hand them on."""
+    codec = Codec()
+    frames = fly(spec)
+    first = frames[0][0]
+    return [
+        (1e-6 * (stamp - first), frame.message)
+        for stamp, raw in frames
+        for frame in codec.feed(raw)
+        if frame.message is not None
+    ]
+
+
+def later(message: Message, seconds: float) -> None:
+    """Move the message's stamp on the boot clock."""
+    if hasattr(message, "time_usec"):
+        message.time_usec += round(seconds * 1e6)
+    if hasattr(message, "time_boot_ms"):
+        message.time_boot_ms += round(seconds * 1e3)
+
+
+async def day(hours: float) -> tuple[float, float, float]:
+    """CPU seconds per simulated second, memory (MB) after a fifth of the time and at its end.
+
+    The same flight again and again on one boot clock, in this process, without a link.
+    """
+    messages = decoded(FlightSpec(vehicle="plane", duration=FLIGHT_S, rates=DAY_RATES))
+    now = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        document = {"state": {"directory": folder}, "http": {"enabled": False}}
+        service = Service(from_mapping(document, source="benchmark"), clock=lambda: now)
+        service.on_link_event(now, AutopilotFound(Autopilot(1, 1, 1, 3)))
+        flights = max(5, round(hours * 3600.0 / FLIGHT_S))
+        early = 0.0
+        began = time.process_time()
+        for number in range(flights):
+            next_tick = number * FLIGHT_S
+            for t, message in messages:
+                now = number * FLIGHT_S + t
+                service.on_message(now, message)
+                later(message, FLIGHT_S)
+                if now >= next_tick:
+                    next_tick += 1.0
+                    await service.on_tick(now)
+            if number == flights // 5:
+                early = cpu_and_memory(os.getpid())[1]
+        share = (time.process_time() - began) / (flights * FLIGHT_S)
+        late = cpu_and_memory(os.getpid())[1]
+    return share, early, late
+
+
+def run(live_s: float = LIVE_S, day_h: float = DAY_H) -> list[tuple[str, float, str]]:
+    """The figures, as (name, value, unit)."""
+    share, memory = live(live_s)
+    out = [
+        ("daemon: live at 200 + 50 + 10 Hz", 100.0 * share, "% of a core"),
+        ("daemon: memory, live", memory, "MB"),
+    ]
+    share, early, late = asyncio.run(day(day_h))
+    out += [
+        (f"daemon: {day_h:g} h at 50 + 25 + 5 Hz", 100.0 * share, "% of a core"),
+        ("daemon: memory after a fifth of that", early, "MB"),
+        ("daemon: memory after all of it", late, "MB"),
+    ]
+    return out
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--live", type=float, default=LIVE_S, metavar="S", help="seconds live")
+    parser.add_argument("--day", type=float, default=DAY_H, metavar="H", help="simulated hours")
+    chosen = parser.parse_args()
+    for name, value, unit in run(chosen.live, chosen.day):
+        print(f"{name:48} {value:8.2f} {unit}")
