@@ -102,12 +102,14 @@ def _imu(snapshot: Snapshot, imu: ImuView) -> RenderableType:
     if c.note:
         parts.append(Text(f" {c.note}", style="dim"))
     proposal = next((p for p in snapshot.push.proposals if p.imu == imu.imu), None)
-    if proposal is not None:
+    if proposal is not None and "not_calibrated" not in proposal.held_back:
         parts.append(_proposal(proposal))
     return Group(*parts)
 
 
 def _proposal(proposal: ProposalView) -> Text:
+    if "nothing_to_change" in proposal.held_back:
+        return Text(" the autopilot has these values: nothing to write", style="green")
     changed = sum(change.before != change.after for change in proposal.changes)
     text = Text(f" push of {changed} values ", style="bold")
     if not proposal.held_back:

@@ -98,9 +98,10 @@ class Proposals:
             refusals = judge(
                 plan, calibrations[imu], condition, self.settings, values=parameters, others=others
             )
-            # Several sentences of one name (six sigmas): the first says enough.
-            policy = {r.objection.value: r.sentence for r in reversed(refusals)}
-            self.current[imu] = Proposal(plan, self._beyond_policy(imu, plan, now) | policy)
+            held_back = self._beyond_policy(imu, plan, now)
+            for refusal in refusals:  # several of one name (six sigmas): the first says enough
+                held_back.setdefault(refusal.objection.value, refusal.sentence)
+            self.current[imu] = Proposal(plan, held_back)
 
     def ready(self) -> PushPlan | None:
         """The first plan that nothing holds back."""
