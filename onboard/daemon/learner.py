@@ -1,148 +1,228 @@
-"""The learner: messages in, calibrations out; its sums survive the process.
+"""The learner: samples in, calibrations out; its sums survive the process.
 
-One per daemon.  It knows no link and no clock: the service hands it messages, tells it when a
-vehicle was found, and asks it to save.
+It lives on the worker's thread and is only called there; what it gives back is frozen.  It
+knows no link.  While a push waits for the flight that judges it, a second, fresh estimator
+learns from what is flown between arming and disarming, and from nothing else: standing on
+the ground after a push is no flight.
 """
 
 from __future__ import annotations
 
-import asyncio
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 
 from onboard import __version__
 from onboard.core.calibrator import Calibrator
 from onboard.core.result import Calibration, Status
-from onboard.core.samples import ParameterValue, Sample
+from onboard.core.samples import ParameterValue, Sample, VehicleState
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
-from onboard.daemon.notices import Notices
+from onboard.daemon.snapshot import TrustView
 from onboard.daemon.store import Store
+from onboard.daemon.view import trust_view
 from onboard.errors import StateError
-from onboard.mavlink.decode import Decoder
-from onboard.mavlink.dialect import Message
 
+SOLVING_SHARE = 0.01
+"""Of a core: after a solution that took 0.1 s, the next one is due 10 s later."""
 KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
+"""Beginnings of the names that change what an estimator makes of the messages."""
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """Something that a person should hear of: kind, sentence, and whether it is a warning."""
+
+    kind: str
+    text: str
+    warning: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """Where the learner stands after a batch.
+
+    ``flown`` is the answer of the flight that has just ended, if a push waits for it.
+    """
+
+    calibrations: dict[int, Calibration]
+    trust: TrustView
+    counters: dict[str, int]
+    news: tuple[News, ...] = ()
+    flown: dict[int, Calibration] = field(default_factory=dict)
 
 
 class Learner:
-    """Feeds the calibrator and keeps its sums on disk, by vehicle."""
+    """Feeds the calibrator and keeps its sums on disk, by vehicle; ``clock`` is monotonic, s."""
 
-    def __init__(self, store: Store, settings: EstimatorSettings, notices: Notices) -> None:
+    def __init__(
+        self, store: Store, settings: EstimatorSettings, *, clock: Callable[[], float]
+    ) -> None:
         self._store = store
         self._settings = settings
-        self._notices = notices
-        self._calibrated: set[int] = set()
+        self._clock = clock
         self._system_id: int | None = None
-        self._device_ids: dict[str, float] = {}
-        self._restored_ids: dict[str, float] = {}
+        self._calibrator = Calibrator(settings)
+        self._flight: Calibrator | None = None
+        self._flown: dict[int, Calibration] = {}
+        self._armed = False
+        self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
-        self.calibrator = Calibrator(settings)
-        self.decoder = Decoder()
-        self.windows = 0
-        self.counters: Counter[str] = Counter()
+        self._restored_ids: dict[str, float] = {}
+        self._answers: dict[int, Calibration] = {}
+        self._calibrated: set[int] = set()
+        self._stale = self._urgent = False
+        self._next_solution = 0.0
+        self._counters: Counter[str] = Counter()
+        self._news: list[News] = []
 
-    def adopt(self, system_id: int, component_id: int) -> None:
+    def adopt(self, system_id: int) -> None:
         """An autopilot was found: go on from what was saved for this vehicle."""
         self._system_id = system_id
-        self.decoder = Decoder(system_id, component_id)
-        self._device_ids = {}
-        self._parameters = {}
-        self.calibrator = Calibrator(self._settings)
         try:
             saved = self._store.load(system_id)
             if saved is None:
                 return
-            self.calibrator = Calibrator.from_bytes(saved.sums, self._settings)
+            self._calibrator = Calibrator.from_bytes(saved.sums, self._settings)
         except StateError as error:
-            self.counters["state_refused"] += 1
-            self._notices.post("state_refused", f"starting from nothing: {error}", warning=True)
+            self._counters["state_refused"] += 1
+            self._tell("state_refused", f"starting from nothing: {error}", warning=True)
             return
         self._restored_ids = saved.device_ids
-        self.counters["state_resumed"] += 1
-        text = f"resumed what was learned of system {system_id} before"
-        self._notices.post("state_resumed", text)
+        self._counters["state_resumed"] += 1
+        self._tell("state_resumed", f"resumed what was learned of system {system_id} before")
 
-    def take(self, message: Message) -> tuple[Sample, ...]:
-        """Decode a message and learn from it; the samples that were in it."""
-        samples = self.decoder.decode(message)
+    def learn(self, samples: Iterable[Sample], *, judging: bool) -> Learned:
+        """Take a batch; ``judging``: a push waits for the verdict of a flight."""
         for sample in samples:
             if type(sample) is ParameterValue:
                 self._parameter(sample)
-            for event in self.calibrator.feed(sample):
+            for event in self._calibrator.feed(sample):
                 self._note(event)
-        return samples
+            if judging:
+                self._fly(sample)
+        if not judging:
+            self._flight = None
+        return self._learned()
 
-    @property
-    def parameters(self) -> Iterable[ParameterValue]:
-        """What the autopilot has said of the parameters that matter to an estimator."""
-        return self._parameters.values()
-
-    def calibrations(self) -> dict[int, Calibration]:
-        """The answer now, by accelerometer."""
-        answers = {imu: self.calibrator.calibration(imu) for imu in self.calibrator.imus}
-        for imu, answer in answers.items():
-            if answer.status is Status.CALIBRATED and imu not in self._calibrated:
-                self._calibrated.add(imu)
-                self._notices.post("calibrated", f"IMU {imu} is calibrated")
-            elif answer.status is Status.INVALID and imu in self._calibrated:
-                self._calibrated.discard(imu)
-                self._notices.post("invalid", f"IMU {imu}: {answer.note}", warning=True)
-        return answers
-
-    def reset(self) -> None:
+    def reset(self) -> Learned:
         """Forget everything that was learned, on disk too; the parameters in force stay known."""
-        self.calibrator = Calibrator(self._settings)
+        self._calibrator = Calibrator(self._settings)
         for parameter in self._parameters.values():
-            self.calibrator.feed(parameter)
+            self._calibrator.feed(parameter)
         self._restored_ids = {}
         self._calibrated.clear()
-        self.windows = 0
+        self._answers = {}
+        self._windows = 0
+        self._flight = None
+        self._stale = self._urgent = True
         if self._system_id is not None:
             self._store.path(self._system_id).unlink(missing_ok=True)
+        return self._learned()
 
-    async def save(self, saved_at: float) -> None:
-        """Write the sums, on a thread: a memory card may take seconds.
+    def save(self, saved_at: float) -> None:
+        """Write the sums to disk.
 
         Raises:
             StateError: the disk does not take them.
         """
         if self._system_id is None:
             return
-        await asyncio.to_thread(
-            self._store.save,
+        self._store.save(
             self._system_id,
-            self.calibrator.to_bytes(),
+            self._calibrator.to_bytes(),
             version=__version__,
-            device_ids=dict(self._device_ids),
+            device_ids={n: p.value for n, p in self._parameters.items() if _is_device_id(n)},
             saved_at=saved_at,
         )
-        self.counters["saves"] += 1
+        self._counters["saves"] += 1
+
+    def _learned(self) -> Learned:
+        self._solve()
+        news, self._news = tuple(self._news), []
+        flown, self._flown = self._flown, {}
+        return Learned(
+            calibrations=self._answers,
+            trust=trust_view(self._calibrator.trust, windows=self._windows),
+            counters=dict(self._counters),
+            news=news,
+            flown=flown,
+        )
+
+    def _solve(self) -> None:
+        """Solve anew if something has come to it, and not too often unless it is urgent."""
+        began = self._clock()
+        if not self._stale or (began < self._next_solution and not self._urgent):
+            return
+        self._stale = self._urgent = False
+        self._answers = _answers(self._calibrator)
+        self._next_solution = began + (self._clock() - began) / SOLVING_SHARE
+        for imu, answer in self._answers.items():
+            if answer.status is Status.CALIBRATED and imu not in self._calibrated:
+                self._calibrated.add(imu)
+                self._tell("calibrated", f"IMU {imu} is calibrated")
+            elif answer.status is Status.INVALID and imu in self._calibrated:
+                self._calibrated.discard(imu)
+                self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
+
+    def _fly(self, sample: Sample) -> None:
+        """Let the judging estimator have what is flown; its answer when the flight ends."""
+        if isinstance(sample, VehicleState) and sample.armed is not None:
+            if sample.armed and not self._armed and self._flight is None:
+                self._flight = Calibrator(self._settings)
+                for parameter in self._parameters.values():
+                    self._flight.feed(parameter)
+            ended = self._armed and not sample.armed
+            self._armed = sample.armed
+            if ended and self._flight is not None:
+                self._flight.feed(sample)
+                self._flown = _answers(self._flight)
+        if self._flight is not None and (self._armed or type(sample) is ParameterValue):
+            self._flight.feed(sample)
 
     def _note(self, event: object) -> None:
+        self._stale = True
         match event:
             case WindowOpened():
-                self.windows += 1
-                self._notices.post("window_opened", "GPS is trusted: learning")
+                self._windows += 1
+                self._tell("window_opened", "GPS is trusted: learning")
             case WindowClosed(_, reason):
-                text = f"GPS is not trusted: {reason.value.replace('_', ' ')}"
-                self._notices.post("window_closed", text)
+                why = reason.value.replace("_", " ")
+                self._tell("window_closed", f"GPS is not trusted: {why}")
             case _:
-                name = type(event).__name__.lower()
-                self.counters[f"event_{name}"] += 1
+                name = type(event).__name__
+                self._urgent |= name == "FlightEnded"
+                self._counters[f"event_{name}"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Keep what a reset must not forget; sums learned on another sensor are worth nothing."""
-        name = parameter.name
+        name, value = parameter.name, parameter.value
         if not name.startswith(KEPT_PARAMETERS):
             return
+        before = self._parameters.get(name)
+        if before is None or before.value != value:
+            self._stale = self._urgent = True
         self._parameters[name] = parameter
-        if not (name.startswith("INS") and name.endswith("_ID")):
-            return
-        self._device_ids[name] = parameter.value
-        before = self._restored_ids.get(name, parameter.value)
-        if before != parameter.value:
-            text = f"{name} was {before:.0f}, is {parameter.value:.0f}: another sensor, begun anew"
-            self._notices.post("other_sensor", text, warning=True)
-            self.counters["state_of_other_sensor"] += 1
+        learned_on = self._restored_ids.get(name, value)
+        if learned_on != value:
+            text = f"{name} was {learned_on:.0f}, is {value:.0f}: another sensor, begun anew"
+            self._tell("other_sensor", text, warning=True)
+            self._counters["state_of_other_sensor"] += 1
             self.reset()
+
+    def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
+        self._news.append(News(kind, text, warning))
+
+
+def _answers(calibrator: Calibrator) -> dict[int, Calibration]:
+    answers = {}
+    for imu in calibrator.imus:
+        try:
+            answers[imu] = calibrator.calibration(imu)
+        except KeyError:  # heard, but not enough for any answer yet
+            continue
+    return answers
+
+
+def _is_device_id(name: str) -> bool:
+    return name.startswith("INS") and name.endswith("_ID")

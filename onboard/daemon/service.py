@@ -1,8 +1,8 @@
 """The service's life: startup, main loop, tick, shutdown, read from top to bottom.
 
-Everything runs on one loop: the link hands each message to :meth:`Service.on_message`, which
-learns from it at once; once a second :meth:`Service.on_tick` solves, judges, saves and tells.
-A tick that does not come is what the watchdog is for.
+The link hands each message to :meth:`Service.on_message`, on the loop; four times a second what
+came is handed to the learner, on the worker's thread; once a second :meth:`Service.on_tick`
+judges, saves and tells.  The watchdog is fed in that tick, as long as the learner keeps up.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from onboard import __version__
-from onboard.core.result import Calibration
 from onboard.daemon import settings
 from onboard.daemon.condition import Observed
 from onboard.daemon.configuration import Configuration, read_secret
-from onboard.daemon.learner import Learner
+from onboard.daemon.learner import Learned, Learner
+from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
 from onboard.daemon.notify import Notifier
 from onboard.daemon.parameters import ParameterWatch
@@ -33,9 +33,15 @@ from onboard.daemon.recording import RollingRecorder
 from onboard.daemon.snapshot import Snapshot
 from onboard.daemon.store import Store
 from onboard.daemon.traffic import Traffic
-from onboard.daemon.view import finite_values, imu_view, journal_view, link_view, trust_view
+from onboard.daemon.view import (
+    NO_TRUST,
+    finite_values,
+    imu_view,
+    journal_view,
+    link_view,
+)
 from onboard.daemon.witness import Witness
-from onboard.errors import OnboardError, StateError
+from onboard.errors import OnboardError
 from onboard.mavlink.autopilot import (
     AutopilotFound,
     AutopilotRebooted,
@@ -59,6 +65,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 TICK_S = 1.0
+SAVE_S = 5.0
 FINISH_PUSH_S = 8.0
 """A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
 JOURNAL_SHOWN = 50
@@ -95,20 +102,27 @@ class Service:
         self._notifier = Notifier.from_environment()
         self.ready = asyncio.Event()
         self._stopping = asyncio.Event()
-        self._expecting: asyncio.Task[None] | None = None
+        self._learner_task: asyncio.Task[None] | None = None
         self._observed = Observed()
-        self._calibrations: dict[int, Calibration] = {}
-        self._next_save = 0.0
         self.notices = Notices(wall_clock)
         link = configuration.link
         endpoints = settings.endpoints(link)
         signing = settings.signing(link, wall_clock)
-        estimator = settings.estimator_settings(configuration.estimator)
         push = configuration.push
         directory = configuration.state.path()
         self._recorder = self._make_recorder(directory)
-        self._learner = Learner(Store(directory), estimator, self.notices)
-        self._witness = Witness(estimator)
+        self._witness = Witness()
+        self.learning = Learning(
+            Learner(
+                Store(directory), settings.estimator_settings(configuration.estimator), clock=clock
+            ),
+            self.notices,
+            judging=lambda: self._witness.waiting,
+            clock=clock,
+            wall_clock=wall_clock,
+            save_every_s=configuration.estimator.save_every_s,
+        )
+        self.learning.listen(self._on_learned)
         self._proposals = Proposals(
             settings.policy_settings(push), approval=push.approval, imus=push.imus
         )
@@ -168,7 +182,7 @@ class Service:
             await self.server.start()
             logger.info("status and control at %s", self.server.url)
         group.create_task(self.link.run(), name="link")
-        self._expecting = group.create_task(self._expect_autopilot(), name="expect autopilot")
+        self._learner_task = group.create_task(self._learn(), name="learner")
         self.phase = "searching"
         self.ready.set()
         self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
@@ -184,37 +198,39 @@ class Service:
             due = max(due + TICK_S, self._clock())
 
     async def on_tick(self, now: float) -> None:
-        """Solve, judge, save, tell; the watchdog is fed last, when all that worked."""
+        """Judge, save, tell; the watchdog is fed last, when all that worked."""
         condition = self._observed.condition(now)
         self._traffic.tick(now)
-        self._calibrations = self._learner.calibrations()
-        self._pusher.judge(self._witness.tick(now, condition, self._learner.parameters))
-        if self._parameters.complete or self._pusher.busy:
+        self._pusher.judge(self._witness.report(condition, now))
+        learned = self.learning.learned
+        if learned is not None and (self._parameters.complete or self._pusher.busy):
             self._pusher.consider(
                 now,
-                calibrations=self._calibrations,
+                calibrations=learned.calibrations,
                 parameters=self._parameters.values,
                 condition=condition,
             )
-        if now >= self._next_save:
-            self._next_save = now + self.configuration.estimator.save_every_s
-            await self._save()
         if self.server is not None:
             self.server.publish()
-        self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
+        if self.learning.keeps_up(now):
+            self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
+
+    def _on_learned(self, learned: Learned) -> None:
+        if learned.flown:
+            self._pusher.judge(self._witness.landed(learned.flown))
 
     async def _shutdown(self) -> None:
         """Stage by stage, each bounded: people, the push, the link, the sums."""
         self.phase = "stopping"
         self._notifier.send(STOPPING="1", STATUS="stopping")
-        if self._expecting is not None:
-            self._expecting.cancel()
         self._pusher.close()
         await self._finish_push()
         if self.server is not None:
             await self.server.stop()
         self.link.close()
-        await self._save()
+        if self._learner_task is not None:
+            self._learner_task.cancel()
+        await self.learning.close(SAVE_S)
 
     async def _finish_push(self) -> None:
         try:
@@ -230,21 +246,21 @@ class Service:
         if self.server is not None:
             await self.server.stop()
         self._journal.close()
+        self.learning.let_go()
 
-    async def _expect_autopilot(self) -> None:
-        await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
+    async def _learn(self) -> None:
+        autopilot = await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
+        await self.learning.run(autopilot.system)
 
     # What comes in
 
     def on_message(self, now: float, message: Message) -> None:
-        """Learn from one message of the link."""
-        source = self._learner.decoder.source
-        if source != (message.get_srcSystem(), message.get_srcComponent()):
+        """Take one message of the link."""
+        if self.learning.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
             return
         self._traffic.count(message.get_type())
-        for sample in self._learner.take(message):
+        for sample in self.learning.take(message):
             self._observed.feed(sample, now)
-            self._witness.feed(sample)
 
     def on_link_event(self, now: float, event: LinkEvent) -> None:
         """Take note of what happened to the autopilot or a connection."""
@@ -253,7 +269,7 @@ class Service:
             case AutopilotFound(autopilot):
                 who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
                 post("autopilot_found", who)
-                self._learner.adopt(autopilot.system, autopilot.component)
+                self.learning.decoder = Decoder(autopilot.system, autopilot.component)
                 self.phase = "running"
                 if not autopilot.is_ardupilot:
                     self._advise_only(
@@ -297,9 +313,8 @@ class Service:
     async def reset(self, imus: tuple[int, ...]) -> str:
         """Forget what was learned, of all accelerometers: they share the window."""
         del imus
-        self._learner.reset()
+        await self.learning.reset()
         self._proposals.forget()
-        self._calibrations = {}
         self.counters["resets"] += 1
         return "what was learned is forgotten; the autopilot's parameters are as they were"
 
@@ -310,7 +325,7 @@ class Service:
     def snapshot(self) -> Snapshot:
         """Everything, now."""
         now = self._clock()
-        learner = self._learner
+        learned = self.learning.learned
         return Snapshot(
             version=__version__,
             time=self._wall_clock(),
@@ -324,8 +339,8 @@ class Service:
                 messages=self._traffic.view(self._streams.report()),
                 signed=self.configuration.link.signing_key_file is not None,
             ),
-            trust=trust_view(learner.calibrator.trust, windows=learner.windows),
-            imus=tuple(imu_view(c) for c in self._calibrations.values()),
+            trust=NO_TRUST if learned is None else learned.trust,
+            imus=tuple(imu_view(c) for c in learned.calibrations.values()) if learned else (),
             push=self._pusher.view(),
             parameters=finite_values(self._parameters.values),
             journal=journal_view(self._journal.entries[-JOURNAL_SHOWN:]),
@@ -335,18 +350,14 @@ class Service:
 
     # How
 
-    async def _save(self) -> None:
-        try:
-            await self._learner.save(self._wall_clock())
-        except StateError as error:
-            self.counters["save_failed"] += 1
-            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
-
     def _all_counters(self) -> dict[str, int]:
         total = Counter(self.counters)
-        for part in (self._learner, self._parameters, self._proposals, self._pusher):
+        for part in (self.learning, self._parameters, self._proposals, self._pusher):
             total.update(part.counters)
-        total.update({f"refused {name}": n for name, n in self._learner.decoder.refused.items()})
+        if self.learning.learned is not None:
+            total.update(self.learning.learned.counters)
+        refused = self.learning.decoder.refused
+        total.update({f"refused {name}": count for name, count in refused.items()})
         total["timesync_rejected"] = self._timesync.rejected
         total["journal_damaged"] = self._journal.damaged
         if self._recorder is not None:
@@ -358,11 +369,14 @@ class Service:
         """One line for systemctl status."""
         if self.link.autopilot is None:
             return "waiting for an autopilot's heartbeat"
+        learned = self.learning.learned
+        if learned is None:
+            return f"{self.link.state.value}, nothing learned yet"
         imus = ", ".join(
             f"IMU {imu} {c.status.value} {c.coverage.percent:.0f} %"
-            for imu, c in self._calibrations.items()
+            for imu, c in learned.calibrations.items()
         )
-        trust = "trusted" if self._learner.calibrator.trust.is_open else "not trusted"
+        trust = "trusted" if learned.trust.open else "not trusted"
         return f"{self.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}"
 
     def _make_recorder(self, state: Path) -> Recorder | None:

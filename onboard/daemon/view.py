@@ -120,6 +120,11 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
     return tuple(shown)
 
 
+NO_TRUST = TrustView(
+    phase="waiting", open=False, reason=None, reasons=(), windows=0, trusted_s=0.0, rejected={}
+)
+
+
 def trust_view(window: TrustWindow, *, windows: int) -> TrustView:
     """The trust window; ``windows``: how often it has opened."""
     return TrustView(

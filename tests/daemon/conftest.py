@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from onboard.core.result import Calibration, Coverage, Status
+from onboard.daemon import learning
 from onboard.daemon import pusher as pusher_module
 from onboard.daemon import service as service_module
 from onboard.daemon.configuration import from_mapping
@@ -39,6 +40,7 @@ def impatient(monkeypatch):
     """What real vehicles need seconds for takes none on loopback."""
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
     monkeypatch.setattr(service_module, "TICK_S", 0.05)
+    monkeypatch.setattr(learning, "BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 
@@ -102,4 +104,6 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
 
 def convinced(service, *calibrations):
     """Have the daemon believe that it has learned these."""
-    service._learner.calibrations = lambda: {c.imu: c for c in calibrations}
+    learner = service.learning._learner
+    learner._solve = lambda: None
+    learner._answers = {c.imu: c for c in calibrations}

@@ -5,6 +5,7 @@ import dataclasses
 import os
 import signal
 import socket
+import threading
 
 import aiohttp
 import pytest
@@ -13,6 +14,8 @@ from vehicle import PX4, Vehicle
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
+from onboard.daemon import learning
+from onboard.daemon import service as service_module
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
 from onboard.daemon.snapshot import Snapshot
@@ -265,7 +268,7 @@ async def test_a_crash_in_the_middle_of_a_push_is_put_right_after_the_restart(
             assert kinds[-1] == "closed"
 
 
-async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, port):
+async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, port, monkeypatch):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = in_force(vehicle)
         convinced(service, WANTED)
@@ -277,8 +280,7 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
             in_force_offset=tuple(in_force(vehicle)[3:]),
             held_out_before=9.0,
         )
-        service._witness._flown[1] = flown
-        service._witness._judge = lambda _imu, watch: watch.judge(flown)
+        monkeypatch.setattr("onboard.daemon.learner._answers", lambda _: {1: flown})
         vehicle.armed, vehicle.landed = True, False
         await until(lambda: service.snapshot().link.armed)
         vehicle.armed, vehicle.landed = False, True
@@ -343,10 +345,10 @@ async def test_the_service_manager_hears_ready_ticks_and_stopping(
 async def test_a_tick_that_fails_feeds_no_watchdog_and_ends_the_service(document, port):
     service = Service(from_mapping(document, source="test"))
 
-    def broken():
-        raise ArithmeticError("estimator")
+    def broken(_now):
+        raise ArithmeticError("tick")
 
-    service._learner.calibrations = broken
+    service._observed.condition = broken
     with pytest.raises(BaseExceptionGroup) as caught:
         await service.run()
     assert caught.group_contains(ArithmeticError)
@@ -363,12 +365,31 @@ async def test_signals_end_it_in_good_order(document, port, number):
     assert service.phase == "stopped"
 
 
+async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
+    document, daemon, port, monkeypatch
+):
+    release = threading.Event()
+    monkeypatch.setattr(learning, "STEP_LIMIT_S", 0.1)
+    async with daemon(document) as service, Vehicle(port):
+        await until(lambda: service.learning.learned is not None)
+        service.learning._learner.learn = lambda *_, **__: release.wait(30.0)
+        await until(lambda: not service.learning.keeps_up(service._clock()))
+        count = service.snapshot().link.messages["RAW_IMU"].count
+        await until(lambda: service.snapshot().link.messages["RAW_IMU"].count > count + 5)
+        sent = []
+        service._notifier.send = lambda **fields: sent.append(fields)
+        await service.on_tick(service._clock())
+        assert sent == []
+        monkeypatch.setattr(service_module, "SAVE_S", 0.1)
+    release.set()
+
+
 async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
     document["estimator"] = {"save_every_s": 0.01}
     async with daemon(document) as service, Vehicle(port):
         file = tmp_path / "state" / "sums-1.bin"
         await until(file.exists)
-        before = service._learner.calibrator
+        before = service.learning._learner._calibrator
         await service.reset(())
-        assert service._learner.calibrator is not before
+        assert service.learning._learner._calibrator is not before
         assert service.snapshot().counters["resets"] == 1

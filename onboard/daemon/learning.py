@@ -1,0 +1,142 @@
+"""Between the loop and the learner's thread: batches go over, what was learned comes back."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from onboard.core.samples import Sample
+from onboard.daemon.learner import Learned, Learner
+from onboard.daemon.notices import Notices
+from onboard.daemon.worker import Worker
+from onboard.errors import StateError
+from onboard.mavlink.decode import Decoder
+from onboard.mavlink.dialect import Message
+
+P = ParamSpec("P")
+T = TypeVar("T")
+logger = logging.getLogger(__name__)
+
+BATCH_S = 0.25
+WAITING_LIMIT = 200_000
+"""Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
+STEP_LIMIT_S = 120.0
+"""A refinement takes seconds, on a slow companion a minute; longer than this is a hang."""
+
+
+class Learning:
+    """Decodes, batches, saves.
+
+    Args:
+        learner: whom to hand the batches.
+        notices: where its news go.
+        judging: whether a push waits for the flight that judges it.
+        clock: monotonic time, s.
+        wall_clock: Unix time, s.
+        save_every_s: how often sums go to disk.
+    """
+
+    def __init__(
+        self,
+        learner: Learner,
+        notices: Notices,
+        *,
+        judging: Callable[[], bool],
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+        save_every_s: float,
+    ) -> None:
+        self.decoder = Decoder()
+        self.learned: Learned | None = None
+        self.counters: Counter[str] = Counter()
+        self._learner = learner
+        self._notices = notices
+        self._judging = judging
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._save_every_s = save_every_s
+        self._next_save = 0.0
+        self._samples: list[Sample] = []
+        self._worker: Worker | None = None
+        self._busy_since: float | None = None
+        self._listeners: list[Callable[[Learned], None]] = []
+
+    def listen(self, listener: Callable[[Learned], None]) -> None:
+        """Have ``listener(learned)`` called on the loop after every batch."""
+        self._listeners.append(listener)
+
+    def take(self, message: Message) -> tuple[Sample, ...]:
+        """Decode a message of the autopilot and put its samples into the next batch."""
+        samples = self.decoder.decode(message)
+        self._samples += samples
+        if len(self._samples) > WAITING_LIMIT:
+            half = WAITING_LIMIT // 2
+            self.counters["samples_dropped"] += half
+            del self._samples[:half]
+        return samples
+
+    async def run(self, system_id: int) -> None:
+        """Learn from this vehicle until cancelled."""
+        self._worker = Worker("learner")
+        await self._call(self._learner.adopt, system_id)
+        while True:
+            await self.step()
+            await asyncio.sleep(BATCH_S)
+
+    async def step(self) -> None:
+        """One batch, and the sums to disk when that is due."""
+        samples, self._samples = self._samples, []
+        now = self._busy_since = self._clock()
+        self._accept(await self._call(self._learner.learn, samples, judging=self._judging()))
+        if now >= self._next_save:
+            self._next_save = now + self._save_every_s
+            await self.save()
+        self._busy_since = None
+
+    async def reset(self) -> None:
+        """Forget what was learned."""
+        self._accept(await self._call(self._learner.reset))
+
+    async def save(self) -> None:
+        """Put the sums on disk; a disk that does not take them is told and tried again."""
+        try:
+            await self._call(self._learner.save, self._wall_clock())
+        except StateError as error:
+            self.counters["save_failed"] += 1
+            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+
+    def keeps_up(self, now: float) -> bool:
+        """Whether the learner is not stuck in a batch."""
+        return self._busy_since is None or now - self._busy_since < STEP_LIMIT_S
+
+    async def close(self, limit_s: float) -> None:
+        """Learn what has come, save, and let the thread go; if it is busy, the last save counts."""
+        try:
+            async with asyncio.timeout(limit_s):
+                await self.step()
+                await self.save()
+                if self._worker is not None:
+                    await self._worker.close()
+        except TimeoutError:
+            logger.warning("the learner is busy: the next start goes on from the last save")
+
+    def let_go(self) -> None:
+        """Stop at once; the thread ends when it can, or with the process."""
+        if self._worker is not None:
+            self._worker.dismiss()
+
+    def _accept(self, learned: Learned) -> None:
+        self.learned = learned
+        for news in learned.news:
+            self._notices.post(news.kind, news.text, warning=news.warning)
+        for listener in self._listeners:
+            listener(learned)
+
+    async def _call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """On the learner's thread, or here while there is none."""
+        if self._worker is None:
+            return function(*args, **kwargs)
+        return await self._worker.call(function, *args, **kwargs)
