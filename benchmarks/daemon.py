@@ -18,13 +18,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from sitl.recording import FlightSpec, fly
-
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
 from onboard.mavlink.autopilot import Autopilot, AutopilotFound
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message
+from sitl.recording import FlightSpec, fly
 
 RATES = {"RAW_IMU": 200.0, "ATTITUDE": 50.0, "GPS_RAW_INT": 10.0}
 DAY_RATES = {"RAW_IMU": 50.0, "ATTITUDE": 25.0, "GPS_RAW_INT": 5.0}

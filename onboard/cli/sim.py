@@ -58,7 +58,7 @@ SIX = 6
 @click.option(
     "--loop-rate", type=click.IntRange(50, 1000), help="Main loop, Hz [plane 50, copter 400]."
 )
-def sim(  # noqa: PLR0917 - one argument an option
+def sim(
     vehicle: Vehicle,
     host: str,
     port: int,

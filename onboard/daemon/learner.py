@@ -68,7 +68,6 @@ class Learner:
         self._armed = False
         self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
-        self._restored_ids: dict[str, float] = {}
         self._answers: dict[int, Calibration] = {}
         self._calibrated: set[int] = set()
         self._stale = self._urgent = False
@@ -88,7 +87,6 @@ class Learner:
             self._counters["state_refused"] += 1
             self._tell("state_refused", f"starting from nothing: {error}", warning=True)
             return
-        self._restored_ids = saved.device_ids
         self._counters["state_resumed"] += 1
         self._tell("state_resumed", f"resumed what was learned of system {system_id} before")
 
@@ -110,7 +108,6 @@ class Learner:
         self._calibrator = Calibrator(self._settings)
         for parameter in self._parameters.values():
             self._calibrator.feed(parameter)
-        self._restored_ids = {}
         self._calibrated.clear()
         self._answers = {}
         self._windows = 0
@@ -132,7 +129,6 @@ class Learner:
             self._system_id,
             self._calibrator.to_bytes(),
             version=__version__,
-            device_ids={n: p.value for n, p in self._parameters.items() if _is_device_id(n)},
             saved_at=saved_at,
         )
         self._counters["saves"] += 1
@@ -195,7 +191,7 @@ class Learner:
                 self._counters[f"event_{name}"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:
-        """Keep what a reset must not forget; sums learned on another sensor are worth nothing."""
+        """Keep what a reset must not forget."""
         name, value = parameter.name, parameter.value
         if not name.startswith(KEPT_PARAMETERS):
             return
@@ -203,12 +199,6 @@ class Learner:
         if before is None or before.value != value:
             self._stale = self._urgent = True
         self._parameters[name] = parameter
-        learned_on = self._restored_ids.get(name, value)
-        if learned_on != value:
-            text = f"{name} was {learned_on:.0f}, is {value:.0f}: another sensor, begun anew"
-            self._tell("other_sensor", text, warning=True)
-            self._counters["state_of_other_sensor"] += 1
-            self.reset()
 
     def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
         self._news.append(News(kind, text, warning))
@@ -222,7 +212,3 @@ def _answers(calibrator: Calibrator) -> dict[int, Calibration]:
         except KeyError:  # heard, but not enough for any answer yet
             continue
     return answers
-
-
-def _is_device_id(name: str) -> bool:
-    return name.startswith("INS") and name.endswith("_ID")

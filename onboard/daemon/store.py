@@ -1,8 +1,8 @@
 """The sums on disk: what the daemon has learned of each vehicle, across restarts.
 
 One file per vehicle (system id), replaced whole: temporary file, fsync, rename, fsync of the
-directory.  It names the accelerometers that it was learned on, and a checksum; a file that is
-damaged or of another version is set aside with the reason, never half used.
+directory.  A file that is damaged or of another version is set aside with the reason, never half
+used.  Whether sums are of the sensor that is there now, the estimator itself looks after.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ SCHEMA = 1
 
 
 class Saved(msgspec.Struct, frozen=True, kw_only=True):
-    """The sums of one vehicle; ``device_ids`` by parameter name, where they were known."""
+    """The sums of one vehicle; ``saved_at`` is Unix time."""
 
     schema: int = SCHEMA
     version: str
     system_id: int
     saved_at: float
-    device_ids: dict[str, float]
     sums: bytes
     check: int
 
@@ -74,7 +73,6 @@ class Store:
         sums: bytes,
         *,
         version: str,
-        device_ids: dict[str, float],
         saved_at: float,
     ) -> None:
         """Replace the file; it is on the disk when this returns.
@@ -87,7 +85,6 @@ class Store:
             version=version,
             system_id=system_id,
             saved_at=saved_at,
-            device_ids=device_ids,
             sums=sums,
             check=crc32(sums),
         )

@@ -8,9 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from conftest import calibration, convinced, until
+from daemons import calibration, convinced, until
 from rich.cells import cell_len
-from vehicle import Vehicle
+from standing_vehicle import Vehicle
 
 from onboard.cli.main import run as onboard
 

@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 
 import aiohttp
 import pytest
-from blank import blank_snapshot
+from blank_snapshot import blank_snapshot
 
 from onboard.daemon.control import VIEWERS_MAX, ControlServer
 from onboard.daemon.snapshot import Snapshot

@@ -4,7 +4,7 @@ import asyncio
 import os
 
 import pytest
-from conftest import until
+from daemons import until
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.daemon.recording import RollingRecorder

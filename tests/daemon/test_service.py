@@ -9,8 +9,8 @@ import threading
 
 import aiohttp
 import pytest
-from conftest import calibration, convinced, until
-from vehicle import PX4, Vehicle
+from daemons import calibration, convinced, until
+from standing_vehicle import PX4, Vehicle
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
@@ -294,17 +294,21 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
         await until(lambda: "refused" in held_back(service))
 
 
-async def test_the_sums_survive_a_restart_and_are_this_sensors(document, daemon, port):
-    async with Vehicle(port) as vehicle:
+async def test_a_restart_goes_on_from_the_saved_sums(document, daemon, port):
+    async with Vehicle(port):
         async with daemon(document) as service:
-            await until(lambda: "INS_ACC3_ID" in service.snapshot().parameters)
+            await until(lambda: service.learning.learned is not None)
         async with daemon(document) as again:
-            await until(lambda: "INS_ACC3_ID" in again.snapshot().parameters)
-            assert again.snapshot().counters["state_resumed"] == 1
-            assert "state_of_other_sensor" not in again.snapshot().counters
-        vehicle.parameters["INS_ACC_ID"] = 99.0
-        async with daemon(document) as third:
-            await until(lambda: "state_of_other_sensor" in third.snapshot().counters)
+            await until(lambda: again.snapshot().counters.get("state_resumed") == 1)
+
+
+async def test_damaged_sums_are_told_and_not_used(document, daemon, port, tmp_path):
+    file = tmp_path / "state" / "sums-1.bin"
+    file.parent.mkdir()
+    file.write_bytes(b"not sums")
+    async with daemon(document) as service, Vehicle(port):
+        await until(lambda: service.snapshot().counters.get("state_refused") == 1)
+        assert any("set aside" in notice.text for notice in service.snapshot().notices)
 
 
 async def test_silence_is_told_and_does_not_end_the_service(document, daemon, port):

@@ -10,13 +10,13 @@ SUMS = bytes(range(256)) * 20
 
 def saved(directory, sums=SUMS, system=1):
     store = Store(directory)
-    store.save(system, sums, version="1", device_ids={"INS_ACC_ID": 5.0}, saved_at=100.0)
+    store.save(system, sums, version="1", saved_at=100.0)
     return store
 
 
 def test_what_is_saved_comes_back(tmp_path):
     loaded = saved(tmp_path / "new" / "directory").load(1)
-    assert (loaded.sums, loaded.device_ids, loaded.saved_at) == (SUMS, {"INS_ACC_ID": 5.0}, 100.0)
+    assert (loaded.sums, loaded.saved_at, loaded.system_id) == (SUMS, 100.0, 1)
 
 
 def test_vehicles_do_not_mix(tmp_path):
@@ -50,7 +50,7 @@ def test_a_save_that_cannot_be_made_leaves_the_old_file(tmp_path, monkeypatch):
     store = saved(tmp_path)
     monkeypatch.setattr("os.fsync", lambda _fd: (_ for _ in ()).throw(OSError(28, "No space left")))
     with pytest.raises(StateError, match="No space"):
-        store.save(1, b"new", version="1", device_ids={}, saved_at=0.0)
+        store.save(1, b"new", version="1", saved_at=0.0)
     monkeypatch.undo()
     assert store.load(1).sums == SUMS
 
