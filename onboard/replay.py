@@ -101,9 +101,10 @@ def replay(
         RecordingError: a file that cannot be used, or one of another vehicle.
         UsageError: there is no such accelerometer in the recordings.
     """
-    recordings = tuple(open_recording(path) for path in paths)
-    if not recordings:
+    if not paths:
         raise UsageError("no recording given")
+    recordings = tuple(open_recording(path) for path in paths)
+    _refuse_repetition(recordings)
     _refuse_mixture(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
     vehicle = _Vehicle()
@@ -132,6 +133,16 @@ def replay(
     )
     notes = () if imu is not None else tuple(map(vehicle.silence, sorted({*seen} - {*wanted})))
     return Replay(recordings, calibrations, vehicle.counts, notes)
+
+
+def _refuse_repetition(recordings: Sequence[Recording]) -> None:
+    """A flight counted twice would be believed too much."""
+    seen: set[Path] = set()
+    for recording in recordings:
+        place = recording.path.resolve()
+        if place in seen:
+            raise UsageError(f"{recording.path}: given twice")
+        seen.add(place)
 
 
 def _refuse_mixture(recordings: Sequence[Recording]) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from onboard.core.assembly import Assembly
 from onboard.core.engine import Chunk, Engine
+from onboard.core.impossible import impossible
 from onboard.core.parameters import ParametersInForce
 from onboard.core.report import calibration_of
 from onboard.core.result import Calibration
@@ -103,6 +104,10 @@ class Calibrator:
 
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
+        refusal = impossible(sample)
+        if refusal is not None:
+            self._counts[refusal] += 1
+            return ()
         if isinstance(sample, ImuSample):
             events = (
                 self._clock(sample.t)
@@ -116,8 +121,7 @@ class Calibrator:
             self._assembly.attitude(sample)
             return ()
         if isinstance(sample, ParameterValue):
-            if np.isfinite(sample.value):
-                self.parameters.set(sample.name, sample.value)
+            self.parameters.set(sample.name, sample.value)
             return ()
         if isinstance(sample, GpsFix):
             return self._fix(sample)
@@ -131,6 +135,14 @@ class Calibrator:
         if isinstance(sample, VehicleState):
             events += self._vehicle(sample)
         return events
+
+    def restart(self, reason: str = "another recording") -> tuple[Event, ...]:
+        """The clock begins anew: forget the inertial states, keep the sums."""
+        events = self._advance(everything=True)
+        ended, self._newest = float(self._newest), -np.inf
+        self._armed = None
+        self._assembly.clear()
+        return (*events, *self._trust.restart(ended), Restarted(ended, reason))
 
     def finish(self) -> tuple[Event, ...]:
         """End of the recording or of the window: process what is pending, refine."""
@@ -213,14 +225,11 @@ class Calibrator:
         """Notice a reboot."""
         if not t < self._newest - BACKWARDS_S:
             return ()
-        events = self._advance(everything=True)
         self._counts["reboots"] += 1
-        self._newest = t
-        self._assembly.clear()
-        return (*events, *self._trust.restart(t), Restarted(t, "reboot"))
+        return self.restart("reboot")
 
     def _fix(self, fix: GpsFix) -> tuple[Event, ...]:
-        if fix.t < self._newest - 60.0:
+        if abs(fix.t - self._newest) > 60.0 and np.isfinite(self._newest):
             # Its clock is not the boot clock (another source, or garbage); a reboot shows in the
             # inertial samples first.
             self._counts["gps_other_clock"] += 1

@@ -131,6 +131,14 @@ def test_recordings_of_another_vehicle_are_refused(tmp_path):
         replay([mine, other], Listener())
 
 
+def test_a_flight_is_not_counted_twice(tmp_path):
+    path = saved(tmp_path, "a.BIN", modern_log(1))
+    again = tmp_path / "again.BIN"
+    again.symlink_to(path)
+    with pytest.raises(UsageError, match="given twice"):
+        replay([path, again], Listener())
+
+
 def test_autopilots_are_not_mixed(tmp_path):
     mine = saved(tmp_path, "a.BIN", modern_log(1))
     other = saved(tmp_path, "b.ulg", px4_log(1))

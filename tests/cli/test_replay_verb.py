@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from dataflash_writer import modern_log
+from telemetry_writer import px4_log, telemetry
+
+from onboard.cli.main import run
+
+
+@pytest.fixture
+def log(tmp_path) -> Path:
+    path = tmp_path / "short.BIN"
+    path.write_bytes(bytes(modern_log(20)))
+    return path
+
+
+def test_a_short_log_gets_a_table_and_no_confident_numbers(log, capsys):
+    assert run(["replay", str(log)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "Accelerometer 1" in out
+    assert "Accelerometer 2" in out
+    assert "calibrated\n" not in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_json_on_standard_output_is_alone_there(log, capsys):
+    assert run(["replay", str(log), "--json", "-", "--imu", "2"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    document = json.loads(out)
+    assert document["schema"] == "onboard.replay/1"
+    assert document["recording"]["files"] == [str(log)]
+    assert [imu["imu"] for imu in document["imus"]] == [2]
+    assert document["imus"][0]["status"] in {"collecting", "insufficient", "invalid"}
+
+
+def test_json_in_a_file_comes_with_the_table(log, tmp_path, capsys):
+    assert run(["replay", str(log), "--json", str(tmp_path / "out.json")]) == 0
+    assert "Accelerometer 1" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out.json").read_text())["recording"]["autopilot"] == "ardupilot"
+
+
+@pytest.mark.parametrize("name", ["x.tlog", "x.ulg"])
+def test_other_kinds(tmp_path, capsys, name):
+    path = tmp_path / name
+    path.write_bytes(bytes(telemetry(5)) if name == "x.tlog" else px4_log(5))
+    assert run(["replay", str(path), "--json", "-"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["recording"]["autopilot"] == ("ardupilot" if name == "x.tlog" else "px4")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["absent.BIN"], "absent.BIN: no such file"),
+        ([], "LOG"),
+        (["{log}", "--imu", "7"], "7"),
+        (["{log}", "--imu", "3"], "no accelerometer 3"),
+        (["{log}", "--json", "{log}/x.json"], "x.json"),
+        (["{tmp}/text.tlog"], "text.tlog: not a"),
+        (["{tmp}/empty.BIN"], "empty.BIN: is empty"),
+        (["{tmp}"], "is a directory"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(log, tmp_path, capsys, arguments, said):
+    (tmp_path / "text.tlog").write_text("this is no log\n" * 100)
+    (tmp_path / "empty.BIN").touch()
+    assert run(["replay", *(a.format(log=log, tmp=tmp_path) for a in arguments)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("onboard: ")
+    assert err.count("\n") == 1
+    assert said in err
+
+
+def test_a_cut_log_is_read_and_the_damage_told(log, capsys):
+    log.write_bytes(log.read_bytes()[:-30])
+    assert run(["replay", str(log)]) == 0
+    assert "cut off" in capsys.readouterr().out
+
+
+@pytest.mark.recordings
+def test_a_recorded_flight_gives_the_truth_of_its_simulator(recordings, tmp_path):
+    out = tmp_path / "b02.json"
+    assert run(["replay", str(recordings / "sitl/b02.tlog"), "--json", str(out)]) == 0
+    truth = json.loads((recordings / "sitl/answers.json").read_text())["b02"]
+    (imu,) = json.loads(out.read_text())["imus"]
+    assert imu["status"] == "calibrated"
+    assert imu["calibration"]["scale"] == pytest.approx(truth["scale"], abs=0.006)
+    assert imu["calibration"]["offset"][:2] == pytest.approx(truth["offset"][:2], abs=0.012)
+    assert imu["calibration"]["offset"][2] == pytest.approx(truth["offset"][2], abs=0.06)
+    delay = imu["timing"]["gps_delay_s"]["value"]
+    assert delay == pytest.approx(truth["net_gps_delay_s"], abs=0.015)
+
+
+@pytest.mark.recordings
+def test_two_recordings_of_one_flight_agree(recordings, tmp_path):
+    numbers = []
+    for name in ("c01.tlog", "c01.BIN"):
+        out = tmp_path / "c01.json"
+        assert run(["replay", str(recordings / "sitl" / name), "--json", str(out)]) == 0
+        imus = json.loads(out.read_text())["imus"]
+        numbers.append([i["calibration"]["scale"] + i["calibration"]["offset"] for i in imus])
+    for imu in range(2):
+        for k in range(6):
+            limit = 0.003 if k < 3 else 0.03
+            assert numbers[0][imu][k] == pytest.approx(numbers[1][imu][k], abs=limit)
