@@ -106,7 +106,8 @@ class Calibrator:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
         refusal = impossible(sample)
         if refusal is not None:
-            self._counts[refusal] += 1
+            if not isinstance(sample, ParameterValue):  # unset ones are NaN: nothing is lost
+                self._counts[refusal] += 1
             return ()
         if isinstance(sample, ImuSample):
             events = (

@@ -21,8 +21,8 @@ MOST_SPEED = 1000.0
 MOST_HEIGHT = 1e5
 """m"""
 MOST_PARAMETER = 1e30
-PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("TRIM_", 10.0))
-"""Part of a name, and the magnitude that such a parameter stays below by far."""
+PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
+"""Part of a name that begins with INS or AHRS, and what its magnitude stays below by far."""
 ACCELEROMETERS = range(1, 6)
 
 
@@ -53,7 +53,9 @@ def impossible(sample: Sample) -> str | None:
         ):
             return "gps_impossible"
     elif isinstance(sample, ParameterValue):
-        limit = next((m for k, m in PARAMETER_LIMITS if k in sample.name), MOST_PARAMETER)
+        limit = MOST_PARAMETER
+        if sample.name.startswith(("INS", "AHRS")):
+            limit = next((most for part, most in PARAMETER_LIMITS if part in sample.name), limit)
         if not abs(sample.value) < limit:
             return "parameter_impossible"
     elif not _is_time(sample.t):

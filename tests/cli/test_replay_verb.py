@@ -87,7 +87,7 @@ def test_a_cut_log_is_read_and_the_damage_told(log, capsys):
 def test_a_recorded_flight_gives_the_truth_of_its_simulator(recordings, tmp_path):
     out = tmp_path / "b02.json"
     assert run(["replay", str(recordings / "sitl/b02.tlog"), "--json", str(out)]) == 0
-    truth = json.loads((recordings / "sitl/answers.json").read_text())["b02"]
+    truth = json.loads((recordings / "sitl/answers.json").read_text())["recordings"]["b02"]
     (imu,) = json.loads(out.read_text())["imus"]
     assert imu["status"] == "calibrated"
     assert imu["calibration"]["scale"] == pytest.approx(truth["scale"], abs=0.006)

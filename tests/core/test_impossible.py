@@ -39,6 +39,7 @@ HUGE = (math.nan, math.inf, -math.inf, 1e38, -1e300)
         replace(FIX, altitude=-400.0),
         SCALE,
         replace(SCALE, name="BRD_SERIAL_NUM", value=2.1e9),
+        replace(SCALE, name="COMPASS_OFFS_MAX", value=1800.0),
         VIBE,
     ],
 )
@@ -59,6 +60,7 @@ def test_what_no_sensor_measures_is_refused_by_name(x):
     for sample in (IMU, ATTITUDE, FIX, VIBE):
         assert impossible(replace(sample, t=x)) is not None
     assert impossible(replace(SCALE, value=x)) == "parameter_impossible"
+    assert impossible(replace(SCALE, value=20.0)) == "parameter_impossible"
 
 
 @pytest.mark.parametrize("imu", [0, -1, 6, 200])
