@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 from onboard.core.columns import Direct, Family, Unknown
 from onboard.core.earth import STANDARD_GRAVITY
 from onboard.core.nodes import Around, Signals
-from onboard.core.smoothing import mean_slope
+from onboard.core.smoothing import mean_slope, second_difference
 
 Array = NDArray[np.float64]
 
 AXIS = "xyz"
+THIRD_MOMENT = 1e-3
+"""Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
 
 
 class Six(Family):
@@ -87,17 +89,26 @@ class GpsSmoothing(Family):
 
     def __init__(self, taken: float, sigma: float = 0.2) -> None:
         """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
-        self.unknowns = (Unknown("window_squared", "s^2", 0.0, sigma),)
+        self.unknowns = (
+            Unknown("window_squared", "s^2", 0.0, sigma),
+            Unknown("third_moment", "s^3", 0.0, THIRD_MOMENT),
+        )
         self.taken = taken
 
     def velocity(self, around: Around) -> Direct:
-        """Mean over the span less the value, per s^2 of ``window^2``."""
+        """Mean over the span less the value, per s^2 of ``window^2``; third derivative over 6.
+
+        A filter that looks back (every real one) is not symmetric about its delay; its third
+        central moment would otherwise be taken for delay where the manoeuvre is quick.
+        """
         slope = mean_slope(around.offset, self.taken)
-        return Direct(body=np.einsum("j,kja->ka", slope, around.f_epoch)[..., None])
+        third = second_difference(around.offset) / 6.0
+        return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_epoch))
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span."""
-        body = around.now.f_b[..., None] / 24.0
+        body = np.zeros((len(around.now.t), 3, 2))
+        body[..., 0] = around.now.f_b / 24.0
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
         return Direct(body=body, ned=ned)

@@ -80,9 +80,15 @@ class Calibrator:
         self._waiting: dict[int, SavedEngine] = {}
         self._counts: Counter[str] = Counter()
         self._newest = -np.inf
+        self._first = np.inf
         self._armed: bool | None = None
         self._finished = False
         self.ekf_bias: dict[int, EkfBias] = {}
+
+    @property
+    def first_sample(self) -> float:
+        """Time of the first inertial sample since the clock last began, s."""
+        return self._first
 
     @property
     def trust(self) -> TrustWindow:
@@ -116,6 +122,8 @@ class Calibrator:
                 else ()
             )
             self._newest = max(self._newest, sample.t)
+            if not np.isfinite(self._first):
+                self._first = sample.t
             self._assembly.imu(sample, self.parameters)
             return events
         if isinstance(sample, AttitudeSample):
@@ -159,12 +167,16 @@ class Calibrator:
         Raises:
             KeyError: that accelerometer has not been seen.
         """
+        return self.calibration_with(imu, self._engines[imu])
+
+    def calibration_with(self, imu: int, engine: Engine) -> Calibration:
+        """The same by another engine over the same flight (a diagnosis with more physics)."""
         rejected = Counter(self._trust.rejected)
         rejected.update(self._assembly.refused(imu))
         rejected.update(self._counts)
         return calibration_of(
             imu,
-            self._engines[imu],
+            engine,
             self.parameters,
             finished=self._finished,
             rejected={k: n for k, n in rejected.items() if n},

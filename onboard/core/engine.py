@@ -104,8 +104,10 @@ class Engine:
         point: Linearisation | None = None,
         noise: NoiseLevels | None = None,
         uses: Uses | None = None,
+        more: tuple[Family, ...] = (),
     ) -> None:
-        """Take the settings, the prior six (scale, beta) and where to start."""
+        """Take the settings, the prior six (scale, beta), where to start, and more physics."""
+        self._more = more
         self.settings = settings
         self.prior = prior
         self.point = point or Linearisation()
@@ -126,7 +128,7 @@ class Engine:
         self._solution: Solution | None = None
 
     def _model(self) -> Model:
-        return calibration_model(self.point, self.prior, self.settings)
+        return calibration_model(self.point, self.prior, self.settings, self._more)
 
     def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
         """A pass whose gates know the last solution: an outlier at the start must not pass."""
@@ -159,18 +161,19 @@ class Engine:
         trusted = chunk.duration * float(np.mean(chunk.trusted))
         before, self.trusted_s = self.trusted_s, self.trusted_s + trusted
         self._run(chunk)
-        if any(before < s <= self.trusted_s for s in self.settings.refine_at_s):
+        due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
+        if due and self.settings.refine:
             self.refine()
         self._age()
 
     def _run(self, chunk: Chunk) -> None:
-        result = self._through(self._pass, chunk)
+        result = self.through(self._pass, chunk)
         self.portions.append(result.portion)
         self.refused.update(result.refused)
         self.states.extend(result.states)
         self._solution = None
 
-    def _through(self, made: Pass, chunk: Chunk) -> PassResult:
+    def through(self, made: Pass, chunk: Chunk) -> PassResult:
         """One chunk through a pass; a filter that coasted too long begins anew."""
         if chunk.fresh or chunk.fixes.t[0] - made.coasting_since > self.settings.coast_s:
             made.restart()
@@ -194,12 +197,12 @@ class Engine:
                     for a, b in zip(self.aged[::2], self.aged[1::2], strict=False)
                 ]
 
-    def refine(self) -> None:
+    def refine(self, rounds: int = ROUNDS) -> None:
         """Estimate timing and noise from the buffer and make its sums anew."""
         if not self.chunks or self._frozen:
             return
         levels = self.noise
-        for turn in range(ROUNDS):
+        for turn in range(rounds):
             members = star(levels)
             made = self._new_pass(members)
             portions = self._over_buffer(made)
@@ -233,7 +236,7 @@ class Engine:
         self.model = self._model()
 
     def _over_buffer(self, made: Pass) -> list[Portion]:
-        return [self._through(made, chunk).portion for chunk in self.chunks]
+        return [self.through(made, chunk).portion for chunk in self.chunks]
 
     def restore(self, portions: list[Portion], trusted_s: float) -> None:
         """Take sums of earlier flights, made about this engine's point."""
@@ -246,6 +249,8 @@ class Engine:
 
     def finish(self) -> None:
         """End of a recording or a flight: refine once more if there is something new."""
+        if not self.settings.refine:
+            return
         if self.latest > 0.05 * self.trusted_s and not self._frozen:
             self.refine()
 

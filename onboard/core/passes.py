@@ -61,10 +61,15 @@ class EpochState:
 
 @dataclass(frozen=True, slots=True)
 class EpochTrace:
-    """What one epoch left: for plots, gates and localisation.  ``innovation`` is NED, m/s."""
+    """What one epoch left, for plots, gates and localisation.
+
+    The velocity residual, NED, m/s, at ``theta`` is ``innovation - columns @ theta``; ``y`` and
+    ``h`` are the whitened rows.
+    """
 
     t: float
     innovation: Array
+    columns: Array
     y: Array
     h: Array
     velocities: int
@@ -261,7 +266,14 @@ class Pass:
         if self._keep:
             result.traces.append(
                 EpochTrace(
-                    rows.t, rows.innovation, y[0], h[0], rows.velocities, rows.height, rows.refused
+                    rows.t,
+                    rows.raw_innovation,
+                    rows.raw_columns,
+                    y[0],
+                    h[0],
+                    rows.velocities,
+                    rows.height,
+                    rows.refused,
                 )
             )
         self._epochs += 1

@@ -18,6 +18,7 @@ class EstimatorSettings:
         memory_s: time constant with which older flight is forgotten once the buffer is full, s
             (an accelerometer's offset wanders with temperature and age).
         refine_at_s: trusted seconds after which timing and noise are estimated anew.
+        refine: estimate timing and noise at all; False where a diagnosis will do it itself.
         minimum_s: trusted seconds below which nothing is called calibrated.
         coast_s: longest stretch without an accepted fix that is bridged inertially, s.
         slowest_imu_hz: inertial streams below this rate cannot be integrated.
@@ -29,6 +30,7 @@ class EstimatorSettings:
     buffer_s: float = 600.0
     memory_s: float = 1800.0
     refine_at_s: tuple[float, ...] = (30.0, 120.0, 480.0)
+    refine: bool = True
     minimum_s: float = 45.0
     coast_s: float = 30.0
     slowest_imu_hz: float = 9.0

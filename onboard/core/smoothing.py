@@ -40,6 +40,16 @@ def mean_weights(offset: Array, window: float) -> Array:
     return weights
 
 
+def second_difference(offset: Array) -> Array:
+    """Weights of the second derivative at zero over the middle half of ``offset``, 1/s^2."""
+    n = len(offset)
+    weights = np.zeros(n)
+    middle, reach = n // 2, n // 4
+    h = offset[middle + reach]
+    weights[[middle - reach, middle, middle + reach]] = np.array([1.0, -2.0, 1.0]) / h**2
+    return weights
+
+
 def mean_slope(offset: Array, window: float) -> Array:
     """Derivative of :func:`mean_weights` to ``window^2``; the limit ``V'' / 24`` at zero.
 

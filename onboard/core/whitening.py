@@ -97,7 +97,7 @@ class Rows:
 
     ``y`` (B, r), ``h`` (B, r, m); ``log_det`` (B,); the first ``velocities`` rows are velocity,
     then height if ``height``, then attitude.  ``innovation`` (v rows, m/s) is that of member 0 at
-    the current estimate, not whitened.
+    the current estimate, not whitened, ``raw_innovation`` and ``raw_columns`` its two parts.
     """
 
     t: float
@@ -107,6 +107,8 @@ class Rows:
     velocities: int
     height: bool
     innovation: Array
+    raw_innovation: Array
+    raw_columns: Array
     refused: tuple[str, ...]
 
 
@@ -316,7 +318,8 @@ class WhiteningFilter:
             )
         if rows is None:
             return None if not refused else self._nothing(epoch.t, refused)
-        innovation = np.asarray(E[0, : kinds.count("v"), 0] - E[0, : kinds.count("v"), 1:] @ theta)
+        n = kinds.count("v")
+        first, columns = E[0, :n, 0], E[0, :n, 1:]
         back = np.swapaxes(gain, -1, -2)
         self._X[:, :, :1] += back @ y[:, :, None]
         self._X[:, :, 1:] -= back @ h
@@ -326,7 +329,16 @@ class WhiteningFilter:
         self._correct(theta)
         log_det = 2.0 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         return Rows(
-            epoch.t, y, h, log_det, kinds.count("v"), "h" in kinds, innovation, tuple(refused)
+            epoch.t,
+            y,
+            h,
+            log_det,
+            n,
+            "h" in kinds,
+            first - columns @ theta,
+            first,
+            columns,
+            tuple(refused),
         )
 
     def _nothing(self, t: float, refused: list[str]) -> Rows:
@@ -340,6 +352,8 @@ class WhiteningFilter:
             0,
             False,  # noqa: FBT003 - a record's field
             np.zeros(0),
+            np.zeros(0),
+            np.zeros((0, self.m)),
             tuple(refused),
         )
 

@@ -1,0 +1,115 @@
+"""Effects proportional to what the accelerometer measures: axes, curvature, mounts that give."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Unknown
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.nodes import Signals
+from onboard.core.physics.effect import EffectColumns, Origin, on_axes
+
+Array = NDArray[np.float64]
+
+PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
+
+
+class CrossAxis(EffectColumns):
+    """Sensitivity of each axis to the others; ``xy`` is what x reads too much per unit of y."""
+
+    name = effect = "cross_axis"
+    source = "misalignment matrix without its diagonal, IEEE Std 1293"
+    cure = "ArduPilot has no parameter for it: remount or replace the sensor"
+    apart = "turn through all headings with bank and pitch: a tilt turns all axes alike"
+    keys = PAIRS
+    plausible = (0.15,) * 6
+    unknowns = tuple(Unknown(f"cross_{p}", "1", 0.0, 0.15) for p in PAIRS)
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``-e_i f_j``."""
+        out = np.zeros((*nodes.t.shape, 3, 6))
+        for k, pair in enumerate(PAIRS):
+            out[..., "xyz".index(pair[0]), k] = -nodes.f_b[..., "xyz".index(pair[1])]
+        return out
+
+
+class ForceTilt(EffectColumns):
+    """Accelerometer tilted against gyroscope and body: ``measured = true + tilt x ...``."""
+
+    name = "force_tilt"
+    effect = "mount_tilt"
+    source = "small rotation about x and y, fixed in the body"
+    cure = "level the autopilot again (accelerometer level calibration), or set AHRS_TRIM"
+    apart = "turn through all headings with bank and pitch"
+    keys = ("roll", "pitch")
+    plausible = (0.3, 0.3)
+    unknowns = (
+        Unknown("force_tilt_roll", "rad", 0.0, 0.15),
+        Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
+    )
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``e x f`` and so on: the recorded attitude is ``tilt`` too large.
+
+        An attitude that reads ``tilt`` too large turns the force by ``tilt`` too much; the
+        accelerometer's own rotation by minus ``tilt`` is the same thing.
+        """
+        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        return np.stack([np.cross(nodes.f_b, ex), np.cross(nodes.f_b, ey)], axis=-1)
+
+    def parameters(self, values: dict[str, float]) -> dict[str, float]:  # type: ignore[override] # narrower on purpose
+        """The trim that takes the tilt out again."""
+        return {"AHRS_TRIM_X": values["roll"], "AHRS_TRIM_Y": values["pitch"]}
+
+
+class ScaleNonlinearity(EffectColumns):
+    """Scale that changes with the load: second-order coefficient, per g."""
+
+    name = effect = "scale_nonlinearity"
+    source = "K2 of IEEE Std 1293"
+    cure = "ArduPilot has no parameter for it: stay inside the sensor's range, or replace it"
+    apart = "fly at several load factors: steep turns, pull-ups, push-overs"
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+        self._three("1/g", 0.1)
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``-f_i^2 / g e_i``."""
+        return on_axes(nodes.f_b**2 / STANDARD_GRAVITY)
+
+
+class LoadFlex(EffectColumns):
+    """Mount that bends with the load: tilt per g of load beyond one."""
+
+    name = effect = "load_flex"
+    source = "linear spring: tilt = flex (n - 1), n = -f_z / g"
+    cure = "stiffen the autopilot's mount"
+    apart = "pull up and turn steeply: only a flexing mount follows the load factor"
+    keys = ("roll", "pitch")
+    plausible = (0.2, 0.2)
+    unknowns = (
+        Unknown("load_flex_roll", "rad/g", 0.0, 0.1),
+        Unknown("load_flex_pitch", "rad/g", 0.0, 0.1),
+    )
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """As a tilt, times ``n - 1``."""
+        extra = -nodes.f_b[..., 2] / STANDARD_GRAVITY - 1.0
+        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        tilt = np.stack([np.cross(nodes.f_b, ex), np.cross(nodes.f_b, ey)], axis=-1)
+        return tilt * extra[..., None, None]

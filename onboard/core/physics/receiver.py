@@ -1,0 +1,71 @@
+"""Effects of the receiver: where its antenna is, how its clock runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Direct, Unknown
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.nodes import Around
+from onboard.core.physics.effect import AXES, EffectColumns, Origin
+
+Array = NDArray[np.float64]
+
+
+class LeverArm(EffectColumns):
+    """Antenna away from the IMU: its velocity has the part of the rotation."""
+
+    name = effect = "gps_lever_arm"
+    source = "rigid body: v_antenna = v + R (w x r)"
+    cure = "measure the antenna's place and set GPS1_POS_*"
+    apart = "pitch, roll and yaw quickly while GPS is good"
+    keys = tuple(AXES)
+    plausible = (5.0, 5.0, 5.0)
+    unknowns = tuple(Unknown(f"lever_{a}", "m", 0.0, 2.0) for a in AXES)
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+
+    def velocity(self, around: Around) -> Direct:
+        """``R (w x e_i)``."""
+        w = around.now.w_b
+        body = np.stack([np.cross(w, e) for e in np.eye(3)], axis=-1)
+        return Direct(body=body)
+
+    def position(self, around: Around) -> Direct:
+        """``R e_i``."""
+        return Direct(body=np.broadcast_to(np.eye(3), (len(around.now.t), 3, 3)))
+
+    def parameters(self, values: dict[str, float]) -> dict[str, float]:  # type: ignore[override] # narrower on purpose
+        """Antenna position against the IMU, which is taken as the body's origin."""
+        return {f"GPS1_POS_{a.upper()}": values[a] for a in AXES}
+
+
+class ClockSkew(EffectColumns):
+    """Receiver stamps that drift against the IMU's clock."""
+
+    name = effect = "clock_skew"
+    source = "delay that grows: rate (t - t0)"
+    cure = "look at the time stamps: driver, transport, or a log put together from two clocks"
+    apart = "fly longer"
+    keys = ("rate",)
+    plausible = (0.01,)
+    unknowns = (Unknown("clock_rate", "1", 0.0, 3e-3),)
+
+    def __init__(self, origin: Origin) -> None:
+        """Take the time from which it counts."""
+        self._t0 = origin.t0
+
+    def velocity(self, around: Around) -> Direct:
+        """``-a (t - t0)``."""
+        age = around.now.t - self._t0
+        body = -around.now.f_b[..., None] * age[:, None, None]
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = -STANDARD_GRAVITY * age
+        return Direct(body=body, ned=ned)
+
+    def position(self, around: Around) -> Direct:
+        """``-v (t - t0)``."""
+        return Direct(along_velocity=-(around.now.t - self._t0)[:, None])
