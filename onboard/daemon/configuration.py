@@ -70,7 +70,7 @@ class PushSettings(Section, frozen=True, kw_only=True):
     scale_max: Annotated[float, Meta(gt=1.0, le=1.2)] = 1.2
     offset_max: Annotated[float, Meta(gt=0.0, le=3.5)] = 3.5
     scale_sigma_max: Positive = 0.005
-    offset_sigma_max: Positive = 0.03
+    offset_sigma_max: Positive = 0.05
     improvement: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.97
     in_flight_scale_step: Annotated[float, Meta(gt=0.0, le=0.05)] = 0.005
     in_flight_offset_step: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.05
