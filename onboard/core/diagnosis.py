@@ -89,7 +89,7 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
     if step is not None:
         # A step may have passed for something slower: what it does not leave is dropped.
         families = _still_needed(engine, chunks, families)
-    final = _engine(engine, chunks, families, rounds=3, start=full)
+    final = _engine(engine, chunks, families, rounds=2, start=full)
     traces = _traces(final)
     calibration = calibrator.calibration_with(imu, final)
     return _Judge(
@@ -123,7 +123,7 @@ def _engine(
     made = Engine(settings, like.prior, origin.point, origin.noise, more=tuple(families))
     made.chunks = list(chunks)
     made.trusted_s = like.trusted_s
-    made.refine(rounds)
+    made.refine(rounds, 2 if start is None else 0)
     return made
 
 

@@ -35,7 +35,9 @@ from onboard.core.whitening import Uses
 Array = NDArray[np.float64]
 
 ROUNDS = 4
-"""Rounds of a refinement: latency is found to a millisecond in two, noise within 10 % in three."""
+"""Rounds of a refinement: latency is found to a millisecond in two or three."""
+NOISE_ROUNDS = 2
+"""Each round may change a level by four; refinements follow each other as the flight goes on."""
 MOST_STATES = 12000
 """Epochs whose state is kept for certificates: 20 minutes at 10 Hz."""
 LONGEST_WINDOW_S = 0.45
@@ -197,18 +199,24 @@ class Engine:
                     for a, b in zip(self.aged[::2], self.aged[1::2], strict=False)
                 ]
 
-    def refine(self, rounds: int = ROUNDS) -> None:
-        """Estimate timing and noise from the buffer and make its sums anew."""
+    def refine(self, rounds: int = ROUNDS, noise_rounds: int = NOISE_ROUNDS) -> None:
+        """Estimate timing and noise from the buffer and make its sums anew.
+
+        Args:
+            rounds: passes at the most.
+            noise_rounds: how many of them try other noise levels too.
+        """
         if not self.chunks or self._frozen:
             return
         levels = self.noise
         for turn in range(rounds):
-            members = star(levels)
+            trying = turn < noise_rounds
+            members = star(levels) if trying else (levels,)
             made = self._new_pass(members)
             portions = self._over_buffer(made)
             self._seed = solve(portions, self.model)
             point = moved(self.point, self.model, self._seed.theta)
-            next_levels = stepped(levels, made.log_likelihoods())
+            next_levels = stepped(levels, made.log_likelihoods()) if trying else levels
             settled = (
                 distance(levels, next_levels) < 0.15
                 and abs(point.delay - self.point.delay) < 5e-4
@@ -216,7 +224,7 @@ class Engine:
             )
             self._move(point, next_levels)
             levels = next_levels
-            if settled and turn > 0:
+            if settled and (turn > 0 or not trying):
                 break
         self._pass = self._new_pass()
         self.refused.clear()

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.earth import STANDARD_GRAVITY, coriolis_n, earth_rate_n, transport_rate_n
+from onboard.core.earth import EARTH_RATE, SEMI_MAJOR_AXIS, STANDARD_GRAVITY
 from onboard.core.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
 
 Array = NDArray[np.float64]
@@ -112,6 +112,22 @@ class Rows:
     refused: tuple[str, ...]
 
 
+_EYE = np.eye(STATES)
+_DIAGONAL = np.arange(STATES)
+_DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
+
+
+def _earth(latitude: float, v_n: Array) -> tuple[Array, Array]:
+    """Coriolis acceleration and turning of NED, for one vector (:mod:`onboard.core.earth`)."""
+    north, east, down = (float(x) for x in v_n)
+    c, s = np.cos(latitude), np.sin(latitude)
+    # A sphere's radius does: half a per cent of 1e-6 rad/s.
+    w = (east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS, -east * s / c / SEMI_MAJOR_AXIS)
+    x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
+    carried = np.array([z * east - y * down, x * down - z * north, y * north - x * east])
+    return carried, np.array([EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2]])
+
+
 def _skew(a: Array) -> Array:
     x, y, z = a
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -182,6 +198,9 @@ class WhiteningFilter:
         self._height_off: float | None = None
         self._attitude_off: float | None = None
         self.noise_gram = np.zeros(3)
+        # Noise in the columns is only wanted where the sums will count, not while levels are tried.
+        self._one = B == 1
+        self._updates = 0
         self._Xi = np.zeros((3, STATES, STATES))
 
     def start(self, epoch: Epoch, R_nb: Array, tilt_sigma: float, heading_sigma: float) -> None:
@@ -247,7 +266,7 @@ class WhiteningFilter:
         S, S2 = R @ step.force, R @ step.force_to_end
         A = R @ step.mean_turn
         lever = _skew(S - S2 / T)
-        F = np.eye(STATES)
+        F = _EYE.copy()
         F[V, PSI] = -_skew(S)
         F[PSI, BIAS] = -A
         F[V, BIAS] = lever @ A
@@ -257,12 +276,11 @@ class WhiteningFilter:
         F[range(10, 13), range(10, 13)] = keep_att
         F[range(14, 17), range(14, 17)] = keep_cv
 
-        v_n = self._X[0, V, 0] + self._X[0, V, 1:] @ theta
-        down = np.array([0.0, 0.0, STANDARD_GRAVITY])
-        turn_n = np.zeros(3)
+        down = _DOWN
+        turn_n = None
         if self.uses.earth:
-            down = down + coriolis_n(latitude, 0.0, v_n)
-            turn_n = earth_rate_n(latitude) + transport_rate_n(latitude, 0.0, v_n)
+            carried, turn_n = _earth(latitude, self._X[0, V, 0] + self._X[0, V, 1:] @ theta)
+            down = down + carried
 
         X = F @ self._X
         turned = R @ step.columns_turn
@@ -279,12 +297,18 @@ class WhiteningFilter:
         if self.uses.recorded_attitude:
             Q[:, PSI] = Q[:, BIAS] = Q[:, ATT] = 0.0
         # Noise acts along the interval: half of it before, half after the transition.
+        Q *= 0.5
+        P, diagonal = self._P, _DIAGONAL
+        P[:, diagonal, diagonal] += Q
         Ft = F.T
-        self._P = F @ self._P @ Ft + ((F * Q[:, None, :]) @ Ft + Q[:, :, None] * np.eye(STATES)) / 2
-        axis = R @ np.eye(3)
-        self._Xi = F @ self._Xi @ Ft
-        self._Xi[:, V, V] += T * axis.T[:, :, None] * axis.T[:, None, :]
-        self.R_nb = _turn(-turn_n * T) @ R @ step.turn
+        P = F @ P @ Ft
+        P[:, diagonal, diagonal] += Q
+        self._P = P
+        if self._one:
+            self._Xi = F @ self._Xi @ Ft
+            self._Xi[:, V, V] += T * R.T[:, :, None] * R.T[:, None, :]
+        R = R @ step.turn
+        self.R_nb = R if turn_n is None else _turn(-turn_n * T) @ R
         self.t += T
 
     def update(self, epoch: Epoch, theta: Array, covariance: Array) -> Rows | None:
@@ -324,8 +348,13 @@ class WhiteningFilter:
         self._X[:, :, :1] += back @ y[:, :, None]
         self._X[:, :, 1:] -= back @ h
         P = self._P - back @ gain
-        self._P = (P + np.swapaxes(P, -1, -2)) / 2
-        self._noise_rows(L[0], back[0], index)
+        self._updates += 1
+        if self._updates % 16 == 0:
+            # Rounding makes it drift from symmetry only slowly.
+            P = (P + np.swapaxes(P, -1, -2)) / 2
+        self._P = P
+        if self._one:
+            self._noise_rows(L[0], back[0], index)
         self._correct(theta)
         log_det = 2.0 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         return Rows(
@@ -420,7 +449,10 @@ class WhiteningFilter:
                 continue
             r, D = y[at : at + n] - h[at : at + n] @ theta, h[at : at + n]
             at += n
-            chi2 = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
+            chi2 = float(r @ r)
+            if chi2 > limit:
+                # Only now the estimate's own uncertainty matters: it can but lower the figure.
+                chi2 = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
             if chi2 > limit:
                 if kind == "v":
                     return name
