@@ -75,7 +75,8 @@ class Format:
     def numbers(self, records: Records, column: str) -> NDArray[np.float64]:
         """(n,) a numeric field in the unit that its format letter implies."""
         divisor = FIELD_TYPES[self.letter(column)][1]
-        values = records[column].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN, by a flipped bit
+            values = records[column].astype(np.float64)
         return values if divisor == 1.0 else values / divisor
 
 

@@ -116,8 +116,9 @@ def _load(path: Path) -> tuple[dict[tuple[str, int], Columns], list[Sample], tup
 def _converted(convert: Converter, instance: int, columns: Columns) -> Stream | None:
     """The samples of a topic; None where it has not the fields, or not those we know."""
     try:
-        t = columns["timestamp"].astype(np.float64) / 1e6
-        return t, convert(t, columns, instance)
+        with np.errstate(all="ignore"):  # damaged bytes make any number
+            t = columns["timestamp"].astype(np.float64) / 1e6
+            return t, convert(t, columns, instance)
     except KeyError:
         return None
 

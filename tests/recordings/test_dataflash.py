@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -191,6 +192,13 @@ def test_garbage_in_the_middle_and_a_cut_end(tmp_path):
     assert recording.counts["IMU"] >= 199
     assert len(recording.damage) == 2
     assert "cut off" in recording.damage[1]
+
+
+def test_a_signalling_nan_is_read_without_a_warning(tmp_path):
+    clean = bytes(modern_log(1))
+    damaged = clean.replace(struct.pack("<f", 0.01), b"\x01\x00\x80\x7f", 1)
+    first = of_type(saved(tmp_path, damaged), ImuSample)[0]
+    assert math.isnan(first.w_b[0])
 
 
 def test_unused_end_of_a_flash_page_is_no_damage(tmp_path):
