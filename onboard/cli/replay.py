@@ -21,7 +21,15 @@ from onboard.replay import replay as replay_recordings
 STANDARD_OUTPUT = "-"
 
 
-@click.command()
+EXAMPLES = """\
+\b
+onboard replay flight.BIN
+onboard replay monday.tlog tuesday.tlog --imu 2
+onboard replay flight.BIN --json - | jq '.imus[0].calibration'
+"""
+
+
+@click.command(epilog=EXAMPLES)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...", type=click.Path(path_type=Path))
 @click.option(
     "--json",
@@ -33,15 +41,10 @@ STANDARD_OUTPUT = "-"
     "--imu", type=click.IntRange(1, 5), metavar="N", help="This accelerometer only, 1 to 5."
 )
 def replay(logs: tuple[Path, ...], json_file: str | None, imu: int | None) -> None:
-    r"""Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
+    """Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
 
     Several LOGs of one vehicle are merged: what a single flight does not show, several may.
     Nothing is written to any autopilot; the table says which parameters to set.
-
-    \b
-    onboard replay flight.BIN
-    onboard replay monday.tlog tuesday.tlog --imu 2
-    onboard replay flight.BIN --json - | jq '.imus[0].calibration'
     """
     with _progress(logs) as progress:
         result = replay_recordings(logs, Calibrator(), imu=imu, progress=progress)

@@ -27,6 +27,12 @@ def test_a_short_log_gets_a_table_and_no_confident_numbers(log, capsys):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_the_help_shows_each_example_on_a_line_of_its_own(capsys):
+    assert run(["replay", "--help"]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert "onboard replay flight.BIN" in lines
+
+
 def test_json_on_standard_output_is_alone_there(log, capsys):
     assert run(["replay", str(log), "--json", "-", "--imu", "2"]) == 0
     out, err = capsys.readouterr()
