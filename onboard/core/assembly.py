@@ -206,7 +206,9 @@ class Assembly:
     def _rotation(self, angles: Array, parameters: ParametersInForce) -> Array:
         """Attitude of the accelerometer's body axes from what was reported."""
         roll, pitch, yaw = angles.T
-        if parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
+        # Firmware that has trims but no choice of EKF is older than the EKFs.
+        old = "AHRS_TRIM_X" in parameters.values and "AHRS_EKF_TYPE" not in parameters.values
+        if old or parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
             return untrimmed_rotation_dcm(roll, pitch, yaw, parameters.trim)
         pitch_trim = 0.0
         if self._over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:

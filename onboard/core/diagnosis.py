@@ -382,20 +382,26 @@ class _Judge:
 
     def diagnosis(self) -> Diagnosis:
         timing = timing_of(self.engine, self.solution)
-        standing = standing_effects(timing, self.solution, self.index, self.told)
+        standing = standing_effects(
+            timing, self.solution, self.index, self.told, self.calibrator.parameters.trim
+        )
         ladder, held = self._ladder()
         before, after = held[0], held[-1]
         effects = [self._standing(n, q, cure, p) for n, (q, cure, p) in standing.items()]
         effects += [self._effect(f) for f in self.families]
         for made in (
-            fault_effect(self.traces, self.engine.chunks, self.calibrator, self.origin.t0),
+            fault_effect(
+                self.traces,
+                self.engine.chunks,
+                self.calibrator,
+                self.origin.t0,
+                self.engine.noise,
+            ),
             saturation_effect(self.engine.chunks, self.origin.t0),
         ):
             if made is not None:
                 effects.append(made)
-        insufficient = self.calibration.coverage.percent < 1.0 or not any(
-            self.calibration.observable
-        )
+        insufficient = not self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after)
         verdict, note = self._verdict(effects, insufficient=insufficient)
         if verdict is Verdict.INSUFFICIENT:

@@ -121,6 +121,7 @@ class Engine:
         self.refused: Counter[str] = Counter()
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
+        self._speed: deque[float] = deque(maxlen=MOST_STATES)
         self._buffered_s = 0.0
         self._refined_s = 0.0
         self._frozen = False
@@ -162,6 +163,8 @@ class Engine:
         self._buffered_s += chunk.duration
         trusted = chunk.duration * float(np.mean(chunk.trusted))
         before, self.trusted_s = self.trusted_s, self.trusted_s + trusted
+        speed = np.hypot(chunk.fixes.v_n[chunk.trusted, 0], chunk.fixes.v_n[chunk.trusted, 1])
+        self._speed.extend(float(v) for v in speed if np.isfinite(v))
         self._run(chunk)
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
@@ -245,6 +248,16 @@ class Engine:
 
     def _over_buffer(self, made: Pass) -> list[Portion]:
         return [self.through(made, chunk).portion for chunk in self.chunks]
+
+    @property
+    def brisk_speed(self) -> float:
+        """Speed over ground that is exceeded in a tenth of the flight, m/s."""
+        return float(np.percentile(self._speed, 90)) if self._speed else 0.0
+
+    @property
+    def moving(self) -> bool:
+        """True if the flight went anywhere: hovering and standing excite nothing."""
+        return self.brisk_speed >= self.settings.brisk_speed
 
     def restore(self, portions: list[Portion], trusted_s: float) -> None:
         """Take sums of earlier flights, made about this engine's point."""

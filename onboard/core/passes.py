@@ -75,6 +75,7 @@ class EpochTrace:
     velocities: int
     height: bool
     refused: tuple[str, ...]
+    refused_by: Array
 
 
 @dataclass(slots=True)
@@ -274,6 +275,7 @@ class Pass:
                     rows.velocities,
                     rows.height,
                     rows.refused,
+                    rows.refused_by,
                 )
             )
         self._epochs += 1

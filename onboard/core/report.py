@@ -150,6 +150,9 @@ def _status(
             "AHRS_ORIENTATION is unknown or not a multiple of 90 degrees: scale and offset of the "
             "sensor's axes cannot be separated from here. " + note
         )
+    if not engine.moving:
+        note = "hovering or standing: fly fast, brake hard, turn both ways. " + note
+        return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
     enough = engine.trusted_s >= engine.settings.minimum_s
     if enough and sum(seen.observed) >= FEWEST_OBSERVED:
         return Status.CALIBRATED, note

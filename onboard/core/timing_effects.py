@@ -14,25 +14,37 @@ from numpy.typing import NDArray
 from onboard.core.calibrator import Calibrator
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
+from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace
 from onboard.core.result import Estimate
+from onboard.core.samples import Vector3
 from onboard.core.solution import Solution
 
 Array = NDArray[np.float64]
 
 LATENCY_S, WINDOW_S, IMU_DELAY_S = 0.05, 0.15, 0.03
+TRIM_RAD = np.deg2rad(0.5)
 TILT_RAD, HEADING_RAD = np.deg2rad(1.0), np.deg2rad(2.5)
 SURE = 4.0
 FAULT_S = 1.0
+FAULT_M_S = 0.7
 RAIL_SAMPLES, RAIL_RUN = 12, 4
 
 Standing = dict[str, tuple[dict[str, Quantity], str, dict[str, float]]]
 
 
 def standing_effects(
-    timing: Mapping[str, Estimate], solution: Solution, index: Mapping[str, int], told: float
+    timing: Mapping[str, Estimate],
+    solution: Solution,
+    index: Mapping[str, int],
+    told: float,
+    trim: Vector3,
 ) -> Standing:
-    """Timing and constant attitude errors that are large enough and sure enough to report."""
+    """Timing and constant attitude errors that are large enough and sure enough to report.
+
+    The tilt is that of the attitude *as recorded*: AHRS_TRIM, which was taken out of it before,
+    is part of it, and a trim that is set makes half a degree worth mentioning.
+    """
     out: Standing = {}
     delay = timing["gps_delay_s"]
     if abs(delay.value - told) > LATENCY_S and abs(delay.value - told) > SURE * delay.sigma:
@@ -57,19 +69,25 @@ def standing_effects(
         )
     sigma = np.sqrt(np.diag(solution.covariance))
     roll, pitch, yaw = (index[n] for n in ("tilt_roll", "tilt_pitch", "heading"))
-    tilt = np.hypot(solution.theta[roll], solution.theta[pitch])
-    if tilt > TILT_RAD and tilt > SURE * max(sigma[roll], sigma[pitch]):
-        values = {"roll": roll, "pitch": pitch}
+    extra_roll, extra_pitch = float(solution.theta[roll]), float(solution.theta[pitch])
+    spread = float(max(sigma[roll], sigma[pitch]))
+    extra, known = float(np.hypot(extra_roll, extra_pitch)), float(np.hypot(*trim[:2]))
+    whole = float(np.hypot(extra_roll - trim[0], extra_pitch - trim[1]))
+    missing = extra > TILT_RAD and extra > SURE * spread
+    trimmed = known > TRIM_RAD and whole > TRIM_RAD and whole > 3.0 * spread
+    if missing or trimmed:
+        cure = "level the autopilot again, or set AHRS_TRIM"
+        if not missing:
+            cure = "none: AHRS_TRIM holds this tilt already and was added back"
         out["mount_tilt"] = (
             {
-                k: Quantity(float(solution.theta[i]), float(sigma[i]), "rad")
-                for k, i in values.items()
+                "roll": Quantity(extra_roll - trim[0], float(sigma[roll]), "rad"),
+                "pitch": Quantity(extra_pitch - trim[1], float(sigma[pitch]), "rad"),
             },
-            "level the autopilot again, or set AHRS_TRIM",
-            {
-                "AHRS_TRIM_X": float(solution.theta[roll]),
-                "AHRS_TRIM_Y": float(solution.theta[pitch]),
-            },
+            cure,
+            {"AHRS_TRIM_X": trim[0] - extra_roll, "AHRS_TRIM_Y": trim[1] - extra_pitch}
+            if missing
+            else {"AHRS_TRIM_X": trim[0], "AHRS_TRIM_Y": trim[1]},
         )
     heading = float(solution.theta[yaw])
     if abs(heading) > HEADING_RAD and abs(heading) > SURE * sigma[yaw]:
@@ -82,7 +100,11 @@ def standing_effects(
 
 
 def fault_effect(
-    traces: Sequence[EpochTrace], chunks: Sequence[Chunk], calibrator: Calibrator, t0: float
+    traces: Sequence[EpochTrace],
+    chunks: Sequence[Chunk],
+    calibrator: Calibrator,
+    t0: float,
+    levels: NoiseLevels,
 ) -> Effect | None:
     """GPS velocities that cannot be true: refused by the innovation gate or by plausibility."""
     bad = [(x.t, True) if "velocity" in x.refused else (x.t, False) for x in traces]
@@ -95,6 +117,10 @@ def fault_effect(
         ]
     bad.sort()
     intervals: list[tuple[float, float]] = []
+    sizes: list[float] = []
+    # A refused fix is a fault only if it is off by what no honest receiver is off.
+    least = max(FAULT_M_S, 8.0 * float(np.hypot(levels.velocity, levels.velocity_colour)))
+    seen = [(x.t, float(np.linalg.norm(x.refused_by))) for x in traces if "velocity" in x.refused]
     start = last = None
     count = 0
     for t, is_bad in [*bad, (np.inf, False)]:
@@ -102,8 +128,11 @@ def fault_effect(
             start, count = (t, 1) if start is None else (start, count + 1)
             last = t
         elif start is not None and last is not None and t - last > 2.0:
-            if count >= 3 and last - start >= FAULT_S:
+            off = [x for x in seen if start <= x[0] <= last]
+            size = float(np.median([x[1] for x in off])) if off else np.inf
+            if count >= 3 and last - start >= FAULT_S and size > least:
                 intervals.append((start - t0, last - t0))
+                sizes.append(size)
             start, count = None, 0
     if not intervals:
         return None
@@ -111,6 +140,11 @@ def fault_effect(
     return Effect(
         name="gps_fault",
         unknowns={
+            "offset": Quantity(
+                float(np.max([x for x in sizes if np.isfinite(x)], initial=0.0)),
+                float(least / 8.0),
+                "m/s",
+            ),
             "duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s"),
         },
         share_of_mismatch=len(inside) / max(len(traces), 1),

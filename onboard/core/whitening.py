@@ -97,7 +97,8 @@ class Rows:
 
     ``y`` (B, r), ``h`` (B, r, m); ``log_det`` (B,); the first ``velocities`` rows are velocity,
     then height if ``height``, then attitude.  ``innovation`` (v rows, m/s) is that of member 0 at
-    the current estimate, not whitened, ``raw_innovation`` and ``raw_columns`` its two parts.
+    the current estimate, not whitened, ``raw_innovation`` and ``raw_columns`` its two parts,
+    ``refused_by`` that of a velocity that was refused.
     """
 
     t: float
@@ -110,6 +111,7 @@ class Rows:
     raw_innovation: Array
     raw_columns: Array
     refused: tuple[str, ...]
+    refused_by: Array
 
 
 _EYE = np.eye(STATES)
@@ -320,6 +322,7 @@ class WhiteningFilter:
             covariance: (m, m) of it.
         """
         refused: list[str] = []
+        off = np.zeros(0)
         use_v = epoch.trusted and bool(np.all(np.isfinite(epoch.velocity[:2])))
         use_h = self.uses.height and epoch.trusted and bool(np.isfinite(epoch.height))
         use_a = self.uses.attitude and epoch.R_attitude is not None
@@ -335,13 +338,16 @@ class WhiteningFilter:
             if bad is None:
                 break
             refused.append(bad)
+            if bad == "velocity":
+                n = kinds.count("v")
+                off = E[0, :n, 0] - E[0, :n, 1:] @ theta
             use_v, use_h, use_a = (
                 use_v and bad != "velocity",
                 use_h and bad != "height",
                 use_a and bad != "attitude",
             )
         if rows is None:
-            return None if not refused else self._nothing(epoch.t, refused)
+            return None if not refused else self._nothing(epoch.t, refused, off)
         n = kinds.count("v")
         first, columns = E[0, :n, 0], E[0, :n, 1:]
         back = np.swapaxes(gain, -1, -2)
@@ -368,9 +374,10 @@ class WhiteningFilter:
             first,
             columns,
             tuple(refused),
+            off,
         )
 
-    def _nothing(self, t: float, refused: list[str]) -> Rows:
+    def _nothing(self, t: float, refused: list[str], off: Array) -> Rows:
         B = len(self.bank)
         empty = np.zeros((B, 0))
         return Rows(
@@ -384,6 +391,7 @@ class WhiteningFilter:
             np.zeros(0),
             np.zeros((0, self.m)),
             tuple(refused),
+            off,
         )
 
     def _rows(
