@@ -60,7 +60,10 @@ class Assembly:
 
     def attitude(self, sample: AttitudeSample) -> None:
         """Take a recorded attitude."""
-        self._attitude.add(sample.t, (sample.roll, sample.pitch, sample.yaw))
+        angles = (sample.roll, sample.pitch, sample.yaw)
+        # All three exactly zero: an estimator that has not begun.
+        if angles != (0.0, 0.0, 0.0):
+            self._attitude.add(sample.t, angles)
 
     def slow(self, sample: Vibration | Throttle | AirData) -> None:
         """Take a signal that only diagnosis looks at."""
@@ -151,7 +154,8 @@ class Assembly:
                 continue
             begin, end = t[piece[0]], t[piece[-1]]
             inside = np.flatnonzero((fixes.t >= begin + REACH_S - 0.1) & (fixes.t <= end - 0.3))
-            good = inside[trusted[inside]]
+            known = fixes.t[inside] >= self._attitude.first + REACH_S
+            good = inside[trusted[inside] & known]
             if len(good) == 0:
                 continue
             fresh = self._fresh.get(imu) != float(fixes.t[inside[0]])

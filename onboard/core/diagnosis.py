@@ -396,6 +396,7 @@ class _Judge:
                 self.calibrator,
                 self.origin.t0,
                 self.engine.noise,
+                self.engine.settings.coast_s,
             ),
             saturation_effect(self.engine.chunks, self.origin.t0),
         ):

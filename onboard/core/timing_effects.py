@@ -105,6 +105,7 @@ def fault_effect(
     calibrator: Calibrator,
     t0: float,
     levels: NoiseLevels,
+    coast_s: float,
 ) -> Effect | None:
     """GPS velocities that cannot be true: refused by the innovation gate or by plausibility."""
     bad = [(x.t, True) if "velocity" in x.refused else (x.t, False) for x in traces]
@@ -130,7 +131,9 @@ def fault_effect(
         elif start is not None and last is not None and t - last > 2.0:
             off = [x for x in seen if start <= x[0] <= last]
             size = float(np.median([x[1] for x in off])) if off else np.inf
-            if count >= 3 and last - start >= FAULT_S and size > least:
+            # A filter that had to begin anew does not tell its own failure from the receiver's.
+            lost = last - start >= 0.95 * coast_s and bool(off)
+            if count >= 3 and last - start >= FAULT_S and size > least and not lost:
                 intervals.append((start - t0, last - t0))
                 sizes.append(size)
             start, count = None, 0

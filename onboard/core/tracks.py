@@ -119,6 +119,11 @@ class SlowTrack:
         return len(self._t)
 
     @property
+    def first(self) -> float:
+        """Time of the oldest value; inf if there is none."""
+        return self._t[0] if self._t else np.inf
+
+    @property
     def last(self) -> float:
         """Time of the newest value; -inf if there is none."""
         return self._t[-1] if self._t else -np.inf
