@@ -158,8 +158,9 @@ def read_imu(
         [RANGE]
         + [e.limit for e in truth.effects if isinstance(e, fx.Saturation) and _hits(e.imu, index)]
     )
+    raw = np.round(raw / RESOLUTION) * RESOLUTION
     rail = np.any(np.abs(raw) >= limit, axis=1)
-    raw = np.clip(np.round(raw / RESOLUTION) * RESOLUTION, -limit, limit)
+    raw = np.clip(raw, -limit, limit)
     gyro = _gyro(trajectory, imu, stream(4), stream(5), t)
     return ImuReadings(
         raw=raw,
