@@ -8,6 +8,16 @@ from pathlib import Path
 import pytest
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--sitl=builtin|ardupilot``: which simulated autopilot the end-to-end tests fly."""
+    parser.addoption(
+        "--sitl",
+        choices=("builtin", "ardupilot"),
+        default="builtin",
+        help="simulated autopilot of the end-to-end tests [builtin]",
+    )
+
+
 @pytest.fixture(scope="session")
 def recordings() -> Path:
     """The folder of shared recordings: ONBOARD_RECORDINGS, or beside the project; else skip."""

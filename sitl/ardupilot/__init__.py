@@ -1,0 +1,1 @@
+"""A real ArduPilot SITL binary: found, started, given a truth, and stopped."""

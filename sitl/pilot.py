@@ -1,0 +1,308 @@
+"""A pilot of any ArduPilot, real or built in: an independent MAVLink client (MAVSDK) that flies.
+
+It arms, takes off, flies random manoeuvres that excite every axis, and lands.  All waiting is
+by the autopilot's own clock, so that the speed of the simulation does not matter; a limit on
+the wall clock only catches a simulator that has died.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import random
+from collections.abc import AsyncIterator, Callable
+from typing import Any, TypeAlias
+
+from mavsdk.asyncio import Configuration, Mavsdk
+from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
+from mavsdk.asyncio.plugins.param import ParamAsync
+from mavsdk.logging import log_subscribe
+from mavsdk.plugins.mavlink_direct import MavlinkMessage
+from mavsdk.plugins.param import ParamError
+
+from sitl.errors import SitlError
+
+GROUND_STATION = (255, 190)
+"""MAV_GCS_SYSID: the only one whose stick inputs ArduPilot takes."""
+Plugin: TypeAlias = Any
+"""Objects of MAVSDK, which has no types."""
+ARMED = 128
+ACCEPTED = 0
+SILENCE = 60.0
+"""Wall-clock seconds without the wanted event after which a simulator counts as dead."""
+MODES = {
+    "copter": {"guided": 4, "land": 9},
+    "plane": {"take off": 13, "fly by wire": 6, "land": 26},
+}
+ARM_DISARM, TAKE_OFF, SET_MODE, SET_INTERVAL = 400, 22, 176, 511
+GUIDED_VELOCITY_AND_YAW = 0b0000_1001_1100_0111
+"""Type mask of SET_POSITION_TARGET_LOCAL_NED: velocity and yaw count, nothing else."""
+
+
+class Pilot:
+    """Flies one vehicle.  Use :meth:`at` to get one."""
+
+    def __init__(self, vehicle: str, system: Plugin, *, seed: int = 1) -> None:
+        self.vehicle = vehicle
+        self._direct = MavlinkDirectAsync(system)
+        self._param = ParamAsync(system)
+        self._random = random.Random(seed)  # noqa: S311 - manoeuvres, not secrets
+        self._state: dict[str, dict[str, Any]] = {}
+        self._news = asyncio.Condition()
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @classmethod
+    @contextlib.asynccontextmanager
+    async def at(cls, url: str, vehicle: str, *, seed: int = 1) -> AsyncIterator[Pilot]:
+        """A pilot connected to a MAVSDK connection string, such as ``tcpout://host:port``.
+
+        Raises:
+            SitlError: no autopilot there.
+        """
+        log_subscribe(_quiet)
+        configuration = Configuration.create_manual(*GROUND_STATION, 1)
+        async with Mavsdk(configuration) as mavsdk:
+            await mavsdk.add_any_connection(url)
+            system = await mavsdk.first_autopilot(timeout_s=SILENCE)
+            if system is None:
+                raise SitlError(f"no autopilot at {url}")
+            pilot = cls(vehicle, system, seed=seed)
+            await pilot._watch()
+            try:
+                yield pilot
+            finally:
+                await pilot._rest()
+
+    # -- what it sees ----------------------------------------------------------------------
+
+    async def _watch(self) -> None:
+        for name in ("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "STATUSTEXT"):
+            self._tasks.append(asyncio.create_task(self._follow(name), name=f"pilot: {name}"))
+        for message, interval_us in ((30, 50_000), (33, 100_000), (24, 200_000)):
+            await self.command(SET_INTERVAL, message, interval_us)
+
+    async def _follow(self, name: str) -> None:
+        async for message in self._direct.subscribe_message(name):
+            async with self._news:
+                self._state[name] = json.loads(message.fields_json)
+                self._news.notify_all()
+
+    async def _rest(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._direct.destroy()
+        self._param.destroy()
+
+    async def _until(self, condition: Callable[[], bool], what: str) -> None:
+        """Waits for something to be seen.
+
+        Raises:
+            SitlError: the simulator has fallen silent, or it took far too long.
+        """
+        async with self._news:
+            try:
+                async with asyncio.timeout(SILENCE * 5):
+                    while not condition():
+                        await asyncio.wait_for(self._news.wait(), SILENCE)
+            except TimeoutError:
+                said = self._state.get("STATUSTEXT", {}).get("text", "nothing")
+                raise SitlError(f"waited in vain for {what}; it last said: {said}") from None
+
+    @property
+    def time(self) -> float:
+        """Boot time of the autopilot, s."""
+        return float(self._state.get("ATTITUDE", {}).get("time_boot_ms", 0)) * 1e-3
+
+    @property
+    def armed(self) -> bool:
+        """As the last heartbeat said."""
+        return bool(int(self._state.get("HEARTBEAT", {}).get("base_mode", 0)) & ARMED)
+
+    @property
+    def height(self) -> float:
+        """Above home, m."""
+        return float(self._state.get("GLOBAL_POSITION_INT", {}).get("relative_alt", 0)) * 1e-3
+
+    @property
+    def standing(self) -> bool:
+        """On the ground and not moving."""
+        speed = float(self._state.get("GPS_RAW_INT", {}).get("vel", 0)) * 1e-2
+        return abs(self.height) < 2.0 and speed < 0.5
+
+    @property
+    def yaw(self) -> float:
+        """Heading, rad."""
+        return float(self._state.get("ATTITUDE", {}).get("yaw", 0.0))
+
+    async def wait(self, seconds: float) -> None:
+        """Waits by the autopilot's clock."""
+        end = self.time + seconds
+        await self._until(lambda: self.time >= end, f"{seconds:.0f} s to pass")
+
+    # -- what it does ----------------------------------------------------------------------
+
+    async def parameter(self, name: str) -> float:
+        """Reads a parameter.
+
+        Raises:
+            SitlError: it does not answer.
+        """
+        try:
+            return float(await self._param.get_param_float(name))
+        except ParamError:
+            try:
+                return float(await self._param.get_param_int(name))
+            except ParamError as error:
+                raise SitlError(f"parameter {name}: {error}") from error
+
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Writes a float parameter.
+
+        Raises:
+            SitlError: it was not taken.
+        """
+        try:
+            await self._param.set_param_float(name, value)
+        except ParamError as error:
+            raise SitlError(f"parameter {name}: {error}") from error
+
+    async def command(self, number: int, *parameters: float) -> bool:
+        """COMMAND_LONG; whether it was accepted."""
+        padded = [*parameters, *[0.0] * (7 - len(parameters))]
+        fields: dict[str, float] = {f"param{i}": p for i, p in enumerate(padded, start=1)}
+        fields |= {"target_system": 1, "target_component": 1, "command": number, "confirmation": 0}
+        message = _message("COMMAND_LONG", fields)
+        acknowledged = await self._direct.send_command(message)
+        return int(json.loads(acknowledged.fields_json).get("result", -1)) == ACCEPTED
+
+    async def set_mode(self, mode: str) -> None:
+        """Changes the mode, by the name in MODES."""
+        await self.command(SET_MODE, 1, MODES[self.vehicle][mode])
+
+    async def take_off(self) -> None:
+        """Waits until it may arm, arms and climbs to a safe height.
+
+        Raises:
+            SitlError: it refuses.
+        """
+        await self._until(
+            lambda: int(self._state.get("GPS_RAW_INT", {}).get("fix_type", 0)) >= 3, "a GPS fix"
+        )
+        await self.set_mode("guided" if self.vehicle == "copter" else "take off")
+        for _ in range(120):
+            if await self.command(ARM_DISARM, 1):
+                break
+            await self.wait(1.0)
+        else:
+            raise SitlError(f"does not arm: {self._state.get('STATUSTEXT', {}).get('text')}")
+        if self.vehicle == "copter":
+            await self.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 25.0)
+        safe = 20.0 if self.vehicle == "copter" else 45.0
+        await self._until(lambda: self.height > safe, f"a height of {safe:.0f} m")
+
+    async def manoeuvre(self, seconds: float) -> None:
+        """Flies at random for so long."""
+        end = self.time + seconds
+        if self.vehicle == "plane":
+            await self.set_mode("fly by wire")
+        while self.time < end:
+            if self.vehicle == "copter":
+                await self._velocity_step()
+            else:
+                await self._stick_step()
+
+    async def land(self) -> None:
+        """Comes down and waits until it has disarmed."""
+        if self.vehicle == "copter":
+            await self._set_velocity((0.0, 0.0, 0.0), self.yaw)
+            await self.wait(3.0)
+        await self.set_mode("land")
+        await self._until(lambda: not self.armed or self.standing, "the landing")
+        # Some versions of Plane leave the disarming to the pilot.
+        for _ in range(60):
+            await self.wait(1.0)
+            if not self.armed or (self.standing and await self.command(ARM_DISARM, 0)):
+                break
+        await self._until(lambda: not self.armed, "disarming after the landing")
+
+    async def _velocity_step(self) -> None:
+        """One velocity and heading for a few seconds, kept within a band of heights."""
+        course = self._random.uniform(-math.pi, math.pi)
+        speed = self._random.uniform(3.0, 9.0)
+        climb = self._random.uniform(-2.0, 2.5)
+        if not 12.0 < self.height + 4.0 * climb < 60.0:
+            climb = -climb
+        velocity = (speed * math.cos(course), speed * math.sin(course), -climb)
+        yaw = self.yaw + self._random.uniform(-2.0, 2.0)
+        end = self.time + self._random.uniform(2.5, 4.5)
+        while self.time < end:  # ArduPilot stops when it hears nothing for 3 s
+            await self._set_velocity(velocity, yaw)
+            await self.wait(0.5)
+
+    async def _set_velocity(self, velocity_n: tuple[float, float, float], yaw: float) -> None:
+        vx, vy, vz = velocity_n
+        fields = {
+            "time_boot_ms": 0,
+            "target_system": 1,
+            "target_component": 1,
+            "coordinate_frame": 1,
+            "type_mask": GUIDED_VELOCITY_AND_YAW,
+            "x": 0.0,
+            "y": 0.0,
+            "z": 0.0,
+            "vx": vx,
+            "vy": vy,
+            "vz": vz,
+            "afx": 0.0,
+            "afy": 0.0,
+            "afz": 0.0,
+            "yaw": math.remainder(yaw, 2.0 * math.pi),
+            "yaw_rate": 0.0,
+        }
+        await self._direct.send_message(_message("SET_POSITION_TARGET_LOCAL_NED", fields))
+
+    async def _stick_step(self) -> None:
+        """One position of the sticks (-1000 ... 1000) for a few seconds."""
+        roll = self._random.choice([-1.0, 1.0]) * self._random.uniform(0.3, 1.0)
+        pitch = self._random.uniform(-1.0, 1.0)
+        if self.height < 60.0:
+            pitch = -abs(pitch)  # stick back: climb
+        if self.height > 150.0:
+            pitch = abs(pitch)
+        rudder = self._random.choice([0.0, 0.0, -0.5, 0.5])
+        throttle = self._random.uniform(0.3, 0.9)
+        end = self.time + self._random.uniform(2.5, 6.0)
+        while self.time < end:
+            await self._sticks(roll, pitch, throttle, rudder)
+            await self.wait(0.4)
+
+    async def _sticks(self, roll: float, pitch: float, throttle: float, rudder: float) -> None:
+        fields = {
+            "target": 1,
+            "x": round(1000 * pitch),
+            "y": round(1000 * roll),
+            "z": round(1000 * throttle),
+            "r": round(1000 * rudder),
+            "buttons": 0,
+        }
+        await self._direct.send_message(_message("MANUAL_CONTROL", fields))
+
+
+def _quiet(level: object, message: str, file: str | None, line: int) -> bool:
+    """Keeps MAVSDK's log off the terminal; what matters comes back as results."""
+    del level, message, file, line
+    return True
+
+
+def _message(name: str, fields: dict[str, Any]) -> Plugin:
+    return MavlinkMessage(
+        message_name=name,
+        system_id=GROUND_STATION[0],
+        component_id=GROUND_STATION[1],
+        target_system_id=1,
+        target_component_id=1,
+        fields_json=json.dumps(fields),
+    )

@@ -1,0 +1,158 @@
+"""Both simulators behind one interface: the same flight, the same physics.
+
+Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
+"""
+
+import asyncio
+import contextlib
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from onboard.core.calibrator import Calibrator
+from onboard.core.result import Status
+from onboard.mavlink.decode import Decoder
+from sitl import harness
+from sitl.ardupilot import process
+from sitl.errors import NoBinaryError
+
+SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
+INTERVALS = {27: 20_000, 30: 20_000, 24: 100_000, 245: 500_000, 193: 500_000, 74: 200_000}
+
+
+@pytest.fixture(params=["copter", "plane"])
+def vehicle(request):
+    return request.param
+
+
+@pytest.fixture
+def kind(request, vehicle):
+    chosen = request.config.getoption("--sitl")
+    reason = harness.unavailable(chosen, vehicle)
+    if reason:
+        pytest.skip(reason)
+    return chosen
+
+
+class Datagrams(asyncio.DatagramProtocol):
+    def __init__(self, listener):
+        self._listener = listener
+
+    def datagram_received(self, data, addr):
+        self._listener.take(data)
+
+
+class Listener:
+    """A minimal client of its own: asks for rates and parameters, keeps every message."""
+
+    def __init__(self):
+        self.messages = []
+        self.packer = mav.MAVLink(None, srcSystem=1, srcComponent=191)
+        self.parser = mav.MAVLink(None)
+        self.parser.robust_parsing = True
+        self._send = None
+
+    @contextlib.asynccontextmanager
+    async def at(self, endpoint):
+        scheme, host, port = endpoint.split(":")
+        if scheme == "tcp":
+            reader, writer = await asyncio.open_connection(host, int(port))
+            self._send = writer.write
+            reading = asyncio.create_task(self._read(reader))
+            try:
+                yield
+            finally:
+                reading.cancel()
+                await asyncio.gather(reading, return_exceptions=True)
+                writer.close()
+            return
+        loop = asyncio.get_running_loop()
+        transport, _ = await loop.create_datagram_endpoint(
+            lambda: Datagrams(self), remote_addr=(host, int(port))
+        )
+        self._send = transport.sendto
+        try:
+            yield
+        finally:
+            transport.close()
+
+    async def _read(self, reader):
+        while data := await reader.read(4096):
+            self.take(data)
+
+    def take(self, data):
+        self.messages += self.parser.parse_buffer(data) or []
+
+    def send(self, message):
+        self._send(message.pack(self.packer))
+
+    async def ask(self):
+        self.send(mav.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3))
+        for number, wanted in INTERVALS.items():
+            for interval in range(wanted, wanted + 20_000, 5000):
+                message = (1, 1, 511, 0, number, interval, 0, 0, 0, 0, 0)
+                self.send(mav.MAVLink_command_long_message(*message))
+                ack = await self.until(lambda m: m.get_type() == "COMMAND_ACK" and m.command == 511)
+                if ack.result == mav.MAV_RESULT_ACCEPTED:
+                    break
+            else:
+                pytest.fail(f"no interval of message {number} is accepted")
+        self.send(mav.MAVLink_param_request_list_message(1, 1))
+
+    async def until(self, condition):
+        seen = len(self.messages)
+        async with asyncio.timeout(60):
+            while True:
+                for message in self.messages[seen:]:
+                    if condition(message):
+                        return message
+                seen = len(self.messages)
+                await asyncio.sleep(0.01)
+
+
+@pytest.mark.slow
+async def test_flies_lands_and_gives_its_truth_away(kind, vehicle):
+    """An estimate from what the vehicle sends is the truth that it was given."""
+    async with harness.simulator(kind, vehicle, speedup=40 if kind == "builtin" else 6) as sitl:
+        await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
+        assert await sitl.parameter("SIM_ACC1_SCAL_Y") == pytest.approx(SCALE[1])
+        listener = Listener()
+        async with listener.at(sitl.endpoint):
+            await listener.ask()
+            await sitl.fly(200.0)
+            await sitl.land()
+    decoder, calibrator = Decoder(), Calibrator()
+    for message in listener.messages:
+        for sample in decoder.decode(message):
+            calibrator.feed(sample)
+    calibrator.finish()
+    result = calibrator.calibration(1)
+    assert result.status is Status.CALIBRATED
+    errors = [e - t for e, t in zip(result.scale + result.offset, SCALE + OFFSET, strict=True)]
+    bounds = [0.01] * 3 + [0.03, 0.03, 0.06]
+    sigmas = result.scale_sigma + result.offset_sigma
+    for error, bound, sigma in zip(errors, bounds, sigmas, strict=True):
+        assert abs(error) < bound
+        assert abs(error) < 4.0 * sigma
+
+
+def test_no_binary_is_said_with_the_places_looked_at(monkeypatch, tmp_path):
+    monkeypatch.setenv("ARDUPILOT_SITL_DIR", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(NoBinaryError, match="ARDUPILOT_SITL_DIR"):
+        process.find_binary("copter")
+    assert "arduplane" in harness.unavailable("ardupilot", "plane")
+    assert harness.unavailable("builtin", "plane") is None
+
+
+def test_binary_in_the_folder_comes_before_the_path(monkeypatch, tmp_path):
+    for place in ("folder", "path"):
+        (tmp_path / place).mkdir()
+        binary = tmp_path / place / "arducopter"
+        binary.write_text("")
+        binary.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
+    monkeypatch.setenv("ARDUPILOT_SITL_DIR", str(tmp_path / "folder"))
+    assert process.find_binary("copter").parent.name == "folder"
+    monkeypatch.delenv("ARDUPILOT_SITL_DIR")
+    assert process.find_binary("copter").parent.name == "path"
