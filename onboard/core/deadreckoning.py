@@ -108,7 +108,7 @@ class _Interval:
 
     @staticmethod
     def of_piece(stretch: Stretch, fixes: Fixes, point: Linearisation) -> list[_Interval]:
-        t = fixes.t - point.delay
+        t = point.true_time(fixes.t)
         if len(t) < 2:
             return []
         nodes = NodeMaker(stretch, np.zeros(3), point.six).intervals(t[:-1], t[1:])

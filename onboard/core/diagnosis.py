@@ -75,9 +75,9 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
     told = calibrator.parameters.gps_delay_told
     everything = catalogue(origin)
     testable, absent = _testable(everything, chunks)
-    full = _engine(engine, chunks, testable, rounds=3)
+    full = _engine(engine, chunks, testable, rounds=3, t0=origin.t0)
     solution = _solution(full)
-    fitter = Fitter(full.all_portions, full.model, solution.inflation)
+    fitter = Fitter(full.all_portions, full.model, solution.inflation, _absent(full))
     base = [i for i, u in enumerate(full.model.unknowns) if not _is_effect(full, testable, i)]
     candidates = [
         _Candidate(c, list(range(*full.model.slices[c.name].indices(full.model.size))))
@@ -88,8 +88,8 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
     families = [c.columns for c in chosen] + ([step] if step else [])
     if step is not None:
         # A step may have passed for something slower: what it does not leave is dropped.
-        families = _still_needed(engine, chunks, families)
-    final = _engine(engine, chunks, families, rounds=2, start=full)
+        families = _still_needed(engine, chunks, families, origin.t0)
+    final = _engine(engine, chunks, families, rounds=2, t0=origin.t0, start=full)
     traces = _traces(final)
     calibration = calibrator.calibration_with(imu, final)
     return _Judge(
@@ -115,16 +115,28 @@ def _engine(
     families: Sequence[EffectColumns],
     *,
     rounds: int,
+    t0: float,
     start: Engine | None = None,
 ) -> Engine:
     """An engine over the same flight with more physics, refined."""
     origin = start or like
     settings = replace(like.settings, refine=True)
-    made = Engine(settings, like.prior, origin.point, origin.noise, more=tuple(families))
+    point = replace(origin.point, skew_from=t0)
+    if not any(f.effect == "clock_skew" for f in families):
+        point = replace(point, skew=0.0)
+    made = Engine(settings, like.prior, point, origin.noise, more=tuple(families))
     made.chunks = list(chunks)
     made.trusted_s = like.trusted_s
     made.refine(rounds, 2 if start is None else 0)
     return made
+
+
+def _absent(engine: Engine) -> Array:
+    """Values of the unknowns that mean that an effect is not in the model."""
+    at = np.zeros(engine.model.size)
+    if "clock_rate" in engine.model.index:
+        at[engine.model.index["clock_rate"]] = -engine.point.skew
+    return at
 
 
 def _solution(engine: Engine) -> Solution:
@@ -225,7 +237,7 @@ def _prune(fitter: Fitter, base: list[int], chosen: list[_Candidate]) -> list[_C
 def _accept(fitter: Fitter, before: Fit, after: Fit, c: _Candidate, bic: float) -> bool:
     if bic < MARGIN or fitter.held_gain(before, after) < HELD_OUT_GAIN:
         return False
-    value = after.theta[c.index]
+    value = after.theta[c.index] - fitter.absent[c.index]
     sigma = np.sqrt(np.diag(after.covariance)[c.index])
     if np.max(np.abs(value) / sigma) < SIGNIFICANT:
         return False
@@ -293,7 +305,7 @@ def _score_steps(
     for chunk in chunks:
         made.add(chunk)
     solution = _solution(made)
-    fitter = Fitter(made.all_portions, made.model, max(1.0, solution.chi2))
+    fitter = Fitter(made.all_portions, made.model, max(1.0, solution.chi2), _absent(made))
     stepped = {i for s in steps for i in range(made.model.size) if _within(made, s, i)}
     free = [i for i in range(made.model.size) if i not in stepped]
     before = fitter.fit(free)
@@ -312,11 +324,11 @@ def _within(engine: Engine, columns: EffectColumns, i: int) -> bool:
 
 
 def _still_needed(
-    like: Engine, chunks: Sequence[Chunk], families: Sequence[EffectColumns]
+    like: Engine, chunks: Sequence[Chunk], families: Sequence[EffectColumns], t0: float
 ) -> list[EffectColumns]:
     """Families that stay significant when all of them are in one model."""
-    made = _engine(like, chunks, families, rounds=2)
-    fitter = Fitter(made.all_portions, made.model, _solution(made).inflation)
+    made = _engine(like, chunks, families, rounds=2, t0=t0)
+    fitter = Fitter(made.all_portions, made.model, _solution(made).inflation, _absent(made))
     kept = list(families)
     for family in list(families):
         free = list(range(made.model.size))
@@ -376,7 +388,10 @@ class _Judge:
         self.absent, self.full, self.full_base = absent, full, full_base
         self.candidates = candidates
         self.solution = solve(engine.all_portions, engine.model)
-        self.fitter = Fitter(engine.all_portions, engine.model, self.solution.inflation)
+        self.absent_at = _absent(engine)
+        self.fitter = Fitter(
+            engine.all_portions, engine.model, self.solution.inflation, self.absent_at
+        )
         self.index = engine.model.index
         self.all = list(range(engine.model.size))
 
@@ -389,19 +404,20 @@ class _Judge:
         before, after = held[0], held[-1]
         effects = [self._standing(n, q, cure, p) for n, (q, cure, p) in standing.items()]
         effects += [self._effect(f) for f in self.families]
-        for made in (
-            fault_effect(
-                self.traces,
-                self.engine.chunks,
-                self.calibrator,
-                self.origin.t0,
-                self.engine.noise,
-                self.engine.settings.coast_s,
-            ),
-            saturation_effect(self.engine.chunks, self.origin.t0),
-        ):
-            if made is not None:
-                effects.append(made)
+        rail = saturation_effect(self.engine.chunks, self.origin.t0)
+        fault = fault_effect(
+            self.traces,
+            self.engine.chunks,
+            self.calibrator,
+            self.origin.t0,
+            self.engine.noise,
+            self.engine.settings.coast_s,
+        )
+        # What a clipped accelerometer integrates to is not the receiver's fault.
+        if rail is not None:
+            effects.append(rail)
+        elif fault is not None:
+            effects.append(fault)
         insufficient = not self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after)
         verdict, note = self._verdict(effects, insufficient=insufficient)
@@ -425,7 +441,7 @@ class _Judge:
 
     def _held(self, names: Sequence[str]) -> Array:
         """Unknowns of ``names`` at the value that means *not in the model*."""
-        at = np.zeros(len(self.all))
+        at = self.absent_at.copy()
         if "gps_delay" in names:
             at[self.index["gps_delay"]] = self.told - self.engine.point.delay
         if "window_squared" in names:
@@ -482,8 +498,11 @@ class _Judge:
         index = [i for i in self.all if _within(self.engine, f, i)]
         without, with_it = self._without(index)
         sigma = np.sqrt(np.diag(self.solution.covariance))
+        taken = {"clock_rate": self.engine.point.skew}
         quantities = {
-            key: Quantity(float(self.solution.theta[i]), float(sigma[i]), u.unit)
+            key: Quantity(
+                float(self.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
+            )
             for key, i, u in zip(f.keys, index, f.unknowns, strict=True)
         }
         if isinstance(f, BiasStep):

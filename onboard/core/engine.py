@@ -93,6 +93,8 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
         window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
         attitude_delay=point.attitude_delay,
+        skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
+        skew_from=point.skew_from,
     )
 
 
@@ -150,6 +152,8 @@ class Engine:
         out = theta.copy()
         out[self.model.index["gps_delay"]] = 0.0
         out[self.model.index["window_squared"]] = 0.0
+        if "clock_rate" in self.model.index:
+            out[self.model.index["clock_rate"]] = 0.0
         return out
 
     @property

@@ -34,6 +34,8 @@ class Linearisation:
         delay: GPS latency, s.
         window: averaging span of the receiver, s.
         attitude_delay: lateness of the recorded attitude, s.
+        skew: growth of the latency, s/s, from ``skew_from`` (s on the boot clock) on.
+        skew_from: see ``skew``.
     """
 
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -41,6 +43,13 @@ class Linearisation:
     delay: float = 0.1
     window: float = 0.0
     attitude_delay: float = 0.0
+    skew: float = 0.0
+    skew_from: float = 0.0
+
+    def true_time(self, stamp: Array) -> Array:
+        """When what a fix with these stamps says was true, s."""
+        out: Array = stamp - self.delay - self.skew * (stamp - self.skew_from)
+        return out
 
     @property
     def six(self) -> Array:
@@ -184,7 +193,7 @@ class Pass:
             fixes: GPS epochs on the boot clock as stamped (delay not removed).
             trusted: (n,) whether the receiver is to be believed there.
         """
-        epoch_t = fixes.t - self.point.delay
+        epoch_t = self.point.true_time(fixes.t)
         maker = NodeMaker(
             stretch, self.bias_b, self.point.six, recorded_attitude=self.uses.recorded_attitude
         )

@@ -36,8 +36,19 @@ class Fit:
 class Fitter:
     """Fits subsets of columns of one set of portions."""
 
-    def __init__(self, portions: Sequence[Portion], model: Model, weaken: float) -> None:
-        """Take the portions and the factor by which their information is weakened."""
+    def __init__(
+        self,
+        portions: Sequence[Portion],
+        model: Model,
+        weaken: float,
+        absent: Array | None = None,
+    ) -> None:
+        """Take the portions and the factor by which their information is weakened.
+
+        ``absent`` (m,) are the values that mean *not in the model*: zero, but for what the
+        linearisation has taken in already.
+        """
+        self.absent = np.zeros(model.size) if absent is None else absent
         self.portions = list(portions)
         self.model = model
         self.weaken = weaken
@@ -52,8 +63,8 @@ class Fitter:
         return self.sums.rows
 
     def fit(self, free: Sequence[int], held: Array | None = None) -> Fit:
-        """Fit the columns ``free``; the rest stays at ``held`` (default zero)."""
-        at = np.zeros(self.model.size) if held is None else held.copy()
+        """Fit the columns ``free``; the rest stays at ``held`` (default: absent)."""
+        at = (self.absent if held is None else held).copy()
         theta, A = self._solve(self.sums, free, at)
         chi2 = self._penalised(self.sums, theta, free)
         out = 0.0

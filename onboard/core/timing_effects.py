@@ -7,6 +7,7 @@ errors of the recorded attitude likewise: an EKF is never exact.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ LATENCY_S, WINDOW_S, IMU_DELAY_S = 0.05, 0.15, 0.03
 TRIM_RAD = np.deg2rad(0.5)
 TILT_RAD, HEADING_RAD = np.deg2rad(1.0), np.deg2rad(2.5)
 SURE = 4.0
+EKF_FLOOR = {"tilt_roll": 0.002, "tilt_pitch": 0.002, "heading": 0.005}
+"""What an EKF's mean attitude is off by without anything being wrong, rad."""
 FAULT_S = 1.0
 FAULT_M_S = 0.7
 RAIL_SAMPLES, RAIL_RUN = 12, 4
@@ -67,7 +70,9 @@ def standing_effects(
             "look at the stream set-up and at INS_ACCEL_FILTER",
             {},
         )
-    sigma = np.sqrt(np.diag(solution.covariance))
+    sigma = np.sqrt(np.diag(solution.covariance)).copy()
+    for name, floor in EKF_FLOOR.items():
+        sigma[index[name]] = np.hypot(sigma[index[name]], floor)
     roll, pitch, yaw = (index[n] for n in ("tilt_roll", "tilt_pitch", "heading"))
     extra_roll, extra_pitch = float(solution.theta[roll]), float(solution.theta[pitch])
     spread = float(max(sigma[roll], sigma[pitch]))
@@ -108,7 +113,7 @@ def fault_effect(
     coast_s: float,
 ) -> Effect | None:
     """GPS velocities that cannot be true: refused by the innovation gate or by plausibility."""
-    bad = [(x.t, True) if "velocity" in x.refused else (x.t, False) for x in traces]
+    bad = [(x.t, "velocity" in x.refused) for x in traces]
     if calibrator.trust.rejected.get("gps_glitch", 0):
         bad += [
             (float(t), True)
@@ -117,26 +122,26 @@ def fault_effect(
             if not ok
         ]
     bad.sort()
-    intervals: list[tuple[float, float]] = []
-    sizes: list[float] = []
     # A refused fix is a fault only if it is off by what no honest receiver is off.
     least = max(FAULT_M_S, 8.0 * float(np.hypot(levels.velocity, levels.velocity_colour)))
-    seen = [(x.t, float(np.linalg.norm(x.refused_by))) for x in traces if "velocity" in x.refused]
-    start = last = None
-    count = 0
+    refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
+    spells: list[_Spell] = []
+    run: list[float] = []
     for t, is_bad in [*bad, (np.inf, False)]:
         if is_bad:
-            start, count = (t, 1) if start is None else (start, count + 1)
-            last = t
-        elif start is not None and last is not None and t - last > 2.0:
-            off = [x for x in seen if start <= x[0] <= last]
-            size = float(np.median([x[1] for x in off])) if off else np.inf
+            run.append(t)
+        elif run and t - run[-1] > 2.0:
+            off = [refused[u] for u in run if u in refused]
+            mean = np.median(np.array(off), axis=0) if off else None
+            size = np.inf if mean is None else float(np.linalg.norm(mean))
             # A filter that had to begin anew does not tell its own failure from the receiver's.
-            lost = last - start >= 0.95 * coast_s and bool(off)
-            if count >= 3 and last - start >= FAULT_S and size > least and not lost:
-                intervals.append((start - t0, last - t0))
-                sizes.append(size)
-            start, count = None, 0
+            lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
+            if len(run) >= 3 and run[-1] - run[0] >= FAULT_S and size > least and not lost:
+                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean))
+            run = []
+    spells = _paired(spells)
+    intervals = [(s.start, s.end) for s in spells]
+    sizes = [float(np.linalg.norm(s.off)) for s in spells if s.off is not None]
     if not intervals:
         return None
     inside = [x for x in traces if any(a <= x.t - t0 <= b for a, b in intervals)]
@@ -158,6 +163,33 @@ def fault_effect(
         cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
         intervals=tuple(intervals),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Spell:
+    """Refused velocities in a row; ``off`` (2,) their median innovation, None where untrusted."""
+
+    start: float
+    end: float
+    off: Array | None
+
+
+def _paired(spells: list[_Spell]) -> list[_Spell]:
+    """Join a fault that outlasted the filter's patience with the jump back at its end.
+
+    A constant error that was taken for a new velocity in the middle shows again, with the other
+    sign, when the receiver recovers: the fault ends where the second spell starts.
+    """
+    out: list[_Spell] = []
+    for spell in spells:
+        before = out[-1].off if out else None
+        if before is not None and spell.off is not None:
+            sizes = float(np.linalg.norm(before) * np.linalg.norm(spell.off))
+            if float(before @ spell.off) < -0.5 * sizes and spell.start - out[-1].end < 120.0:
+                out[-1] = _Spell(out[-1].start, spell.start, before)
+                continue
+        out.append(spell)
+    return out
 
 
 def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
