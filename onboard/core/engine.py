@@ -123,7 +123,7 @@ class Engine:
         self.refused: Counter[str] = Counter()
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
-        self._speed: deque[float] = deque(maxlen=MOST_STATES)
+        self._brisk = 0.0
         self._buffered_s = 0.0
         self._refined_s = 0.0
         self._frozen = False
@@ -167,8 +167,6 @@ class Engine:
         self._buffered_s += chunk.duration
         trusted = chunk.duration * float(np.mean(chunk.trusted))
         before, self.trusted_s = self.trusted_s, self.trusted_s + trusted
-        speed = np.hypot(chunk.fixes.v_n[chunk.trusted, 0], chunk.fixes.v_n[chunk.trusted, 1])
-        self._speed.extend(float(v) for v in speed if np.isfinite(v))
         self._run(chunk)
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
@@ -255,8 +253,13 @@ class Engine:
 
     @property
     def brisk_speed(self) -> float:
-        """Speed over ground that is exceeded in a tenth of the flight, m/s."""
-        return float(np.percentile(self._speed, 90)) if self._speed else 0.0
+        """Most speed over ground that a tenth of the buffered flight ever exceeded, m/s."""
+        speeds = [np.hypot(*c.fixes.v_n[c.trusted, :2].T) for c in self.chunks]
+        every = np.concatenate(speeds) if speeds else np.zeros(0)
+        every = every[np.isfinite(every)]
+        if len(every):
+            self._brisk = max(self._brisk, float(np.percentile(every, 90)))
+        return self._brisk
 
     @property
     def moving(self) -> bool:
