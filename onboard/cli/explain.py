@@ -61,9 +61,6 @@ NAMES = {
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...", type=click.Path(path_type=Path))
 @click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
 @click.option(
-    "--param", "param_file", metavar="FILE", help="Write parameters for a ground station."
-)
-@click.option(
     "--imu",
     type=click.IntRange(1, 5),
     metavar="N",
