@@ -151,14 +151,32 @@ class HttpSettings(Section, frozen=True, kw_only=True):
             return False
 
 
+class ParametersSettings(Section, frozen=True, kw_only=True):
+    """The ``OBC_*`` parameters and messages that a ground station sees of this component.
+
+    ``writable``: a ground station may set the push policy and approve.  ``imus`` accelerometers
+    get parameters.  ``messages``: events as STATUSTEXT.
+    """
+
+    enabled: bool = True
+    writable: bool = True
+    imus: Annotated[int, Meta(ge=1, le=5)] = 3
+    messages: bool = True
+
+
 class MqttSettings(Section, frozen=True, kw_only=True):
-    """Broker to publish to; off by default."""
+    """Broker to publish to; off by default.
+
+    ``prefix`` is ``onboard/<system id>`` where none is given; ``state_interval_s`` is the time
+    between two publications of the whole state.
+    """
 
     enabled: bool = False
     host: Text = "127.0.0.1"
     port: Port = 1883
     prefix: Text | None = None
     commands: bool = False
+    state_interval_s: Annotated[float, Meta(ge=0.1)] = 2.0
     client_id: Text | None = None
     username: Text | None = None
     password_file: Text | None = None
@@ -173,6 +191,10 @@ class MqttSettings(Section, frozen=True, kw_only=True):
             raise ValueError("certificate_file and key_file belong together")
         if not self.tls and (self.ca_file is not None or self.certificate_file is not None):
             raise ValueError("ca_file and certificate_file need tls = true")
+        if self.password_file is not None and self.username is None:
+            raise ValueError("password_file needs a username")
+        if self.prefix is not None and any(c in self.prefix for c in "+#\0"):
+            raise ValueError("prefix must not contain + or #")
 
 
 class Configuration(Section, frozen=True, kw_only=True):
@@ -184,6 +206,7 @@ class Configuration(Section, frozen=True, kw_only=True):
     state: StateSettings = StateSettings()
     recording: RecordingSettings = RecordingSettings()
     http: HttpSettings = HttpSettings()
+    parameters: ParametersSettings = ParametersSettings()
     mqtt: MqttSettings = MqttSettings()
 
 

@@ -26,6 +26,7 @@ from onboard.daemon.learner import Learned, Learner
 from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
 from onboard.daemon.notify import Notifier
+from onboard.daemon.outlets import Outlets
 from onboard.daemon.parameters import ParameterWatch
 from onboard.daemon.proposals import Proposals
 from onboard.daemon.pusher import Pusher
@@ -133,6 +134,7 @@ class Service:
         self._parameters = ParameterWatch()
         self._streams = Streams(settings.stream_requests(link.rates))
         self._timesync = TimeSync()
+        self._outlets = Outlets(configuration, self, self.notices, clock=clock)
         self._traffic = Traffic()
         self.link = Link(
             endpoints,
@@ -177,12 +179,15 @@ class Service:
         self.link.subscribe(self.on_message, Decoder.names)
         for participant in (self._streams, self._timesync, self._parameters, self._pusher):
             self.link.attach(participant)
+        for outlet in self._outlets.participants:
+            self.link.attach(outlet)
         if self.configuration.http.enabled:
             self.server = self._make_server()
             await self.server.start()
             logger.info("status and control at %s", self.server.url)
         group.create_task(self.link.run(), name="link")
         self._learner_task = group.create_task(self._learn(), name="learner")
+        self._outlets.start(group)
         self.phase = "searching"
         self.ready.set()
         self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
@@ -212,6 +217,7 @@ class Service:
             )
         if self.server is not None:
             self.server.publish()
+        self._outlets.publish()
         if self.learning.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
 
@@ -225,6 +231,7 @@ class Service:
         self._notifier.send(STOPPING="1", STATUS="stopping")
         self._pusher.close()
         await self._finish_push()
+        await self._outlets.close()
         if self.server is not None:
             await self.server.stop()
         self.link.close()
@@ -352,7 +359,13 @@ class Service:
 
     def _all_counters(self) -> dict[str, int]:
         total = Counter(self.counters)
-        for part in (self.learning, self._parameters, self._proposals, self._pusher):
+        for part in (
+            self.learning,
+            self._parameters,
+            self._proposals,
+            self._pusher,
+            self._outlets,
+        ):
             total.update(part.counters)
         if self.learning.learned is not None:
             total.update(self.learning.learned.counters)

@@ -1,0 +1,196 @@
+"""Outlets: everybody outside who is told what the service does, other than over HTTP.
+
+The ground station's parameter view and messages, and the broker.  The service hands each of its
+ticks' snapshots over here and knows nothing more of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+from onboard.daemon.announcer import Announcer
+from onboard.daemon.configuration import Configuration
+from onboard.daemon.notices import Notices
+from onboard.daemon.parameter_view import (
+    POLICIES,
+    UNEXPLAINED,
+    finding_number,
+    parameter_values,
+    top_effect,
+)
+from onboard.daemon.snapshot import Snapshot
+from onboard.errors import OnboardError, RefusedError
+from onboard.mavlink.autopilot import Participant
+from onboard.mavlink.parameter_server import ParameterServer, Writable
+from onboard.push.policy import Mode
+
+if TYPE_CHECKING:
+    from onboard.mqtt.publisher import Publisher
+
+logger = logging.getLogger(__name__)
+
+
+class Operated(Protocol):
+    """What outlets need of the service."""
+
+    def snapshot(self) -> Snapshot:
+        """Everything, now."""
+
+    async def approve(self, imus: tuple[int, ...]) -> str:
+        """Allow the proposed push."""
+
+    async def reject(self, imus: tuple[int, ...]) -> str:
+        """Refuse the proposed push."""
+
+    async def rollback(self, imus: tuple[int, ...]) -> str:
+        """Write back what was in force before the last push."""
+
+    async def reset(self, imus: tuple[int, ...]) -> str:
+        """Forget what was learned."""
+
+    def set_policy(self, mode: Mode) -> None:
+        """Change the push policy until the next start."""
+
+
+class Outlets:
+    """Feeds the outlets that the configuration asks for.
+
+    Raises:
+        ConfigurationError: a secret or certificate of the broker's that cannot be read.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        service: Operated,
+        notices: Notices,
+        *,
+        clock: Callable[[], float],
+    ) -> None:
+        self._service = service
+        self._notices = notices
+        self._settings = configuration.parameters
+        self._approval: asyncio.Task[None] | None = None
+        self._approving = False
+        self._finding: tuple[int, str] = (0, "")
+        self._server: ParameterServer | None = None
+        self._announcer: Announcer | None = None
+        self._publisher: Publisher | None = None
+        if configuration.parameters.messages:
+            self._announcer = Announcer(clock)
+            notices.listen(self._announcer.hear)
+        if configuration.mqtt.enabled:
+            from onboard.mqtt.publisher import Publisher  # noqa: PLC0415 - not all want its 10 MB
+
+            self._publisher = Publisher(configuration.mqtt, service, notices, clock=clock)
+
+    @property
+    def participants(self) -> Sequence[Participant]:
+        """Who speaks on the link; asked once, when the service starts."""
+        found: list[Participant] = []
+        if self._settings.enabled:
+            self._server = self._make_server()
+            found.append(self._server)
+        if self._announcer is not None:
+            found.append(self._announcer)
+        return found
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What happened, by name."""
+        total: Counter[str] = Counter()
+        for part in (self._server, self._announcer, self._publisher):
+            if part is not None:
+                total.update(part.counters)
+        return dict(total)
+
+    def start(self, group: asyncio.TaskGroup) -> None:
+        """Begin; what is in the journal already is no news."""
+        if self._publisher is not None:
+            self._publisher.publish(self._service.snapshot())
+            group.create_task(self._publisher.run(), name="mqtt")
+
+    def publish(self) -> None:
+        """A tick has passed."""
+        if self._server is None and self._publisher is None and self._announcer is None:
+            return
+        snapshot = self._service.snapshot()
+        self._tell_of_physics(snapshot)
+        if self._server is not None:
+            self._server.update(self._values(snapshot))
+        if self._publisher is not None:
+            self._publisher.publish(snapshot)
+
+    async def close(self) -> None:
+        """Say goodbye, within a few seconds."""
+        if self._approval is not None:
+            self._approval.cancel()
+        if self._publisher is not None:
+            self._publisher.publish(self._service.snapshot())
+            await self._publisher.close()
+
+    # The parameter view
+
+    def _make_server(self) -> ParameterServer:
+        writable = {
+            "OBC_PUSH": Writable(0.0, len(POLICIES) - 1.0, self._set_policy),
+            "OBC_APPROVE": Writable(0.0, 1.0, self._approve),
+        }
+        return ParameterServer(
+            self._values(self._service.snapshot()),
+            writable=writable if self._settings.writable else {},
+            denied=self._denied,
+        )
+
+    def _values(self, snapshot: Snapshot) -> dict[str, float]:
+        return parameter_values(snapshot, imus=self._settings.imus, approving=self._approving)
+
+    def _set_policy(self, value: float) -> None:
+        name = POLICIES[int(value)]
+        self._service.set_policy(Mode(name))
+        self._notices.post("parameter_done", f"push policy is now {name.replace('_', ' ')}")
+
+    def _approve(self, value: float) -> None:
+        if value == 0.0:
+            return
+        if self._approving:
+            raise RefusedError("an approval is under way")
+        if not any(
+            {"approval", "refused"} & proposal.held_back.keys()
+            for proposal in self._service.snapshot().push.proposals
+        ):
+            raise RefusedError("nothing waits for approval")
+        # The station is first told that its 1 has arrived, then that it is done.
+        self._approving = True
+        self._approval = asyncio.create_task(self._carry_out(), name="approval by parameter")
+
+    async def _carry_out(self) -> None:
+        try:
+            self._notices.post("parameter_done", await self._service.approve(()))
+        except OnboardError as error:
+            self._notices.post("parameter_denied", str(error), warning=True)
+        finally:
+            self._approving = False
+
+    def _denied(self, name: str, sentence: str) -> None:
+        self._notices.post("parameter_denied", f"{name}: {sentence}", warning=True)
+
+    # Diagnosis
+
+    def _tell_of_physics(self, snapshot: Snapshot) -> None:
+        """Say once that physics is missing, and which."""
+        number = finding_number(snapshot.diagnosis)
+        effect = top_effect(snapshot.diagnosis)
+        name = "" if effect is None else str(effect.get("name"))
+        if (number, name) == self._finding:
+            return
+        self._finding = (number, name)
+        if name:
+            what = name.replace("_", " ")
+            self._notices.post("physics_missing", f"physics missing: {what}", warning=True)
+        elif number == UNEXPLAINED:
+            self._notices.post("physics_missing", "physics missing: no known effect", warning=True)

@@ -1,0 +1,277 @@
+"""The parameter protocol's other side: our own component's parameters, sans IO.
+
+It rests on four rules:
+
+1. Every PARAM_VALUE is a broadcast, so one answer serves every ground station: a list that is
+   asked for while another is being sent only makes the cycle go round once more from where it
+   is, and ten stations that ask cost no more than one.
+2. Values go out as REAL32.  Whole numbers are exact in it, and it alone means the same to the
+   stations that cast integers and to those that copy their bytes.
+3. What is set is answered with the value then in force: the new one, or the old one where the
+   write was denied, as ArduPilot does; PARAM_ERROR says why to those that know it.
+4. The number of parameters and their order never change while it runs.
+
+Sending is paced: lists and announcements share a telemetry line with the autopilot.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from onboard.errors import RefusedError
+from onboard.mavlink.dialect import COMPONENT, Message, mavlink
+from onboard.mavlink.parameter_messages import (
+    MAV_PARAM_TYPE_REAL32,
+    ParameterErrorCode,
+    to_float32,
+)
+
+NAME_LENGTH = 16
+LIST_HZ = 50.0
+ANNOUNCE_HZ = 5.0
+"""PARAM_VALUE is 37 bytes on the wire: a list takes 1.9 kB/s for its second, changes 0.2."""
+BURST_S = 0.2
+"""Sending that was not possible for longer than this is not made up for."""
+
+Set = Callable[[float], None]
+
+_INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}
+"""MAV_PARAM_TYPE of the whole numbers that fit into the field, and how their bytes read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Writable:
+    """What a ground station may set.
+
+    ``set`` is called with a value inside the bounds, and raises
+    :class:`~onboard.errors.RefusedError` where the value cannot be had now.
+    """
+
+    minimum: float
+    maximum: float
+    set: Set
+    whole: bool = True
+
+    def objection(self, value: float) -> str:
+        """Why this value is out of the question, empty if it is not."""
+        if not math.isfinite(value) or not self.minimum <= value <= self.maximum:
+            return f"allowed are {self.minimum:g} to {self.maximum:g}"
+        if self.whole and value != round(value):
+            return "allowed are whole numbers"
+        return ""
+
+
+class ParameterServer:
+    """Participant of the link that answers for our component's parameters.
+
+    Args:
+        values: all of them with their first values, in the order of their indices.
+        writable: those that may be set; all others are read-only.
+        component: our component id; the system id is the autopilot's.
+        list_hz: pace of a list, messages/s.
+        announce_hz: pace of announced changes, messages/s.
+        denied: told the name and the sentence when a ground station's write is denied.
+
+    Raises:
+        ValueError: a name that the protocol cannot carry, a value that it cannot, or a writable
+            name without a value.
+    """
+
+    names = ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET")
+
+    def __init__(
+        self,
+        values: Mapping[str, float],
+        *,
+        writable: Mapping[str, Writable],
+        component: int = COMPONENT,
+        list_hz: float = LIST_HZ,
+        announce_hz: float = ANNOUNCE_HZ,
+        denied: Callable[[str, str], None] | None = None,
+    ) -> None:
+        for name in values:
+            if not name.isascii() or not 0 < len(name) <= NAME_LENGTH:
+                raise ValueError(f"{name!r} is no name for a parameter")
+        if unknown := writable.keys() - values.keys():
+            raise ValueError(f"writable, but not there: {', '.join(sorted(unknown))}")
+        self.counters: Counter[str] = Counter()
+        self._order = tuple(values)
+        self._index = {name: index for index, name in enumerate(self._order)}
+        self._values = {name: to_float32(value) for name, value in values.items()}
+        self._writable = dict(writable)
+        self._component = component
+        self._system: int | None = None
+        self._denied = denied
+        self._list = _Pace(list_hz)
+        self._changes = _Pace(announce_hz)
+        self._next = 0
+        self._remaining = 0
+        self._changed: dict[str, None] = {}
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What stations are told, as float32."""
+        return dict(self._values)
+
+    def update(self, values: Mapping[str, float]) -> None:
+        """New values; those that differ are announced, writable ones first.
+
+        Raises:
+            KeyError: no such parameter.
+            ValueError: a value that a parameter cannot have.
+        """
+        for name, value in values.items():
+            wanted = to_float32(value)
+            if self._values[name] != wanted:
+                self._values[name] = wanted
+                self._changed[name] = None
+
+    # What the link calls
+
+    def start(self, system: int, component: int, now: float) -> None:  # noqa: ARG002 - the participants' signature
+        """Our system id is the autopilot's."""
+        self._system = system
+
+    def feed(self, message: Message, now: float) -> Sequence[Message]:
+        """Take a ground station's request; the answers, a list excepted."""
+        if self._system is None or message.target_system not in (0, self._system):
+            return ()
+        if message.target_component not in (0, self._component):
+            return ()
+        match message.get_type():
+            case "PARAM_REQUEST_LIST":
+                return self._asked_list(now)
+            case "PARAM_REQUEST_READ":
+                return self._asked_read(message)
+            case "PARAM_SET":
+                return self._asked_set(message)
+        return ()
+
+    def poll(self, now: float) -> Sequence[Message]:
+        """What is due of a list and of changes."""
+        due: list[Message] = []
+        if self._remaining:
+            for _ in range(min(self._remaining, self._list.take(now))):
+                due.append(self._value(self._order[self._next]))
+                self._next = (self._next + 1) % len(self._order)
+                self._remaining -= 1
+        elif self._changed:
+            count = min(len(self._changed), self._changes.take(now))
+            due += [self._value(self._most_urgent()) for _ in range(count)]
+        return due
+
+    # How
+
+    def _asked_list(self, now: float) -> Sequence[Message]:
+        self.counters["parameter_lists"] += 1
+        if not self._remaining:
+            self._next = 0
+            self._list.begin(now)
+        self._remaining = len(self._order)
+        return ()
+
+    def _asked_read(self, message: Message) -> Sequence[Message]:
+        index = int(message.param_index)
+        if index >= 0:
+            name = self._order[index] if index < len(self._order) else None
+        else:
+            name = message.param_id if message.param_id in self._index else None
+        if name is None:
+            return self._error(message, ParameterErrorCode.DOES_NOT_EXIST)
+        self.counters["parameter_reads"] += 1
+        return (self._value(name),)
+
+    def _asked_set(self, message: Message) -> Sequence[Message]:
+        name = message.param_id
+        if name not in self._index:
+            return self._error(message, ParameterErrorCode.DOES_NOT_EXIST)
+        writable = self._writable.get(name)
+        if writable is None:
+            return self._deny(message, ParameterErrorCode.READ_ONLY, "is read-only")
+        value = _meant(message)
+        if objection := writable.objection(value):
+            return self._deny(message, ParameterErrorCode.VALUE_OUT_OF_RANGE, objection)
+        try:
+            writable.set(value)
+        except RefusedError as error:
+            return self._deny(message, ParameterErrorCode.PERMISSION_DENIED, str(error))
+        self.counters["parameter_sets"] += 1
+        self._values[name] = to_float32(value)
+        return (self._value(name),)
+
+    def _deny(self, message: Message, code: ParameterErrorCode, sentence: str) -> Sequence[Message]:
+        self.counters["parameter_sets_denied"] += 1
+        if self._denied is not None:
+            self._denied(message.param_id, sentence)
+        return (self._value(message.param_id), *self._error(message, code))
+
+    def _error(self, message: Message, code: ParameterErrorCode) -> Sequence[Message]:
+        """PARAM_ERROR, but never to what was meant for every component: others may have it."""
+        if message.target_component != self._component:
+            return ()
+        return (
+            mavlink.MAVLink_param_error_message(
+                message.get_srcSystem(),
+                message.get_srcComponent(),
+                message.param_id.encode(),
+                getattr(message, "param_index", -1),
+                code.value,
+            ),
+        )
+
+    def _most_urgent(self) -> str:
+        name = next((n for n in self._changed if n in self._writable), next(iter(self._changed)))
+        del self._changed[name]
+        return name
+
+    def _value(self, name: str) -> Message:
+        # What stations hear of, for whatever reason, need not be announced to them again.
+        self._changed.pop(name, None)
+        return mavlink.MAVLink_param_value_message(
+            name.encode(),
+            self._values[name],
+            MAV_PARAM_TYPE_REAL32,
+            len(self._order),
+            self._index[name],
+        )
+
+
+class _Pace:
+    """How many messages are due: ``rate`` a second, without bursts."""
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._burst = max(1.0, rate * BURST_S)
+        self._credit = 0.0
+        self._at: float | None = None
+
+    def begin(self, now: float) -> None:
+        """Nothing is due yet."""
+        self._credit, self._at = 0.0, now
+
+    def take(self, now: float) -> int:
+        """What may be sent now."""
+        elapsed = now - self._at if self._at is not None else 1.0 / self._rate
+        self._at = now
+        self._credit = min(self._burst, self._credit + max(0.0, elapsed) * self._rate)
+        whole = int(self._credit + 1e-9)
+        self._credit -= whole
+        return whole
+
+
+def _meant(message: Message) -> float:
+    """The number that a PARAM_SET carries.
+
+    Stations differ in how they put a whole number into the float field: as its value, or as its
+    bytes.  Bytes of a small whole number read as a float below 1e-38, which nobody means
+    (0 is 0 both ways); those of a negative one read as NaN.
+    """
+    value = float(message.param_value)
+    layout = _INTEGERS.get(message.param_type)
+    if layout is None or (math.isfinite(value) and (value == 0.0 or abs(value) >= 1.0)):
+        return value
+    return float(struct.unpack_from(layout, struct.pack("<f", value))[0])

@@ -1,0 +1,1 @@
+"""The broker's side: what is published, as which document, and how the connection is kept."""
