@@ -170,7 +170,7 @@ class Outlets:
 
     async def _carry_out(self) -> None:
         try:
-            self._notices.post("parameter_done", await self._service.approve(()))
+            self._notices.post("approved", await self._service.approve(()))
         except OnboardError as error:
             self._notices.post("parameter_denied", str(error), warning=True)
         finally:

@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 import random
+import re
 import ssl
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from onboard.daemon.control import Actions
 
 logger = logging.getLogger(__name__)
+library = logging.getLogger("onboard.mqtt.library")
+library.setLevel(logging.CRITICAL)
+"""The library's own log has a line for every attempt; what matters is told as a notice."""
 
 ONLINE, OFFLINE = b"online", b"offline"
 KEEPALIVE_S = 30
@@ -47,6 +51,8 @@ STABLE_S = 10.0
 """A connection that held this long starts the back-off from the beginning."""
 COMMANDS_WAITING = 16
 FAREWELL_S = 2.0
+_CODES = re.compile(r"^\[[^]]*\] | \(_ssl\.c:\d+\)$")
+"""What is around the words of a system's or a broker's error: [Errno 111], [code:135]."""
 
 
 class Publisher:
@@ -134,6 +140,9 @@ class Publisher:
             began = self._clock()
             try:
                 await self._session()
+            except asyncio.CancelledError:
+                if not self._closing.is_set():
+                    raise
             except (aiomqtt.MqttError, OSError, TimeoutError) as error:
                 self._lost(_reason(error))
             except Exception as error:
@@ -146,7 +155,9 @@ class Publisher:
                 return
             if self._clock() - began >= STABLE_S:
                 self._backoff.reset()
-            await asyncio.sleep(self._backoff.next())
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(self._backoff.next()):
+                    await self._closing.wait()
 
     async def close(self) -> None:
         """Send what waits, say that we are offline, and let :meth:`run` end; bounded."""
@@ -156,8 +167,7 @@ class Publisher:
         task = self._task
         if task is None or task.done():
             return
-        if self.connected:
-            await asyncio.wait((task,), timeout=FAREWELL_S)
+        await asyncio.wait((task,), timeout=FAREWELL_S)
         if not task.done():
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -176,6 +186,7 @@ class Publisher:
             will=aiomqtt.Will(self._topic("availability"), OFFLINE, qos=1, retain=True),
             tls_context=self._tls,
             keepalive=KEEPALIVE_S,
+            logger=library,
             timeout=ANSWER_S,
             # Commands of an hour ago are not to be carried out when the line is back.
             clean_session=True,
@@ -330,12 +341,7 @@ def _explained(files: str, key: str) -> Iterator[None]:
 
 def _reason(error: Exception) -> str:
     """Why there is no connection, in a few words."""
-    cause = error.__cause__
+    text = str(error) or type(error).__name__
     if isinstance(error, aiomqtt.exceptions.MqttConnectError):
-        code = error.rc
-        return f"refused: {code if not isinstance(code, int) else error}"
-    if isinstance(cause, ssl.SSLCertVerificationError):
-        return f"its certificate is not trusted: {cause.verify_message}"
-    if isinstance(cause, OSError):
-        return cause.strerror or str(cause)
-    return str(error) or type(error).__name__
+        return f"it refuses: {_CODES.sub('', text)}"
+    return _CODES.sub("", text)

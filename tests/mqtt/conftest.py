@@ -1,0 +1,52 @@
+"""A broker, and publishers that are little patient with it."""
+
+import asyncio
+import contextlib
+import random
+import time
+
+import pytest
+from broker import Broker
+from published import Obedient, noticeboard, settings
+
+from onboard.mqtt import publisher as publisher_module
+from onboard.mqtt.publisher import Publisher
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    monkeypatch.setattr(publisher_module, "BACKOFF_BASE_S", 0.05)
+    monkeypatch.setattr(publisher_module, "BACKOFF_CAP_S", 0.2)
+    monkeypatch.setattr(publisher_module, "ANSWER_S", 3.0)
+    monkeypatch.setattr(publisher_module, "FAREWELL_S", 0.5)
+
+
+@pytest.fixture
+async def broker(tmp_path):
+    async with Broker(tmp_path) as running:
+        yield running
+
+
+@pytest.fixture
+def publishing():
+    """``async with publishing(port) as publisher``, which runs and is closed in good order."""
+
+    @contextlib.asynccontextmanager
+    async def run(port, *, actions=None, **changes):
+        notices, kept = noticeboard()
+        publisher = Publisher(
+            settings(host="127.0.0.1", port=port, **changes),
+            actions or Obedient(),
+            notices,
+            clock=time.monotonic,
+            rng=random.Random(1),
+        )
+        publisher.kept = kept
+        task = asyncio.create_task(publisher.run(), name="publisher")
+        try:
+            yield publisher
+        finally:
+            await publisher.close()
+            await task
+
+    return run

@@ -1,0 +1,238 @@
+"""Against a real broker: topics, retained state, restarts, refusals, commands."""
+
+import asyncio
+import json
+
+import pytest
+from broker import Broker, Subscriber, free_port
+from published import Obedient, imu_view, journal_line, snapshot
+
+from onboard.daemon.snapshot import Snapshot
+
+DIAGNOSIS = {"schema": "onboard.explain/1", "verdict": "clean", "effects": []}
+
+
+async def kinds(publisher, kind):
+    """Wait for a notice of this kind, and give all of them."""
+    async with asyncio.timeout(60.0):
+        while not (found := [n for n in publisher.kept if n.kind == kind]):
+            await asyncio.sleep(0.01)
+    return found
+
+
+async def test_everything_retained_is_there_for_whoever_comes_late(broker, publishing):
+    async with publishing(broker.port) as publisher:
+        publisher.publish(snapshot(diagnosis=DIAGNOSIS))
+        await kinds(publisher, "mqtt_connected")
+        async with Subscriber(broker.client()) as late:
+            assert await late.payload("onboard/1/availability") == b"online"
+            state = Snapshot.from_json(await late.payload("onboard/1/state"))
+            assert state == snapshot(diagnosis=DIAGNOSIS)
+            calibration = json.loads(await late.payload("onboard/1/calibration"))
+            assert calibration["imus"][0]["calibration"]["scale"] == [1.02, 0.99, None]
+            assert json.loads(await late.payload("onboard/1/diagnosis")) == DIAGNOSIS
+            assert all(m.retain for m in late.messages)
+
+
+async def test_only_what_changed_is_sent_and_every_event_once_in_order(broker, publishing):
+    lines = [journal_line(n) for n in range(6)]
+    async with Subscriber(broker.client()) as station, publishing(broker.port) as publisher:
+        publisher.publish(snapshot(journal=lines[:2]))
+        for end in (2, 3, 3, 6):
+            publisher.publish(snapshot(journal=lines[:end]))
+        await station.until(lambda: len(station.all("onboard/1/event")) == 4)
+        publisher.publish(snapshot(imus=[imu_view(scale=1.03)], journal=lines))
+        await station.until(lambda: len(station.all("onboard/1/calibration")) == 2)
+        texts = [json.loads(p)["text"] for p in station.all("onboard/1/event")]
+        assert texts == ["write 2", "write 3", "write 4", "write 5"]
+        assert not any(m.retain for m in station.messages if str(m.topic).endswith("event"))
+
+
+async def test_a_broker_that_forgot_everything_has_it_back(tmp_path, publishing):
+    async with Broker(tmp_path) as broker, publishing(broker.port) as publisher:
+        publisher.publish(snapshot(diagnosis=DIAGNOSIS))
+        await kinds(publisher, "mqtt_connected")
+        for restart in range(3):
+            await broker.stop()
+            lost = restart + 1
+            async with asyncio.timeout(60.0):
+                while sum(n.kind == "mqtt_lost" for n in publisher.kept) < lost:
+                    await asyncio.sleep(0.01)
+            publisher.publish(
+                snapshot(
+                    time=2e9 + restart,
+                    diagnosis=DIAGNOSIS,
+                    journal=[journal_line(n) for n in range(lost)],
+                )
+            )
+            await asyncio.sleep(0.11)  # the state's own interval
+            publisher.publish(
+                snapshot(
+                    time=2e9 + restart,
+                    diagnosis=DIAGNOSIS,
+                    journal=[journal_line(n) for n in range(lost)],
+                )
+            )
+            await broker.start()
+            async with Subscriber(broker.client()) as station:
+                assert await station.payload("onboard/1/availability") == b"online"
+                state = Snapshot.from_json(await station.payload("onboard/1/state"))
+                assert state.time == 2e9 + restart
+                await station.payload("onboard/1/calibration")
+                await station.payload("onboard/1/diagnosis")
+        # Each outage was told of once, however often a connection was tried in it.
+        assert sum(n.kind == "mqtt_lost" for n in publisher.kept) == 3
+
+
+async def test_events_of_an_outage_come_after_it(tmp_path, publishing):
+    async with Broker(tmp_path) as broker, publishing(broker.port) as publisher:
+        publisher.publish(snapshot())
+        await kinds(publisher, "mqtt_connected")
+        await broker.stop()
+        await kinds(publisher, "mqtt_lost")
+        publisher.publish(snapshot(journal=[journal_line(1), journal_line(2)]))
+        await broker.start()
+        # Nobody retains events: a subscriber with a session of its own would have them; here
+        # the broker's log tells that they came.
+        async with asyncio.timeout(60.0):
+            while broker.log.count("'onboard/1/event'") < 2:
+                await asyncio.sleep(0.02)
+
+
+async def test_an_absent_broker_is_told_of_once_and_tried_again(tmp_path, publishing):
+    port = free_port()
+    async with publishing(port) as publisher:
+        publisher.publish(snapshot())
+        async with asyncio.timeout(60.0):
+            while publisher.counters["mqtt_attempts"] < 5:
+                await asyncio.sleep(0.01)
+        (lost,) = [n for n in publisher.kept if n.kind == "mqtt_lost"]
+        assert lost.warning
+        assert f"127.0.0.1:{port}" in lost.text
+        assert "refused" in lost.text.lower()
+        assert not publisher.connected
+
+
+async def test_farewell_and_last_will(broker, publishing):
+    async with Subscriber(broker.client()) as station:
+        async with publishing(broker.port) as publisher:
+            publisher.publish(snapshot())
+            await station.until(lambda: station.latest.get("onboard/1/availability") == b"online")
+        await station.until(lambda: station.latest["onboard/1/availability"] == b"offline")
+        assert "will" not in broker.log.lower().split("client onboard-1 disconnected")[-1]
+    async with Subscriber(broker.client()) as late:
+        assert await late.payload("onboard/1/availability") == b"offline"
+
+
+async def test_a_publisher_that_dies_is_declared_offline_by_the_broker(broker, publishing):
+    async with Subscriber(broker.client()) as station, publishing(broker.port) as publisher:
+        publisher.publish(snapshot())
+        await station.until(lambda: station.latest.get("onboard/1/availability") == b"online")
+        # Somebody else takes our client id: the broker drops our connection without a farewell.
+        async with broker.client(identifier="onboard-1"):
+            await station.until(lambda: b"offline" in station.all("onboard/1/availability"))
+        # And we come back.
+        await station.until(lambda: station.all("onboard/1/availability")[-1] == b"online")
+
+
+async def test_commands_are_carried_out_once_and_answered(broker, publishing):
+    obedient = Obedient()
+    async with (
+        Subscriber(broker.client()) as station,
+        publishing(broker.port, commands=True, actions=obedient) as publisher,
+    ):
+        publisher.publish(snapshot())
+        await kinds(publisher, "mqtt_connected")
+        replies = "onboard/1/command/reply"
+        for number, (payload, expected) in enumerate(
+            [
+                (b'{"command": "approve", "imus": [1, 2], "id": "a"}', ("done", "approved")),
+                (b"rollback", ("done", "rolling back")),
+                (b'{"command": "reset"}', ("error", "not while armed")),
+                (b'{"command": "format"}', ("error", "format")),
+                (b'{"command": "approve", "imus": [9]}', ("error", "<= 5")),
+                (b'{"command": "approve", "imu": 1}', ("error", "imu")),
+                (b"\xff\x00", ("error", "")),
+                (b" " * 5000, ("error", "at most")),
+            ]
+        ):
+            await station.client.publish("onboard/1/command", payload, qos=1)
+            await station.until(lambda count=number + 1: len(station.all(replies)) == count)
+            reply = json.loads(station.all(replies)[-1])
+            outcome, text = expected
+            assert text in reply[outcome]
+            assert reply["id"] == ("a" if number == 0 else None)
+        assert obedient.asked == [("approve", (1, 2)), ("rollback", ())]
+
+
+async def test_a_retained_command_is_nobodys_wish(broker, publishing):
+    obedient = Obedient()
+    async with Subscriber(broker.client()) as station:
+        await station.client.publish("onboard/1/command", b"rollback", qos=1, retain=True)
+        async with publishing(broker.port, commands=True, actions=obedient) as publisher:
+            publisher.publish(snapshot())
+            await kinds(publisher, "mqtt_connected")
+            async with asyncio.timeout(60.0):
+                while not publisher.counters["mqtt_commands_ignored"]:
+                    await asyncio.sleep(0.01)
+    assert obedient.asked == []
+
+
+async def test_commands_are_off_by_default(broker, publishing):
+    obedient = Obedient()
+    async with (
+        Subscriber(broker.client()) as station,
+        publishing(broker.port, actions=obedient) as publisher,
+    ):
+        publisher.publish(snapshot())
+        await kinds(publisher, "mqtt_connected")
+        await station.client.publish("onboard/1/command", b"approve", qos=1)
+        publisher.publish(snapshot(imus=[imu_view(2)]))
+        await station.until(lambda: len(station.all("onboard/1/calibration")) == 2)
+        assert obedient.asked == []
+        assert "SUBSCRIBE from onboard-1" not in broker.log
+
+
+async def test_a_prefix_of_ones_own_needs_no_vehicle(broker, publishing):
+    async with (
+        Subscriber(broker.client()) as station,
+        publishing(broker.port, prefix="fleet/kite/") as publisher,
+    ):
+        publisher.publish(snapshot(system_id=None))
+        await station.payload("fleet/kite/state")
+
+
+async def test_without_a_vehicle_there_is_no_prefix_and_no_connection(broker, publishing):
+    async with publishing(broker.port) as publisher:
+        publisher.publish(snapshot(system_id=None))
+        assert publisher.prefix == ""
+        assert publisher.counters["mqtt_attempts"] == 0
+        publisher.publish(snapshot(system_id=7))
+        await kinds(publisher, "mqtt_connected")
+        assert publisher.prefix == "onboard/7"
+
+
+@pytest.mark.parametrize("password", ["right", "wrong"])
+async def test_user_and_password(tmp_path, publishing, password):
+    table = tmp_path / "passwords"
+    table.write_text("daemon:right\n")
+    table.chmod(0o600)
+    secret = tmp_path / "secret"
+    secret.write_text(f"{password}\n")
+    await hashed(table)
+    async with (
+        Broker(tmp_path, "allow_anonymous false", f"password_file {table}") as broker,
+        publishing(broker.port, username="daemon", password_file=str(secret)) as publisher,
+    ):
+        publisher.publish(snapshot())
+        if password == "right":
+            await kinds(publisher, "mqtt_connected")
+        else:
+            (lost,) = await kinds(publisher, "mqtt_lost")
+            assert "authori" in lost.text.lower()
+
+
+async def hashed(table):
+    """Mosquitto's own tool turns the plain passwords into hashes."""
+    process = await asyncio.create_subprocess_exec("mosquitto_passwd", "-U", str(table))
+    assert await process.wait() == 0
