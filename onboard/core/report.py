@@ -26,6 +26,8 @@ SCALE_FLOOR = 5e-4
 OFFSET_FLOOR = 3e-3
 """What the model does not know (filters, interpolation, clocks) limits every flight to this."""
 FEWEST_OBSERVED = 3
+CONTRADICTION = 10.0
+"""Inflation of the variance past which portions of one flight ask for different parameters."""
 
 
 def calibration_of(
@@ -50,7 +52,7 @@ def calibration_of(
     offset = -beta / scale
     covariance = six_covariance(solution)
     seen = assess(six_information(solution), engine.settings.needs)
-    status, note = _status(engine, seen, parameters, finished=finished)
+    status, note = _status(engine, solution, seen, parameters, finished=finished)
     held_scale, held_offset = np.array(in_force.scale), np.array(in_force.offset)
     force_six = np.concatenate([held_scale, -held_scale * held_offset])
     fixed = {i: float(x) for i, x in enumerate(force_six)}
@@ -142,7 +144,12 @@ def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:
 
 
 def _status(
-    engine: Engine, seen: Observability, parameters: ParametersInForce, *, finished: bool
+    engine: Engine,
+    solution: Solution,
+    seen: Observability,
+    parameters: ParametersInForce,
+    *,
+    finished: bool,
 ) -> tuple[Status, str]:
     note = seen.note
     if not parameters.representable:
@@ -153,7 +160,13 @@ def _status(
     if not engine.moving:
         note = "hovering or standing: fly fast, brake hard, turn both ways. " + note
         return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
-    enough = engine.trusted_s >= engine.settings.minimum_s
+    doubt = solution.inflation > CONTRADICTION
+    if doubt:
+        note = (
+            "the flight contradicts itself: something is missing from the model, "
+            "see onboard explain. " + note
+        )
+    enough = engine.trusted_s >= engine.settings.minimum_s and not doubt
     if enough and sum(seen.observed) >= FEWEST_OBSERVED:
         return Status.CALIBRATED, note
     return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
