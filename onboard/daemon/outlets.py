@@ -130,8 +130,7 @@ class Outlets:
         if self._approval is not None:
             self._approval.cancel()
         if self._publisher is not None:
-            self._publisher.publish(self._service.snapshot())
-            await self._publisher.close()
+            await self._publisher.close(self._service.snapshot())
 
     # The parameter view
 

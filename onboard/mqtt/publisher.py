@@ -159,9 +159,15 @@ class Publisher:
                 async with asyncio.timeout(self._backoff.next()):
                     await self._closing.wait()
 
-    async def close(self) -> None:
-        """Send what waits, say that we are offline, and let :meth:`run` end; bounded."""
+    async def close(self, last: Snapshot | None = None) -> None:
+        """Send what waits, say that we are offline, and let :meth:`run` end; bounded.
+
+        Args:
+            last: the state that stays with the broker.
+        """
         self._closing.set()
+        if last is not None:
+            self.publish(last)
         self._named.set()
         self._news.set()
         task = self._task

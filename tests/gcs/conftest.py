@@ -1,0 +1,55 @@
+"""A daemon, a vehicle and ground stations around one router, all on loopback."""
+
+import contextlib
+from pathlib import Path
+
+import pytest
+from router import Router
+
+from onboard.daemon import learning
+from onboard.daemon import pusher as pusher_module
+from onboard.daemon import service as service_module
+from onboard.mavlink.parameters import ClientSettings
+from onboard.push.transaction import TransactionSettings
+
+DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
+"""The daemon and the vehicle are those of its own tests."""
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
+    monkeypatch.setattr(service_module, "TICK_S", 0.05)
+    monkeypatch.setattr(learning, "BATCH_S", 0.02)
+    monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
+    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
+
+
+@pytest.fixture
+def airfield(tmp_path):
+    """``async with airfield({"parameters": ...}) as (service, vehicle, router)``.
+
+    The daemon believes to have calibrated accelerometers 1 and 2, and waits for approval.
+    """
+
+    @contextlib.asynccontextmanager
+    async def run(sections=None):
+        from daemons import calibration, convinced, running, until  # noqa: PLC0415
+        from standing_vehicle import Vehicle  # noqa: PLC0415
+
+        async with Router() as router:
+            document = {
+                "link": {"endpoints": [f"udpout:127.0.0.1:{router.port}"]},
+                "push": {"approval": True, "disarmed_s": 0.0},
+                "state": {"directory": str(tmp_path / "state")},
+                "http": {"enabled": False},
+            }
+            async with (
+                running(document | (sections or {})) as service,
+                Vehicle(router.port) as vehicle,
+            ):
+                convinced(service, calibration(1), calibration(2, offset=(0.1, 0.1, 0.1)))
+                await until(lambda: service.snapshot().push.approval_needed)
+                yield service, vehicle, router
+
+    return run

@@ -1,0 +1,259 @@
+"""The daemon's parameters in ground stations, over real sockets: ours, MAVSDK's, MAVProxy's."""
+
+import asyncio
+import contextlib
+import os
+import re
+import shutil
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from onboard.core.accelerometer import parameter_names
+from onboard.daemon.parameter_view import STATES
+
+WANTED = (1.02, 0.99, 1.01, 0.2, -0.1, 0.15)
+
+
+class Ground(asyncio.DatagramProtocol):
+    """A ground station of a few lines."""
+
+    def __init__(self, port, system=255):
+        self.heard = []
+        self._address = ("127.0.0.1", port)
+        self._packer = mavlink.MAVLink(None, srcSystem=system, srcComponent=190)
+        self._parser = mavlink.MAVLink(None)
+        self._parser.robust_parsing = True
+        self._news = asyncio.Event()
+        self._transport = None
+
+    async def __aenter__(self):
+        loop = asyncio.get_running_loop()
+        self._transport, _ = await loop.create_datagram_endpoint(
+            lambda: self, local_addr=("127.0.0.1", 0)
+        )
+        self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+        return self
+
+    async def __aexit__(self, *_):
+        self._transport.close()
+
+    def send(self, message):
+        self._transport.sendto(message.pack(self._packer), self._address)
+
+    def datagram_received(self, data, _address):
+        self.heard += self._parser.parse_buffer(data) or ()
+        self._news.set()
+
+    @property
+    def values(self):
+        return {
+            m.param_id: m.param_value
+            for m in self.heard
+            if m.get_type() == "PARAM_VALUE" and m.get_srcComponent() == 191
+        }
+
+    @property
+    def texts(self):
+        return [m.text for m in self.heard if m.get_type() == "STATUSTEXT"]
+
+    def set(self, name, value):
+        self.send(mavlink.MAVLink_param_set_message(1, 191, name.encode(), value, 9))
+
+    async def until(self, condition):
+        async with asyncio.timeout(60.0):
+            while not condition():
+                self._news.clear()
+                await self._news.wait()
+
+
+def six(vehicle, imu=1):
+    return [vehicle.parameters[name] for name in parameter_names(imu).six]
+
+
+async def test_two_ground_stations_see_the_same_and_one_approves(airfield):
+    async with (
+        airfield() as (_, vehicle, router),
+        Ground(router.port) as one,
+        Ground(router.port, 254) as other,
+    ):
+        for station in (one, other):
+            station.send(mavlink.MAVLink_param_request_list_message(1, 191))
+        for station in (one, other):
+            await station.until(lambda s=station: len(s.values) == 55)
+        assert one.values == other.values
+        assert one.values["OBC_STATE"] == STATES["approval"]
+        assert one.values["OBC_WAITING"] == 2.0
+        assert one.values["OBC_1_SCAL_X"] == pytest.approx(1.02)
+        assert not any(name.startswith("INS_") for name, _ in vehicle.sets)
+        one.set("OBC_APPROVE", 1.0)
+        # Acknowledged with 1; back at 0 when it is done; both stations hear of both.
+        for station in (one, other):
+            await station.until(
+                lambda s=station: approvals(s)[-2:] == [1.0, 0.0] and s.values["OBC_STATE"] != 4.0
+            )
+            await station.until(lambda s=station: s.values["OBC_WAITING"] == 0.0)
+        await one.until(lambda: six(vehicle) == pytest.approx(WANTED))
+        await other.until(lambda: any("IMU 2 calibration written" in t for t in other.texts))
+        # The autopilot's own change is seen by the same ground station.
+        seen = {
+            m.param_id: m.param_value
+            for m in other.heard
+            if m.get_type() == "PARAM_VALUE" and m.get_srcComponent() == 1
+        }
+        assert seen["INS_ACCSCAL_X"] == pytest.approx(1.02)
+
+
+def approvals(station):
+    return [
+        m.param_value
+        for m in station.heard
+        if m.get_type() == "PARAM_VALUE" and m.param_id == "OBC_APPROVE"
+    ]
+
+
+async def test_the_policy_is_set_and_told(airfield):
+    async with airfield() as (service, _, router), Ground(router.port) as station:
+        station.set("OBC_PUSH", 0.0)
+        await station.until(lambda: station.values.get("OBC_PUSH") == 0.0)
+        assert service.snapshot().push.policy == "never"
+        await station.until(lambda: "OBC: push policy is now never" in station.texts)
+        # What the policy holds back does not wait for a person alone.
+        station.set("OBC_PUSH", 7.0)
+        await station.until(lambda: any("OBC_PUSH" in text for text in station.texts))
+        assert service.snapshot().push.policy == "never"
+        assert station.values["OBC_PUSH"] == 0.0
+
+
+async def test_approving_what_does_not_wait_is_refused_in_words(airfield):
+    async with airfield() as (service, vehicle, router), Ground(router.port) as station:
+        await service.approve(())
+        await station.until(lambda: six(vehicle, 2)[0] == pytest.approx(1.02))
+        await station.until(lambda: not service.snapshot().push.approval_needed)
+        sets = len(vehicle.sets)
+        station.set("OBC_APPROVE", 1.0)
+        await station.until(lambda: approvals(station) or station.texts)
+        assert set(approvals(station)) <= {0.0}
+        assert len(vehicle.sets) == sets
+
+
+async def test_look_but_do_not_touch(airfield):
+    async with (
+        airfield({"parameters": {"writable": False}}) as (service, vehicle, router),
+        Ground(router.port) as station,
+    ):
+        station.set("OBC_APPROVE", 1.0)
+        station.set("OBC_PUSH", 2.0)
+        await station.until(lambda: {"OBC_APPROVE", "OBC_PUSH"} <= station.values.keys())
+        assert station.values["OBC_APPROVE"] == 0.0
+        assert station.values["OBC_PUSH"] == 1.0
+        assert service.snapshot().push.policy == "landed"
+        assert not any(name.startswith("INS_") for name, _ in vehicle.sets)
+
+
+async def test_switched_off_nobody_answers(airfield):
+    off = {"parameters": {"enabled": False, "messages": False}}
+    async with airfield(off) as (service, vehicle, router), Ground(router.port) as station:
+        station.send(mavlink.MAVLink_param_request_list_message(1, 191))
+        await service.approve(())
+        await station.until(lambda: six(vehicle, 2)[0] == pytest.approx(1.02))
+        assert station.values == {}
+        assert station.texts == []
+
+
+async def test_mavsdk_reads_lists_and_sets(airfield):
+    mavsdk = pytest.importorskip("mavsdk.asyncio", reason="mavsdk is not installed")
+    from mavsdk.asyncio.plugins.param import (  # noqa: PLC0415
+        ParamAsync,
+        ParamError,
+        ParamResult,
+        ProtocolVersion,
+    )
+
+    async with airfield() as (service, vehicle, router):
+        kind = mavsdk.ComponentType.GROUND_STATION
+        station = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(kind))
+        try:
+            await station.add_any_connection(f"udpout://127.0.0.1:{router.port}")
+            parameters = ParamAsync(await station.first_autopilot(30.0))
+            with contextlib.suppress(ParamError):  # it answers UNKNOWN, and selects
+                await parameters.select_component(191, ProtocolVersion.V1)
+            everything = await parameters.get_all_params()
+            floats = {p.name: p.value for p in everything.float_params}
+            assert len(floats) == 55
+            assert floats["OBC_2_OFFS_X"] == pytest.approx(0.1)
+            await parameters.set_param_float("OBC_PUSH", 2.0)
+            assert service.snapshot().push.policy == "in_flight"
+            assert await parameters.get_param_float("OBC_PUSH") == 2.0
+            for name, value, reason in (
+                ("OBC_STATE", 1.0, ParamResult.READ_ONLY),
+                ("OBC_PUSH", 9.0, ParamResult.VALUE_OUT_OF_RANGE),
+            ):
+                with pytest.raises(ParamError) as denied:
+                    await parameters.set_param_float(name, value)
+                assert denied.value.result == reason
+            await parameters.set_param_float("OBC_APPROVE", 1.0)
+            async with asyncio.timeout(60.0):
+                while six(vehicle, 2)[0] != pytest.approx(1.02):
+                    await asyncio.sleep(0.02)
+                while await parameters.get_param_float("OBC_APPROVE") != 0.0:
+                    await asyncio.sleep(0.02)
+        finally:
+            await asyncio.to_thread(station.destroy)
+
+
+MAVPROXY = os.environ.get("MAVPROXY") or shutil.which("mavproxy.py")
+
+
+@pytest.mark.skipif(
+    MAVPROXY is None, reason="MAVProxy is not installed (pip install MAVProxy), nor MAVPROXY set"
+)
+async def test_mavproxy_fetches_shows_and_sets(airfield, tmp_path):
+    async with airfield() as (service, vehicle, router):
+        console = await asyncio.create_subprocess_exec(
+            MAVPROXY,
+            f"--master=udpout:127.0.0.1:{router.port}",
+            "--default-modules=param,link",
+            f"--state-basedir={tmp_path}",
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+            cwd=tmp_path,
+        )
+        said = bytearray()
+        news = asyncio.Event()
+
+        async def listen():
+            while chunk := await console.stdout.read(4096):
+                said.extend(chunk)
+                news.set()
+
+        async def say(line, pattern):
+            """Type a command until the answer appears: the console may be busy starting."""
+            start = len(said)
+            async with asyncio.timeout(120.0):
+                while not (found := re.search(pattern, said[start:].decode(errors="replace"))):
+                    console.stdin.write(f"{line}\n".encode())
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(3.0):
+                            while not re.search(pattern, said[start:].decode(errors="replace")):
+                                news.clear()
+                                await news.wait()
+            return found
+
+        listener = asyncio.create_task(listen())
+        try:
+            await say("", r"Detected vehicle 1:191")
+            await say("vehicle 1:191", r"Set vehicle 1:191")
+            await say("param fetch", r"Received 55 parameters|Requested parameter list")
+            await say("param show OBC_*", r"OBC_1_SCAL_X\s+1\.0[12]")
+            await say("param set OBC_PUSH 2", r"push policy is now in flight")
+            assert service.snapshot().push.policy == "in_flight"
+            await say("param show OBC_PUSH", r"OBC_PUSH\s+2\.0")
+            await say("param set OBC_STATE 9", r"Failed to set OBC_STATE|read-only")
+            await say("param set OBC_APPROVE 1", r"IMU 2 calibration written")
+            assert six(vehicle) == pytest.approx(WANTED)
+        finally:
+            console.kill()
+            await console.wait()
+            await asyncio.gather(listener, return_exceptions=True)
