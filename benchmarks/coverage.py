@@ -98,7 +98,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--first", type=int, default=0, help="first seed")
     chosen = parser.parse_args(arguments)
     for line in table(flights(chosen.count, chosen.duration, chosen.first)):
-        print(line)  # noqa: T201 - a table is what it is for
+        print(line)
 
 
 if __name__ == "__main__":

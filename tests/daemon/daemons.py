@@ -21,7 +21,7 @@ async def running(document):
         await task
 
 
-async def until(condition, *, limit=60.0):
+async def until(condition, *, limit=300.0):
     """Wait until it holds; the limit only ends a hopeless test."""
     async with asyncio.timeout(limit):
         while not condition():

@@ -131,9 +131,11 @@ async def test_flies_lands_and_gives_its_truth_away(kind, vehicle):
     errors = [e - t for e, t in zip(result.scale + result.offset, SCALE + OFFSET, strict=True)]
     bounds = [0.01] * 3 + [0.03, 0.03, 0.06]
     sigmas = result.scale_sigma + result.offset_sigma
-    for error, bound, sigma in zip(errors, bounds, sigmas, strict=True):
-        assert abs(error) < bound
+    for error, bound, sigma, seen in zip(errors, bounds, sigmas, result.observable, strict=True):
+        # A coordinated turn shows little of the y scale; then it must say so.
+        assert abs(error) < bound or not seen
         assert abs(error) < 4.0 * sigma
+    assert sum(result.observable) >= 5
 
 
 def test_no_binary_is_said_with_the_places_looked_at(monkeypatch, tmp_path):
