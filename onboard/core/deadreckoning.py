@@ -33,10 +33,9 @@ class Drift:
 
 
 def free_drift(
-    pieces: Sequence[tuple[Stretch, Fixes]],
+    chain: Sequence[Interval],
     states: Sequence[EpochState],
     sixes: Sequence[Array],
-    point: Linearisation,
     *,
     horizon_s: float,
     most: int = 6,
@@ -44,18 +43,15 @@ def free_drift(
     """Integrate freely over windows spread over the flight.
 
     Args:
-        pieces: chunks of flight in order of time, each with its fixes.
+        chain: integrals between epochs (:func:`intervals`), in order of time.
         states: filter states at epochs.
         sixes: sets of (6,) scale, beta to compare.
-        point: linearisation (GPS latency, averaging span).
         horizon_s: length of a window.
         most: windows at the most.
 
     Returns:
         Median over windows per set; None if no window fits.
     """
-    intervals = [_Interval.of_piece(s, f, point) for s, f in pieces]
-    chain = [x for part in intervals for x in part]
     if not chain or not states:
         return None
     start = np.array([x.start for x in chain])
@@ -94,8 +90,16 @@ def free_drift(
     )
 
 
+def intervals(pieces: Sequence[tuple[Stretch, Fixes]], point: Linearisation) -> list[Interval]:
+    """Integrals between the epochs of chunks of flight, each with its fixes, in order of time.
+
+    ``point`` is the linearisation (GPS latency, averaging span).
+    """
+    return [x for stretch, fixes in pieces for x in Interval.of_piece(stretch, fixes, point)]
+
+
 @dataclass(frozen=True, slots=True)
-class _Interval:
+class Interval:
     """Integrals of one interval between epochs, body axes of its start."""
 
     start: float
@@ -107,7 +111,8 @@ class _Interval:
     velocity: Array
 
     @staticmethod
-    def of_piece(stretch: Stretch, fixes: Fixes, point: Linearisation) -> list[_Interval]:
+    def of_piece(stretch: Stretch, fixes: Fixes, point: Linearisation) -> list[Interval]:
+        """Those of one chunk."""
         t = point.true_time(fixes.t)
         if len(t) < 2:
             return []
@@ -116,7 +121,7 @@ class _Interval:
         eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
         whole = nodes.integrals(eye)[0]
         return [
-            _Interval(
+            Interval(
                 float(t[k]),
                 float(t[k + 1]),
                 nodes.P[k, -1],
@@ -130,7 +135,7 @@ class _Interval:
 
 
 def _drift(
-    chain: Sequence[_Interval],
+    chain: Sequence[Interval],
     state: EpochState,
     sixes: Sequence[Array],
     attitude: Mapping[float, Array],
@@ -147,8 +152,10 @@ def _drift(
         for i, six in enumerate(sixes):
             v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:])
             v[i, 2] += STANDARD_GRAVITY * T
-        turned = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
-        R = attitude.get(round(x.end, 3), turned)
+        at_end = attitude.get(round(x.end, 3))
+        if at_end is None:
+            at_end = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+        R = at_end
         seen = np.isfinite(x.velocity)
         if seen[0]:
             error = np.where(seen, v - x.velocity, 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.certificate import certify
-from onboard.core.deadreckoning import Drift, free_drift
+from onboard.core.deadreckoning import Drift, free_drift, intervals
 from onboard.core.engine import Engine
 from onboard.core.observability import Observability, assess
 from onboard.core.parameters import ParametersInForce
@@ -188,11 +188,11 @@ def _certificate(engine: Engine) -> Certificate | None:
 
 def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, Drift | None]:
     """Free drift over 60 s and over 10 s, parameters in force against the estimate."""
-    pieces = [(c.stretch, c.fixes) for c in engine.chunks]
+    chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
     states = list(engine.states)
     return (
-        free_drift(pieces, states, (before, after), engine.point, horizon_s=60.0),
-        free_drift(pieces, states, (before, after), engine.point, horizon_s=10.0, most=12),
+        free_drift(chain, states, (before, after), horizon_s=60.0),
+        free_drift(chain, states, (before, after), horizon_s=10.0, most=12),
     )
 
 

@@ -28,7 +28,7 @@ class EstimatorSettings:
     """
 
     chunk_s: float = 10.0
-    buffer_s: float = 600.0
+    buffer_s: float = 300.0
     memory_s: float = 1800.0
     refine_at_s: tuple[float, ...] = (30.0, 120.0, 480.0)
     refine: bool = True

@@ -90,7 +90,7 @@ class EstimatorSettings(Section, frozen=True, kw_only=True):
     satellites_min: Annotated[int, Meta(ge=0, le=50)] = 6
     hdop_max: Positive = 2.5
     speed_accuracy_max: Positive = 1.5
-    buffer_s: Annotated[float, Meta(ge=60.0, le=3600.0)] = 600.0
+    buffer_s: Annotated[float, Meta(ge=60.0, le=3600.0)] = 300.0
     memory_s: Annotated[float, Meta(ge=60.0)] = 1800.0
     save_every_s: Positive = 60.0
 

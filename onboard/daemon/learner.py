@@ -23,8 +23,8 @@ from onboard.daemon.store import Store
 from onboard.daemon.view import trust_view
 from onboard.errors import StateError
 
-SOLVING_SHARE = 0.01
-"""Of a core: after a solution that took 0.1 s, the next one is due 10 s later."""
+SOLVING_SHARE = 0.005
+"""Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
 KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
 """Beginnings of the names that change what an estimator makes of the messages."""
 
