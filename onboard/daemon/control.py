@@ -24,6 +24,7 @@ import hmac
 import ipaddress
 import logging
 import re
+import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from typing import Annotated, Protocol
 from urllib.parse import urlsplit
@@ -33,7 +34,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from msgspec import Meta
 
 from onboard.daemon.snapshot import Snapshot
-from onboard.errors import ConfigurationError, OnboardError, RefusedError
+from onboard.errors import OnboardError, RefusedError
 
 logger = logging.getLogger(__name__)
 
@@ -98,20 +99,12 @@ class Live:
 
 
 class ControlServer:
-    """HTTP server on one address; ``pages`` add further handlers to the same application."""
+    """HTTP server; ``pages`` add further handlers to the same application."""
 
     def __init__(
-        self,
-        actions: Actions,
-        *,
-        address: str,
-        port: int,
-        token: str | None = None,
-        pages: Iterable[Page] = (),
+        self, actions: Actions, *, token: str | None = None, pages: Iterable[Page] = ()
     ) -> None:
         self._actions = actions
-        self._address = address
-        self._port = port
         self._token = token
         self._runner: web.AppRunner | None = None
         self.live = Live()
@@ -130,31 +123,11 @@ class ControlServer:
         for page in pages:
             page(self.application)
 
-    @property
-    def url(self) -> str:
-        """Where the server listens, with the port that it really got."""
-        host, port = self._address, self._port
-        if self._runner is not None and self._runner.addresses:
-            port = self._runner.addresses[0][1]
-        if host in {"0.0.0.0", "::"}:  # noqa: S104 - compared with, not bound to
-            host = "127.0.0.1"
-        return f"http://{f'[{host}]' if ':' in host else host}:{port}"
-
-    async def start(self) -> None:
-        """Listen.
-
-        Raises:
-            ConfigurationError: the address cannot be bound.
-        """
+    async def start(self, listening: socket.socket) -> None:
+        """Serve on a socket that listens already; closing it is its owner's."""
         runner = web.AppRunner(self.application, access_log=None, shutdown_timeout=2.0)
         await runner.setup()
-        try:
-            await web.TCPSite(runner, self._address, self._port).start()
-        except OSError as error:
-            await runner.cleanup()
-            raise ConfigurationError(
-                f"[http] {self._address}:{self._port}: {error.strerror or error}"
-            ) from None
+        await web.SockSite(runner, listening).start()
         self._runner = runner
 
     async def stop(self) -> None:
@@ -196,33 +169,33 @@ class ControlServer:
     async def _live(self, request: web.Request) -> web.WebSocketResponse:
         if self.live.viewers >= VIEWERS_MAX:
             raise web.HTTPServiceUnavailable(text=f"{VIEWERS_MAX} viewers already")
-        socket = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
-        await socket.prepare(request)
+        viewer = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
+        await viewer.prepare(request)
         self.live.viewers += 1
-        sender = asyncio.create_task(self._feed(socket), name="live viewer")
+        sender = asyncio.create_task(self._feed(viewer), name="live viewer")
         try:
-            async for message in socket:  # only to notice that the viewer has gone
+            async for message in viewer:  # only to notice that the viewer has gone
                 if message.type == WSMsgType.ERROR:
                     break
         finally:
             self.live.viewers -= 1
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
-        return socket
+        return viewer
 
-    async def _feed(self, socket: web.WebSocketResponse) -> None:
+    async def _feed(self, viewer: web.WebSocketResponse) -> None:
         try:
-            await _send(socket, self._actions.snapshot().to_json())
+            await _send(viewer, self._actions.snapshot().to_json())
             async for document in self.live.follow():
-                await _send(socket, document)
-            await socket.close(code=WSCloseCode.GOING_AWAY, message=b"service stops")
+                await _send(viewer, document)
+            await viewer.close(code=WSCloseCode.GOING_AWAY, message=b"service stops")
         except (TimeoutError, ConnectionError):
-            await socket.close()
+            await viewer.close()
 
 
-async def _send(socket: web.WebSocketResponse, document: bytes) -> None:
+async def _send(viewer: web.WebSocketResponse, document: bytes) -> None:
     async with asyncio.timeout(SEND_LIMIT_S):
-        await socket.send_str(document.decode())
+        await viewer.send_str(document.decode())
 
 
 def _acting(action: Callable[[tuple[int, ...]], Awaitable[str]]) -> Handler:

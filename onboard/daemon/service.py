@@ -22,6 +22,7 @@ from onboard import __version__
 from onboard.daemon import settings
 from onboard.daemon.condition import Observed
 from onboard.daemon.configuration import Configuration, read_secret
+from onboard.daemon.door import Door
 from onboard.daemon.learner import Learned, Learner
 from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
@@ -61,7 +62,7 @@ from onboard.push.journal import Journal
 from onboard.push.policy import Mode
 
 if TYPE_CHECKING:
-    from onboard.daemon.control import ControlServer, Page
+    from onboard.daemon.control import Page
 
 logger = logging.getLogger(__name__)
 
@@ -144,7 +145,7 @@ class Service:
             clock=clock,
             wall_clock=wall_clock,
         )
-        self.server: ControlServer | None = None
+        self.door: Door | None = None
 
     # Life
 
@@ -182,9 +183,9 @@ class Service:
         for outlet in self._outlets.participants:
             self.link.attach(outlet)
         if self.configuration.http.enabled:
-            self.server = self._make_server()
-            await self.server.start()
-            logger.info("status and control at %s", self.server.url)
+            self.door = self._make_door()
+            self.door.listen()
+            logger.info("status and control at %s", self.door.url)
         group.create_task(self.link.run(), name="link")
         self._learner_task = group.create_task(self._learn(), name="learner")
         self._outlets.start(group)
@@ -215,8 +216,8 @@ class Service:
                 parameters=self._parameters.values,
                 condition=condition,
             )
-        if self.server is not None:
-            self.server.publish()
+        if self.door is not None:
+            self.door.publish()
         self._outlets.publish()
         if self.learning.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
@@ -232,8 +233,8 @@ class Service:
         self._pusher.close()
         await self._finish_push()
         await self._outlets.close()
-        if self.server is not None:
-            await self.server.stop()
+        if self.door is not None:
+            await self.door.close()
         self.link.close()
         if self._learner_task is not None:
             self._learner_task.cancel()
@@ -250,8 +251,8 @@ class Service:
         """Whatever way it ended: no port, file or lock stays behind."""
         self.phase = "stopped"
         self.link.close()
-        if self.server is not None:
-            await self.server.stop()
+        if self.door is not None:
+            await self.door.close()
         self._journal.close()
         self.learning.let_go()
 
@@ -404,16 +405,12 @@ class Service:
             wall_clock=self._wall_clock,
         )
 
-    def _make_server(self) -> ControlServer:
-        from onboard.daemon.control import ControlServer  # noqa: PLC0415 - not all want its 15 MB
-
+    def _make_door(self) -> Door:
         http = self.configuration.http
         token = http.token
         if http.token_file is not None:
             token = read_secret(http.token_file, key="[http] token_file")
-        return ControlServer(
-            self, address=http.address, port=http.port, token=token, pages=self._pages
-        )
+        return Door(self, address=http.address, port=http.port, token=token, pages=self._pages)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:

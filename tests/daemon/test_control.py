@@ -8,6 +8,7 @@ import pytest
 from blank_snapshot import blank_snapshot
 
 from onboard.daemon.control import VIEWERS_MAX, ControlServer
+from onboard.daemon.door import Door, bound
 from onboard.daemon.snapshot import Snapshot
 from onboard.errors import ConfigurationError, RefusedError
 
@@ -49,13 +50,15 @@ class Recorded:
 @asynccontextmanager
 async def serving(*, token=None, pages=()):
     actions = Recorded()
-    server = ControlServer(actions, address="127.0.0.1", port=0, token=token, pages=pages)
-    await server.start()
-    try:
-        async with aiohttp.ClientSession(server.url) as client:
-            yield server, actions, client
-    finally:
-        await server.stop()
+    server = ControlServer(actions, token=token, pages=pages)
+    with bound("127.0.0.1", 0) as listening:
+        await server.start(listening)
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        try:
+            async with aiohttp.ClientSession(url) as client:
+                yield server, actions, client
+        finally:
+            await server.stop()
 
 
 async def error_of(response):
@@ -140,7 +143,7 @@ async def test_the_right_token_acts_and_reading_needs_none():
 
 
 async def test_a_foreign_page_in_the_operators_browser_can_do_nothing():
-    async with serving() as (server, actions, client):
+    async with serving() as (_, actions, client):
         for headers in ({"Origin": "http://evil.example"}, {"Host": "rebound.example"}):
             async with client.post("/api/approve", json={}, headers=headers) as response:
                 assert response.status == 403
@@ -149,7 +152,9 @@ async def test_a_foreign_page_in_the_operators_browser_can_do_nothing():
         # a form needs no preflight, so it must not be understood
         async with client.post("/api/approve", data={"imus": "1"}) as response:
             assert response.status == 415
-        async with client.post("/api/approve", json={}, headers={"Origin": server.url}) as response:
+        async with client.post(
+            "/api/approve", json={}, headers={"Origin": str(client._base_url).rstrip("/")}
+        ) as response:
             assert response.status == 200
         assert actions.asked == [("approve", ())]
 
@@ -215,12 +220,45 @@ async def test_stopping_says_goodbye_to_viewers():
         await stopping
 
 
+def a_door(actions, port=0):
+    return Door(actions, address="127.0.0.1", port=port, token=None)
+
+
 async def test_a_taken_port_is_one_line():
-    async with serving() as (server, actions, _):
-        port = int(server.url.rsplit(":", 1)[1])
-        other = ControlServer(actions, address="127.0.0.1", port=port)
+    with bound("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
         with pytest.raises(ConfigurationError, match=rf"\[http\] 127.0.0.1:{port}: .*in use"):
-            await other.start()
+            a_door(Recorded(), port).listen()
+
+
+async def test_the_door_opens_when_somebody_knocks_and_closes_for_good():
+    actions = Recorded()
+    door = a_door(actions)
+    door.listen()
+    url = door.url
+    door.publish()
+    assert actions.ticks == 0
+    async with aiohttp.ClientSession(url) as client:
+        async with client.get("/api/snapshot") as response:
+            assert response.status == 200
+        viewer = await client.ws_connect("/api/live")
+        await viewer.receive_str()
+        door.publish()
+        await viewer.receive_str()
+        closing = asyncio.create_task(door.close())
+        assert (await viewer.receive()).type == aiohttp.WSMsgType.CLOSE
+        await closing
+        with pytest.raises(aiohttp.ClientConnectionError):
+            await client.get("/api/snapshot")
+
+
+async def test_a_door_that_nobody_knocked_at_closes_too():
+    door = a_door(Recorded())
+    door.listen()
+    port = int(door.url.rsplit(":", 1)[1])
+    await door.close()
+    with bound("127.0.0.1", port) as free:
+        assert free.getsockname()[1] == port
 
 
 async def test_pages_are_added_as_handlers():
