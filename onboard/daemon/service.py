@@ -145,7 +145,7 @@ class Service:
             clock=clock,
             wall_clock=wall_clock,
         )
-        self.door: Door | None = None
+        self.server: Door | None = None
 
     # Life
 
@@ -183,9 +183,9 @@ class Service:
         for outlet in self._outlets.participants:
             self.link.attach(outlet)
         if self.configuration.http.enabled:
-            self.door = self._make_door()
-            self.door.listen()
-            logger.info("status and control at %s", self.door.url)
+            self.server = self._make_server()
+            self.server.listen()
+            logger.info("status and control at %s", self.server.url)
         group.create_task(self.link.run(), name="link")
         self._learner_task = group.create_task(self._learn(), name="learner")
         self._outlets.start(group)
@@ -216,8 +216,8 @@ class Service:
                 parameters=self._parameters.values,
                 condition=condition,
             )
-        if self.door is not None:
-            self.door.publish()
+        if self.server is not None:
+            self.server.publish()
         self._outlets.publish()
         if self.learning.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
@@ -233,8 +233,8 @@ class Service:
         self._pusher.close()
         await self._finish_push()
         await self._outlets.close()
-        if self.door is not None:
-            await self.door.close()
+        if self.server is not None:
+            await self.server.close()
         self.link.close()
         if self._learner_task is not None:
             self._learner_task.cancel()
@@ -251,8 +251,8 @@ class Service:
         """Whatever way it ended: no port, file or lock stays behind."""
         self.phase = "stopped"
         self.link.close()
-        if self.door is not None:
-            await self.door.close()
+        if self.server is not None:
+            await self.server.close()
         self._journal.close()
         self.learning.let_go()
 
@@ -405,7 +405,7 @@ class Service:
             wall_clock=self._wall_clock,
         )
 
-    def _make_door(self) -> Door:
+    def _make_server(self) -> Door:
         http = self.configuration.http
         token = http.token
         if http.token_file is not None:

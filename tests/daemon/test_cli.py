@@ -98,21 +98,21 @@ async def test_status_fits_80_columns_and_tells_what_matters(
         convinced(service, calibration(), long)
         await until(lambda: service.snapshot().push.approval_needed)
         await until(lambda: service.snapshot().link.armed is False)
-        status, out, _ = await call(capsys, "status", "--url", service.door.url)
+        status, out, _ = await call(capsys, "status", "--url", service.server.url)
         assert status == 0
         assert max(map(cell_len, out.splitlines())) <= 80
         for words in ("ardupilot copter", "disarmed", "IMU 1: calibrated", "INS_ACC2OFFS_Z"):
             assert words in out
         assert "1.02000" in out
         assert "onboard approve" in out
-        status, out, _ = await call(capsys, "status", "--json", "--url", service.door.url)
+        status, out, _ = await call(capsys, "status", "--json", "--url", service.server.url)
         assert json.loads(out)["schema"] == "onboard.state/1"
 
 
 async def test_approve_and_rollback_from_the_terminal(document, daemon, port, capsys):
     document["push"]["approval"] = True
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        url = service.door.url
+        url = service.server.url
         status, _, err = await call(capsys, "approve", "--url", url)
         assert (status, "nothing waits" in err) == (2, True)
         convinced(service, calibration())
@@ -131,12 +131,12 @@ async def test_a_wrong_token_is_told(document, daemon, capsys, tmp_path):
     async with daemon(document) as service:
         status, _, err = await call(
             capsys,
-            *("reset", "--url", service.door.url, "--token-file", str(tmp_path / "token")),
+            *("reset", "--url", service.server.url, "--token-file", str(tmp_path / "token")),
         )
         assert (status, "token" in err) == (2, True)
         (tmp_path / "token").write_text("open\n")
         status, out, _ = await call(
             capsys,
-            *("reset", "--url", service.door.url, "--token-file", str(tmp_path / "token")),
+            *("reset", "--url", service.server.url, "--token-file", str(tmp_path / "token")),
         )
         assert (status, "forgotten" in out) == (0, True)

@@ -138,7 +138,7 @@ async def test_approval_is_waited_for_and_asked_for_over_http(document, daemon, 
     async with (
         daemon(document) as service,
         Vehicle(port) as vehicle,
-        aiohttp.ClientSession(service.door.url) as client,
+        aiohttp.ClientSession(service.server.url) as client,
     ):
         async with client.post("/api/approve", json={}) as response:
             assert response.status == 409
