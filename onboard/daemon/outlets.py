@@ -7,7 +7,6 @@ ticks' snapshots over here and knows nothing more of them.
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
@@ -31,7 +30,8 @@ from onboard.push.policy import Mode
 if TYPE_CHECKING:
     from onboard.mqtt.publisher import Publisher
 
-logger = logging.getLogger(__name__)
+REPEATED_S = 10.0
+"""A ground station gives up repeating a write well before."""
 
 
 class Operated(Protocol):
@@ -76,6 +76,8 @@ class Outlets:
         self._settings = configuration.parameters
         self._approval: asyncio.Task[None] | None = None
         self._approving = False
+        self._clock = clock
+        self._last_denied = ("", 0.0)
         self._finding: tuple[int, str] = (0, "")
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
@@ -176,7 +178,12 @@ class Outlets:
             self._approving = False
 
     def _denied(self, name: str, sentence: str) -> None:
-        self._notices.post("parameter_denied", f"{name}: {sentence}", warning=True)
+        """Stations repeat a write that did not take: that is no news."""
+        text, now = f"{name}: {sentence}", self._clock()
+        last, at = self._last_denied
+        self._last_denied = (text, now)
+        if text != last or now - at > REPEATED_S:
+            self._notices.post("parameter_denied", text, warning=True)
 
     # Diagnosis
 

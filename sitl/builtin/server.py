@@ -40,6 +40,7 @@ class _Client:
         self.send = send
         # Filled by the event loop while the simulation's thread empties it.
         self.inbox: deque[Message] = deque()
+        self.forwarded: list[bytes] = []
         self._packer = mav.MAVLink(None, srcSystem=system, srcComponent=1)
         self._parser = mav.MAVLink(None)
         self._parser.robust_parsing = True
@@ -51,7 +52,8 @@ class _Client:
     def frames(self) -> list[bytes]:
         """Frames to be sent now."""
         waiting, self.link.outbox = self.link.outbox, []
-        return [packed(message, self._packer) for _, message in waiting]
+        others, self.forwarded = self.forwarded, []
+        return others + [packed(message, self._packer) for _, message in waiting]
 
 
 class Server:
@@ -148,10 +150,23 @@ class Server:
             self._requests.popleft()(self.autopilot)
         for client in self._clients:
             while client.inbox:
-                self.autopilot.receive(client.link, client.inbox.popleft())
+                self._route(client, client.inbox.popleft())
         if self.driver is not None:
             self.driver.step(self.autopilot)
         self.autopilot.advance(seconds)
+
+    def _route(self, client: _Client, message: Message) -> None:
+        """As ArduPilot does: what is for all, or for another component, goes on to the others."""
+        own = int(self.autopilot.parameters["MAV_SYSID"])
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        if system in {0, own} and component in {0, 1}:
+            self.autopilot.receive(client.link, message)
+        if system != own or component != 1:
+            frame = bytes(message.get_msgbuf())
+            for other in self._clients:
+                if other is not client:
+                    other.forwarded.append(frame)
 
     def _admit(self) -> None:
         """Clients come and go only between steps."""

@@ -81,6 +81,37 @@ async def test_two_udp_clients_and_a_broadcast():
             transport.close()
 
 
+async def test_a_companion_and_a_ground_station_hear_each_other_through_the_autopilot():
+    server = Server(Autopilot("copter", Truth()), speedup=10.0)
+    port = await server.listen_udp()
+    async with running(server):
+        peers = [await udp_client(port) for _ in range(2)]
+        ground, companion = (client for _, client in peers)
+        companion.packer = mav.MAVLink(None, srcSystem=1, srcComponent=191)
+        for client in (ground, companion):
+            client.send(heartbeat())
+            await client.until(lambda m: m.get_type() == "HEARTBEAT")
+        # For the companion alone: the autopilot's own parameters stay untouched and untold.
+        ground.send(mav.MAVLink_param_set_message(1, 191, b"INS_ACCOFFS_X", 0.25, 9))
+        heard = await companion.until(lambda m: m.get_type() == "PARAM_SET")
+        assert (heard.get_srcSystem(), heard.target_component) == (255, 191)
+        companion.send(mav.MAVLink_param_value_message(b"OBC_PUSH", 1.0, 9, 1, 0))
+        await ground.until(lambda m: m.get_type() == "PARAM_VALUE")
+        companion.send(heartbeat())
+        await ground.until(lambda m: m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 191)
+        # For the autopilot alone: nobody else gets it.
+        ground.send(mav.MAVLink_param_set_message(1, 1, b"INS_ACCOFFS_Y", 0.5, 9))
+        await companion.until(
+            lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == "INS_ACCOFFS_Y"
+        )
+        assert sum(m.get_type() == "PARAM_SET" for m in companion.messages) == 1
+        assert server.autopilot.parameters["INS_ACCOFFS_X"] != 0.25
+        values = [m for m in ground.messages if m.get_type() == "PARAM_VALUE"]
+        assert {m.param_id for m in values} <= {"OBC_PUSH", "INS_ACCOFFS_Y"}
+        for transport, _ in peers:
+            transport.close()
+
+
 async def test_sends_unasked_to_a_listening_ground_station():
     loop = asyncio.get_running_loop()
     transport, client = await loop.create_datagram_endpoint(Client, local_addr=("127.0.0.1", 0))
