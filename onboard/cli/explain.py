@@ -15,51 +15,27 @@ from rich.text import Text
 from onboard.cli.replay import STANDARD_OUTPUT, write_json
 from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.core.result import SIX_NAMES
+from onboard.errors import UsageError
 from onboard.explain import Explanation
 from onboard.explain import explain as explain_recordings
+from onboard.report.parameters import parameter_text
+from onboard.report.words import EFFECTS, VERDICTS
 
 EXAMPLES = """\
 \b
 onboard explain flight.BIN
-onboard explain flight.tlog --imu 2
+onboard explain flight.tlog --report flight.html --param cure.param
 onboard explain flight.BIN --json - | jq '.effects[].name'
 """
-
-WORDS = {
-    Verdict.CLEAN: ("green", "Nothing is missing: six numbers and timing explain this flight."),
-    Verdict.EXPLAINED: ("yellow", "Physics is missing from the model, and it was found."),
-    Verdict.PARTLY_EXPLAINED: ("yellow", "Physics is missing; a part of it was found."),
-    Verdict.UNEXPLAINED: ("red", "Something is missing, and nothing in the catalogue explains it."),
-    Verdict.INSUFFICIENT: ("red", "This flight is too quiet to say."),
-}
-NAMES = {
-    "gps_latency": "GPS is late",
-    "gps_smoothing": "GPS averages its velocity",
-    "gps_lever_arm": "The GPS antenna is not where the IMU is",
-    "imu_delay": "Attitude and accelerometer are not simultaneous",
-    "cross_axis": "The accelerometer's axes are not square",
-    "mount_tilt": "Attitude and accelerometer are tilted against each other",
-    "heading_error": "The heading is off",
-    "heading_by_throttle": "The motors pull the compass",
-    "temperature_drift": "The offset follows the temperature",
-    "bias_ramp": "The offset grows with time",
-    "bias_step": "The offset jumped",
-    "scale_nonlinearity": "The scale changes with the load",
-    "vibration_rectification": "Vibration shifts the offset",
-    "throttle_coupling": "The throttle shifts the offset",
-    "saturation": "The accelerometer hit its limit",
-    "gps_fault": "GPS velocity was false",
-    "clock_skew": "The GPS clock runs at another rate",
-    "gravity": "Gravity differs",
-    "load_flex": "The mount bends under load",
-    "rotor_drag": "Rotor drag",
-    "empirical": "An empirical term",
-}
 
 
 @click.command(epilog=EXAMPLES)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...", type=click.Path(path_type=Path))
 @click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
+@click.option("--report", "report_file", metavar="FILE", help="Write one self-contained HTML page.")
+@click.option(
+    "--param", "param_file", metavar="FILE", help="Write parameters for a ground station."
+)
 @click.option(
     "--imu",
     type=click.IntRange(1, 5),
@@ -69,6 +45,8 @@ NAMES = {
 def explain(
     logs: tuple[Path, ...],
     json_file: str | None,
+    report_file: str | None,
+    param_file: str | None,
     imu: int | None,
 ) -> None:
     """Find the physics that a recording has and the model lacks.
@@ -80,6 +58,19 @@ def explain(
         result = explain_recordings(logs, imu=imu)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
+    if report_file is not None:
+        # jinja2 only when it is wanted.
+        from onboard.report.explain import explain_html
+
+        page = explain_html(
+            result.diagnosis,
+            files=result.files,
+            autopilot=result.source.autopilot,
+            duration_s=result.duration_s,
+        )
+        _write(report_file, page)
+    if param_file is not None:
+        _write(param_file, parameter_text(result.diagnosis, result.files))
     if json_file != STANDARD_OUTPUT:
         console = Console(highlight=False)
         for part in summary(result):
@@ -89,7 +80,7 @@ def explain(
 def summary(result: Explanation) -> Iterator[RenderableType]:
     """What a pilot reads in ten seconds."""
     d = result.diagnosis
-    colour, words = WORDS[d.verdict]
+    colour, words = VERDICTS[d.verdict]
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
     yield Text(words, style=f"bold {colour}")
     if d.verdict is Verdict.INSUFFICIENT:
@@ -127,7 +118,7 @@ def _effects(effects: tuple[Effect, ...]) -> Table:
         )
         spans = "; ".join(f"{a:.0f}-{b:.0f} s" for a, b in e.intervals[:4])
         table.add_row(
-            f"{NAMES.get(e.name, e.name)} ({e.name})",
+            f"{EFFECTS.get(e.name, e.name)} ({e.name})",
             size + (f"; {spans}" if spans else ""),
             f"{100 * e.share_of_mismatch:.0f} %",
         )
@@ -150,6 +141,13 @@ def _six(d: Diagnosis) -> Table:
     for name, value, sigma, force, seen in rows:
         table.add_row(name, f"{value:.4f}", f"{sigma:.4f}", f"{force:.4f}", "yes" if seen else "no")
     return table
+
+
+def _write(file: str, text: str) -> None:
+    try:
+        Path(file).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
 
 
 @contextmanager
