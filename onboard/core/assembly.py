@@ -88,12 +88,18 @@ class Assembly:
             out.update(self._imus[imu].refused)
         return out
 
+    def forget(self, imu: int) -> None:
+        """Forget what waits of one accelerometer, but not what was refused of it."""
+        if imu in self._imus:
+            refused = self._imus[imu].refused
+            self._imus[imu] = ImuTrack()
+            self._imus[imu].refused = refused
+            self._fresh.pop(imu, None)
+
     def clear(self) -> None:
         """Forget all that waits (reboot)."""
         for imu in self._imus:
-            highres = self._imus[imu].refused
-            self._imus[imu] = ImuTrack()
-            self._imus[imu].refused = highres
+            self.forget(imu)
         self._attitude = SlowTrack()
         self._slow.clear()
         self._fixes.clear()

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.accelerometer import SixParameters, parameter_names
 from onboard.core.assembly import Assembly
 from onboard.core.engine import Chunk, Engine
 from onboard.core.impossible import impossible
@@ -38,6 +39,7 @@ from onboard.core.trust import TrustWindow, WindowClosed, WindowOpened
 
 Array = NDArray[np.float64]
 
+OF_ACCELEROMETER = {name: imu for imu in range(1, 6) for name in parameter_names(imu).six}
 BACKWARDS_S = 1.0
 """A clock that goes back by more is a reboot; by less, a message that was overtaken."""
 
@@ -130,7 +132,7 @@ class Calibrator:
             self._assembly.attitude(sample)
             return ()
         if isinstance(sample, ParameterValue):
-            self.parameters.set(sample.name, sample.value)
+            self._parameter(sample)
             return ()
         if isinstance(sample, GpsFix):
             return self._fix(sample)
@@ -234,6 +236,18 @@ class Calibrator:
         self._engines[imu] = Engine(self.settings, self._prior(imu))
         return self._engines[imu]
 
+    def _parameter(self, parameter: ParameterValue) -> None:
+        """Take a report; what was taken for raw before the six were known, was not raw."""
+        imu = OF_ACCELEROMETER.get(parameter.name)
+        unknown = imu is not None and not self.parameters.known(imu)
+        self.parameters.set(parameter.name, parameter.value)
+        if imu is None or not unknown or not self.parameters.known(imu):
+            return
+        if self.parameters.six(imu) != SixParameters():
+            self._assembly.forget(imu)
+            if self._engines.pop(imu, None) is not None:
+                self._counts["begun_anew_with_parameters"] += 1
+
     def _clock(self, t: float) -> tuple[Event, ...]:
         """Notice a reboot."""
         if not t < self._newest - BACKWARDS_S:
@@ -270,6 +284,10 @@ class Calibrator:
         made: dict[int, list[Chunk]] = self._assembly.take(self.parameters, everything=everything)
         newest = -np.inf
         for imu, chunks in made.items():
+            saved = self._waiting.get(imu)
+            if saved is not None and saved.device_id is not None and not self.parameters.known(imu):
+                self._counts["before_parameters"] += len(chunks)
+                continue  # whether this is the sensor of the saved sums is not known yet
             for chunk in chunks:
                 self._engine_of(imu).add(chunk)
                 newest = max(newest, float(chunk.fixes.t[-1]))
