@@ -229,13 +229,16 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
         clock = t_receiver - t_receiver[0]
     else:
         period = float(np.median(np.diff(t)))
+        if period <= 0.0:
+            return t.copy()
+        count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
+        # The median of jittered intervals is off by a millisecond, which adds up over a chunk:
+        # good enough to number the epochs, not to say when they were.
+        period = float(np.polyfit(count, t - t[0], 1)[0])
         # Whole milliseconds: receivers run at 1, 2, 4, 5, 8, 10 ... Hz.
         period = (
             round(period * 1e3) * 1e-3 if abs(period * 1e3 - round(period * 1e3)) < 0.3 else period
         )
-        if period <= 0.0:
-            return t.copy()
-        count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
         clock = count * period
     offset = t - t[0] - clock
     if float(np.ptp(offset)) < 2e-3:
