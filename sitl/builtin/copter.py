@@ -24,17 +24,17 @@ from sitl.builtin.smoothing import (
 )
 from sitl.builtin.trajectory import Environment, Start, Trajectory
 
-HORIZONTAL_S = (1.5, 0.9, 0.5, 0.2)
-VERTICAL_S = (0.7, 0.6, 0.4, 0.2)
+HORIZONTAL_S = (1.7, 0.9, 0.5, 0.2)
+VERTICAL_S = (0.9, 0.6, 0.4, 0.2)
 YAW_S = (1.2, 0.6, 0.4, 0.2)
 SETTLING_S = sum(HORIZONTAL_S)
 GUST_S = (0.5, 0.35, 0.25, 0.15, 0.1)
 CLIMB = 2.5
 DESCENT = 1.5
 RANGE = 150.0
-FLOOR, CEILING = 12.0, 60.0
+FLOOR, CEILING = 12.0, 70.0
 HOVER_THROTTLE = 0.35
-LONGEST_S = 16.0
+LONGEST_S = 20.0
 """A manoeuvre and coming down from where it may have climbed to."""
 DULL_GUSTS = 0.3
 
@@ -160,8 +160,8 @@ def _plan(flight: CopterFlight, start: Start) -> _Plan:
         course = rng.uniform(-np.pi, np.pi)
         if np.linalg.norm(place) > RANGE:
             course = float(np.arctan2(-place[1], -place[0])) + rng.uniform(-0.7, 0.7)
-        speed = rng.uniform(2.0, 10.0) * (rng.random() > 0.12)
-        climb = rng.uniform(-3.2, 3.2)
+        speed = rng.uniform(4.0, 12.0) * (rng.random() > 0.12)
+        climb = rng.uniform(-3.5, 3.5)
         if not FLOOR < height + climb * hold < CEILING:
             climb = -climb if FLOOR < height - climb * hold < CEILING else 0.0
         command = np.array([speed * np.cos(course), speed * np.sin(course)])

@@ -149,7 +149,8 @@ class Server:
         while self._requests:
             self._requests.popleft()(self.autopilot)
         for client in self._clients:
-            while client.inbox:
+            # What comes in meanwhile has to wait for the next step, or answers never leave.
+            for _ in range(len(client.inbox)):
                 self._route(client, client.inbox.popleft())
         if self.driver is not None:
             self.driver.step(self.autopilot)

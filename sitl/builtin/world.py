@@ -115,6 +115,8 @@ class World:
 
     def launch(self, t: float, duration: float) -> float:
         """A flight begins just after ``t``; returns the boot time at which it is over."""
+        while len(self.pieces) > 1 and self.pieces[-1].start > t:
+            self.pieces.pop()
         piece = self.pieces[-1]
         keep = whole_samples(t - piece.start + STEP)
         if piece.flight is None and keep < piece.trajectory.n:
@@ -129,6 +131,8 @@ class World:
         piece = self.at(t)
         if piece.flight is None or piece is not self.pieces[-1]:
             return
+        if piece.flight.stop_at is not None:
+            return  # on its way down already
         flight = replace(piece.flight, stop_at=t - piece.start + 0.5)
         start = self.pieces[-2].trajectory.end if len(self.pieces) > 1 else self._start
         self._measure_again(piece, self._fly(flight, start), self.truth)

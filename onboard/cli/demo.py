@@ -1,0 +1,193 @@
+"""``onboard demo``: a simulated autopilot and the service, from the first flight to the proof.
+
+The autopilot runs in a process of its own and is reached over UDP, as a real one would be; the
+service is the one that ``onboard run`` starts.  The hidden truth is known only to the
+simulator and to the table in the end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import tempfile
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.console import Console
+
+from onboard.errors import OnboardError
+
+if TYPE_CHECKING:
+    from onboard.cli.demo_report import Outcome
+    from onboard.cli.demo_show import Show
+    from onboard.daemon.service import Service
+    from sitl.builtin.world import Vehicle
+    from sitl.station import Station
+
+VEHICLE: Vehicle = "copter"
+SEED = 11
+SPEEDUP = 12.0
+FIRST_FLIGHT_S, PROOF_FLIGHT_S = 240.0, 120.0
+POLL_S = 0.25
+PUSH_LIMIT_S = 90.0
+"""Wall-clock seconds for the service to write, after the landing."""
+
+
+class DemoError(OnboardError):
+    """The demonstration did not show what it should; says what is missing."""
+
+    exit_status = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line asks for; times in simulated seconds."""
+
+    duration: float
+    port: int
+    speedup: float
+    seed: int
+
+
+@click.command()
+@click.option("--json", "json_file", metavar="F", help="Write the result as JSON; - is stdout.")
+@click.option(
+    "--duration",
+    default=FIRST_FLIGHT_S,
+    show_default=True,
+    type=click.FloatRange(120.0, 1800.0),
+    help="Length of the first flight, s of simulated time.",
+)
+@click.option(
+    "--port",
+    default=0,
+    type=click.IntRange(0, 65535),
+    help="Port of the status page on 127.0.0.1 [a free one].",
+)
+@click.option(
+    "--speedup",
+    default=SPEEDUP,
+    show_default=True,
+    type=click.FloatRange(1.0, 50.0),
+    help="Simulated seconds a second.",
+)
+@click.option("--seed", default=SEED, show_default=True, help="Of truth, manoeuvres and noise.")
+def demo(json_file: str | None, duration: float, port: int, speedup: float, seed: int) -> None:
+    """Fly a simulated autopilot, calibrate it, and fly again to see that it was right.
+
+    Two accelerometers are off by some per cent and some tenths of m/s^2.  The service finds
+    out by how much while the vehicle flies, writes the parameters after the landing and reads
+    them back; a second flight shows the residual that is left.
+    """
+    from onboard.cli.demo_report import report
+    from onboard.cli.demo_show import Show
+
+    logging.getLogger("onboard").addHandler(logging.NullHandler())
+    out = Console(stderr=json_file == "-", highlight=False)
+    options = Options(duration, port, speedup, seed)
+    with Show(out, Console(stderr=True, highlight=False)) as show:
+        outcome = asyncio.run(_demonstrate(options, show))
+    for part in report(outcome):
+        out.print(part)
+    if json_file is not None:
+        document = outcome.document().to_json()
+        if json_file == "-":
+            click.echo(document, nl=False)
+        else:
+            Path(json_file).write_bytes(document)
+    if outcome.shortcomings:
+        raise DemoError("; ".join(outcome.shortcomings))
+
+
+async def _demonstrate(options: Options, show: Show) -> Outcome:
+    from onboard.cli.demo_report import Outcome
+    from onboard.daemon import configuration
+    from onboard.daemon.service import Service
+    from sitl.builtin.process import autopilot_process
+    from sitl.builtin.truth import random_imus
+
+    imus = random_imus(options.seed, 2)
+    with tempfile.TemporaryDirectory(prefix="onboard-demo-") as folder:
+        show.stage("starting a simulated ArduPilot copter, two accelerometers, clearly off")
+        async with autopilot_process(
+            VEHICLE, imus, speedup=options.speedup, seed=options.seed
+        ) as sim_port:
+            service = Service(
+                configuration.from_mapping(
+                    {
+                        "link": {"endpoints": [f"udpout:127.0.0.1:{sim_port}"]},
+                        "state": {"directory": folder},
+                        "http": {"port": options.port},
+                    },
+                    source="demo",
+                )
+            )
+            running = asyncio.create_task(service.run(), name="service")
+            try:
+                await _first(running, _fly_twice(service, sim_port, options, show))
+            finally:
+                service.stop()
+                await asyncio.gather(running, return_exceptions=True)
+        return Outcome.of(service, Path(folder) / "journal.jsonl", imus, options.duration)
+
+
+async def _fly_twice(service: Service, sim_port: int, options: Options, show: Show) -> None:
+    """The demonstration itself, stage by stage."""
+    from sitl.station import Station
+
+    await service.ready.wait()
+    async with Station.at("127.0.0.1", sim_port) as station:
+        show.watch(service, station)
+        if service.server is not None:
+            show.stage(f"status page: {service.server.url}")
+        show.stage("the service reads the parameters and asks for its message rates")
+        await _until(lambda: bool(service.snapshot().imus), "the first samples", PUSH_LIMIT_S)
+        show.stage(f"first flight: {options.duration:.0f} s of random manoeuvres")
+        await _flight(station, options.duration)
+        show.stage("landed; the service waits until it has been disarmed for 5 s, then writes")
+        wanted = set(range(1, len(service.snapshot().imus) + 1))
+        await _until(
+            lambda: set(service.snapshot().push.can_roll_back) >= wanted,
+            "the parameters to be written",
+            PUSH_LIMIT_S,
+        )
+        show.stage("parameters are written and read back")
+        show.stage(f"second flight, {PROOF_FLIGHT_S:.0f} s: is the residual smaller now?")
+        await _flight(station, PROOF_FLIGHT_S)
+        await _until(
+            lambda: {j.imu for j in service.snapshot().push.judged} >= wanted,
+            "the verdict on the second flight",
+            PUSH_LIMIT_S,
+        )
+        show.stage("done")
+
+
+async def _flight(station: Station, seconds: float) -> None:
+    await station.take_off()
+    await station.until_time(station.time + seconds)
+    await station.land()
+    await station.until_disarmed()
+
+
+async def _until(condition: Callable[[], bool], what: str, limit_s: float) -> None:
+    try:
+        async with asyncio.timeout(limit_s):
+            while not condition():  # noqa: ASYNC110 - a snapshot is asked for, never announced
+                await asyncio.sleep(POLL_S)
+    except TimeoutError:
+        raise DemoError(f"waited {limit_s:.0f} s in vain for {what}") from None
+
+
+async def _first(running: asyncio.Task[None], work: Coroutine[None, None, None]) -> None:
+    """Does the work unless the service ends before it, which is a failure of the service."""
+    task = asyncio.create_task(work, name="demonstration")
+    await asyncio.wait({running, task}, return_when=asyncio.FIRST_COMPLETED)
+    if not task.done():
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await running
+        raise DemoError("the service ended early")
+    await task

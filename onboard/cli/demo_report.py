@@ -1,0 +1,185 @@
+"""What the demonstration has shown: truth, estimate, sigma, pushed and read back; residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.result import Calibration
+from onboard.document import PushedDocument, RecordingDocument, ReplayDocument, imu_document
+from onboard.push.entries import Planned, Purpose, ReadBack
+from onboard.push.journal import Journal
+
+if TYPE_CHECKING:
+    from onboard.daemon.service import Service
+    from onboard.daemon.snapshot import JudgedView
+    from sitl.builtin.truth import ImuTruth
+
+SCALE_LIMIT, OFFSET_LIMIT = 0.01, 0.05
+"""How far an estimate may be from the truth; offsets in m/s^2."""
+SIGMAS = 3.0
+READ_BACK_LIMIT = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of a demonstration.  Keys are accelerometers."""
+
+    truth: Mapping[int, SixParameters]
+    calibrations: Mapping[int, Calibration]
+    pushed: Mapping[int, tuple[PushedDocument, ...]]
+    judged: Mapping[int, JudgedView]
+    duration: float
+
+    @classmethod
+    def of(
+        cls, service: Service, journal: Path, imus: Sequence[ImuTruth], duration: float
+    ) -> Outcome:
+        """Collects it from the service, which has ended, and its journal."""
+        truth = {
+            number: SixParameters(scale=imu.scale, offset=imu.offset)
+            for number, imu in enumerate(imus, start=1)
+        }
+        learned = service.learning.learned
+        return cls(
+            truth=truth,
+            calibrations={} if learned is None else learned.calibrations,
+            pushed=_pushed(journal),
+            judged={view.imu: view for view in service.snapshot().push.judged},
+            duration=duration,
+        )
+
+    @property
+    def shortcomings(self) -> tuple[str, ...]:
+        """What it did not show; empty when all is well."""
+        return tuple(s for imu in self.truth for s in self._shortcomings(imu))
+
+    def _shortcomings(self, imu: int) -> Iterator[str]:
+        calibration, judged = self.calibrations.get(imu), self.judged.get(imu)
+        if calibration is None:
+            yield f"IMU {imu} was not calibrated"
+            return
+        for name, error, sigma, limit in _errors(calibration, self.truth[imu]):
+            if abs(error) > limit:
+                yield f"{name} is off by {error:.4f}, more than {limit}"
+            if abs(error) > SIGMAS * sigma:
+                yield f"{name} is off by {abs(error) / sigma:.1f} sigma"
+        pushed = self.pushed.get(imu, ())
+        if {p.name for p in pushed} != set(parameter_names(imu).six):
+            yield f"IMU {imu}: not all six parameters were pushed"
+        for p in pushed:
+            if p.read_back is None or abs(p.read_back - p.wanted) > READ_BACK_LIMIT:
+                yield f"{p.name} reads back {p.read_back}, wanted {p.wanted}"
+        before, after = _residuals(judged)
+        if before is None or after is None or after >= before:
+            yield f"IMU {imu}: the residual has not fallen"
+
+    def document(self) -> ReplayDocument:
+        """The JSON document: as of a replay, with truth and what was pushed."""
+        samples = {"first_flight_s": round(self.duration)}
+        return ReplayDocument(
+            recording=RecordingDocument(
+                files=[], autopilot="ardupilot", duration_s=self.duration, samples=samples
+            ),
+            imus=[
+                imu_document(c, truth=self.truth[imu], pushed=self.pushed.get(imu, ()))
+                for imu, c in self.calibrations.items()
+                if imu in self.truth
+            ],
+        )
+
+
+def report(outcome: Outcome) -> Iterator[RenderableType]:
+    """One table an accelerometer, its residuals, and a verdict."""
+    for imu in outcome.truth:
+        calibration = outcome.calibrations.get(imu)
+        if calibration is None:
+            continue
+        yield Text()
+        yield _table(outcome, imu, calibration)
+        before, after = _residuals(outcome.judged.get(imu))
+        if before is not None and after is not None:
+            yield Text(
+                f"velocity residual with the parameters in force: {before:.3f} m/s before, "
+                f"{after:.3f} m/s after"
+            )
+    yield Text()
+    if outcome.shortcomings:
+        yield Text("not as it should be: " + "; ".join(outcome.shortcomings), style="bold red")
+    else:
+        yield Text("all estimates within their limits; all parameters written", style="bold green")
+
+
+def _table(outcome: Outcome, imu: int, calibration: Calibration) -> Table:
+    table = Table(title=f"accelerometer {imu}", title_justify="left")
+    for heading in ("parameter", "before", "truth", "estimate", "sigma", "pushed", "read back"):
+        table.add_column(heading, justify="left" if heading == "parameter" else "right")
+    truth = outcome.truth[imu].as_vector()
+    estimate = calibration.scale + calibration.offset
+    sigma = calibration.scale_sigma + calibration.offset_sigma
+    pushed = {p.name: p for p in outcome.pushed.get(imu, ())}
+    for i, name in enumerate(parameter_names(imu).six):
+        p = pushed.get(name)
+        numbers = (
+            None if p is None else p.before,
+            float(truth[i]),
+            estimate[i],
+            sigma[i],
+            None if p is None else p.wanted,
+            None if p is None else p.read_back,
+        )
+        table.add_row(name, *("-" if x is None else f"{x:.4f}" for x in numbers))
+    return table
+
+
+def _errors(
+    calibration: Calibration, truth: SixParameters
+) -> Iterator[tuple[str, float, float, float]]:
+    """Name, error, sigma, limit of each of the six."""
+    estimate = calibration.scale + calibration.offset
+    sigma = calibration.scale_sigma + calibration.offset_sigma
+    limits = (SCALE_LIMIT,) * 3 + (OFFSET_LIMIT,) * 3
+    names = parameter_names(calibration.imu).six
+    for name, x, t, s, limit in zip(names, estimate, truth.as_vector(), sigma, limits, strict=True):
+        yield name, x - float(t), s, limit
+
+
+def _residuals(judged: JudgedView | None) -> tuple[float | None, float | None]:
+    """Velocity residual with the parameters in force, first flight and second, m/s."""
+    if judged is None:
+        return None, None
+    return judged.velocity_rms_before_push_m_s, judged.velocity_rms_after_push_m_s
+
+
+def _pushed(journal: Path) -> dict[int, tuple[PushedDocument, ...]]:
+    """The first push of each accelerometer, from the service's own journal."""
+    plans: dict[str, Planned] = {}
+    read: dict[tuple[str, str], float] = {}
+    with Journal(journal) as kept:
+        for _, entry in kept.entries:
+            if isinstance(entry, Planned) and entry.purpose is Purpose.PUSH:
+                plans[entry.transaction] = entry
+            elif isinstance(entry, ReadBack):
+                read[entry.transaction, entry.name] = entry.value
+    found: dict[int, tuple[PushedDocument, ...]] = {}
+    for transaction, planned in plans.items():
+        found.setdefault(
+            planned.plan.imu,
+            tuple(
+                PushedDocument(
+                    name=change.name,
+                    before=change.before,
+                    wanted=change.wanted,
+                    read_back=read.get((transaction, change.name)),
+                )
+                for change in planned.plan.changes
+            ),
+        )
+    return found

@@ -1,0 +1,99 @@
+"""What the demonstration shows while it runs: stages as lines, progress below them."""
+
+from __future__ import annotations
+
+import threading
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from onboard.core.result import SIX_NAMES
+
+if TYPE_CHECKING:
+    from onboard.daemon.service import Service
+    from onboard.daemon.snapshot import ImuView
+    from sitl.station import Station
+
+REFRESH_HZ = 4.0
+STATUS_STYLE = {"calibrated": "bold green", "collecting": "yellow", "insufficient": "yellow"}
+
+
+class Show:
+    """Lines for the stages; on a terminal also a panel that lives.
+
+    Args:
+        out: where the stages go.
+        live: where the panel goes, if that is a terminal.
+    """
+
+    def __init__(self, out: Console, live: Console) -> None:
+        self._out = out
+        self._console = live
+        self._live: Live | None = None
+        self._service: Service | None = None
+        self._station: Station | None = None
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._live = Live(
+                get_renderable=self._panel,
+                console=self._console,
+                refresh_per_second=REFRESH_HZ,
+                transient=True,
+            )
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def watch(self, service: Service, station: Station) -> None:
+        """Shows these from now on."""
+        with self._lock:
+            self._service, self._station = service, station
+
+    def stage(self, sentence: str) -> None:
+        """Says what comes next."""
+        clock = "" if self._station is None else f"{self._station.time:6.0f} s  "
+        self._out.print(Text(f"{clock:>10}{sentence}"))
+
+    def _panel(self) -> RenderableType:
+        with self._lock:
+            service, station = self._service, self._station
+        if service is None or station is None:
+            return Text()
+        snapshot = service.snapshot()
+        state = "armed" if station.armed else "disarmed"
+        trust = "GPS trusted" if snapshot.trust.open else "GPS not trusted"
+        head = Text(f"{station.time:8.0f} s  {state}, {trust}", style="bold")
+        return Group(head, *(_imu(view) for view in snapshot.imus))
+
+
+def _imu(view: ImuView) -> RenderableType:
+    """One line of estimates, with sigmas under them."""
+    table = Table(box=None, padding=(0, 1), show_edge=False)
+    table.add_column(f"IMU {view.imu}", width=12)
+    for name in SIX_NAMES:
+        table.add_column(name, justify="right", width=9)
+    c = view.calibration
+    numbers = c.scale + c.offset
+    sigmas = c.scale_sigma + c.offset_sigma
+    style = STATUS_STYLE.get(view.status, "red")
+    table.add_row(Text(view.status, style=style), *(_number(x, "{:.4f}") for x in numbers))
+    table.add_row(f"{view.coverage.percent:.0f} %", *(_number(x, "±{:.4f}") for x in sigmas))
+    return table
+
+
+def _number(x: float | None, pattern: str) -> str:
+    return "-" if x is None else pattern.format(x)

@@ -1,0 +1,132 @@
+"""A small ground station: one more MAVLink client over UDP, to command flights with.
+
+It sends its heartbeat and sees the vehicle's: enough to arm, take off, land and wait.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from typing import cast
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from sitl.builtin.messages import Message, packed
+from sitl.errors import SitlError
+
+IDENTITY = (255, 190)
+ARMED = 128
+BEAT = 1.0
+RETRY = 0.5
+PATIENCE = 60.0
+"""Seconds after which a command that is still refused, or unanswered, has failed."""
+
+
+class Station(asyncio.DatagramProtocol):
+    """Use :meth:`at`.  ``armed`` and ``time`` (boot clock, s) are as last seen."""
+
+    def __init__(self) -> None:
+        self.armed = False
+        self.time = 0.0
+        self.last_text = ""
+        self._results: dict[int, int] = {}
+        self._news = asyncio.Event()
+        self._transport: asyncio.DatagramTransport | None = None
+        self._packer = mav.MAVLink(None, srcSystem=IDENTITY[0], srcComponent=IDENTITY[1])
+        self._parser = mav.MAVLink(None)
+        self._parser.robust_parsing = True
+
+    @classmethod
+    @contextlib.asynccontextmanager
+    async def at(cls, host: str, port: int) -> AsyncIterator[Station]:
+        """A station that speaks to an autopilot that listens on UDP."""
+        loop = asyncio.get_running_loop()
+        transport, station = await loop.create_datagram_endpoint(cls, remote_addr=(host, port))
+        beating = asyncio.create_task(station.beat(), name="ground station: heartbeat")
+        try:
+            yield station
+        finally:
+            beating.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await beating
+            transport.close()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Keeps the transport."""
+        self._transport = cast("asyncio.DatagramTransport", transport)
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        """Takes note of what is needed."""
+        del addr
+        for message in self._parser.parse_buffer(data) or []:
+            match message.get_type():
+                case "HEARTBEAT":
+                    self.armed = bool(message.base_mode & ARMED)
+                case "ATTITUDE":
+                    self.time = message.time_boot_ms * 1e-3
+                case "COMMAND_ACK":
+                    self._results[message.command] = message.result
+                case "STATUSTEXT":
+                    self.last_text = message.text
+                case _:
+                    continue
+            self._news.set()
+
+    def error_received(self, exc: Exception) -> None:
+        """Nobody there yet."""
+        del exc
+
+    async def take_off(self) -> None:
+        """Arms and takes off, as soon as the autopilot allows it.
+
+        Raises:
+            SitlError: it never does.
+        """
+        await self._insist(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        await self._insist(mav.MAV_CMD_NAV_TAKEOFF)
+
+    async def land(self) -> None:
+        """Tells it to land."""
+        await self._insist(mav.MAV_CMD_NAV_LAND)
+
+    async def until_disarmed(self) -> None:
+        """Waits for the end of a flight."""
+        while self.armed:
+            await self._wait()
+
+    async def until_time(self, time: float) -> None:
+        """Waits for the boot clock."""
+        while self.time < time:
+            await self._wait()
+
+    async def _insist(self, command: int, parameter: float = 0.0) -> None:
+        """Sends a command until it is accepted."""
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while self._results.pop(command, None) != mav.MAV_RESULT_ACCEPTED:
+                    parameters = (parameter, 0, 0, 0, 0, 0, 0)
+                    self._send(mav.MAVLink_command_long_message(1, 1, command, 0, *parameters))
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(RETRY):
+                            while command not in self._results:
+                                await self._wait()
+        except TimeoutError:
+            said = self.last_text or "nothing"
+            raise SitlError(
+                f"command {command} is not accepted; the autopilot said: {said}"
+            ) from None
+
+    async def _wait(self) -> None:
+        self._news.clear()
+        await self._news.wait()
+
+    async def beat(self) -> None:
+        """Says once a second that it is there."""
+        while True:
+            self._send(mav.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+            await asyncio.sleep(BEAT)
+
+    def _send(self, message: Message) -> None:
+        if self._transport is not None:
+            self._transport.sendto(packed(message, self._packer))
