@@ -90,6 +90,10 @@ class Station(asyncio.DatagramProtocol):
         """Tells it to land."""
         await self._insist(mav.MAV_CMD_NAV_LAND)
 
+    def set_pace(self, speedup: float) -> None:
+        """Asks a simulation to run at so many times real time (SIM_SPEEDUP)."""
+        self._send(mav.MAVLink_param_set_message(1, 1, b"SIM_SPEEDUP", speedup, 9))
+
     async def until_disarmed(self) -> None:
         """Waits for the end of a flight."""
         while self.armed:

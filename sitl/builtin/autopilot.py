@@ -372,6 +372,8 @@ class Autopilot:
     # -- parameters ------------------------------------------------------------------------
 
     def _changed(self, name: str) -> None:
+        if name == "SIM_SPEEDUP":
+            return
         if name.startswith("SIM_") or name in {"INS_ACCEL_FILTER", "INS_GYRO_FILTER"}:
             self._dirty_world = True
         elif name.startswith(("INS_ACC", "AHRS_")) and hasattr(self, "corrections"):

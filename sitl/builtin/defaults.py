@@ -66,6 +66,7 @@ def _simulator(truth: Truth) -> list[Parameter]:
         Parameter("SIM_GPS1_HZ", gps.rate, Kind.INT8),
         Parameter("SIM_GPS1_JAM", 0, Kind.INT8),
         Parameter("SIM_GPS1_ENABLE", 1, Kind.INT8),
+        Parameter("SIM_SPEEDUP", 1.0),
         Parameter("SIM_VIB_FREQ_X", truth.imus[0].vibration_hz),
         Parameter("SIM_IMUT_START", truth.imus[0].temperature_start),
         Parameter("SIM_IMUT_END", truth.imus[0].temperature_end),

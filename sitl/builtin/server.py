@@ -21,6 +21,7 @@ from sitl.builtin.messages import Message, packed
 
 TICK = 0.005
 """Wall-clock seconds between steps of the simulation."""
+SLOWEST_PACE, FASTEST_PACE = 0.01, 100.0
 SLOWEST = 0.2
 """Backlog that is forgotten instead of being caught up, wall-clock s."""
 
@@ -77,7 +78,7 @@ class Server:
         if speedup <= 0.0:
             raise ValueError(f"speedup has to be positive, not {speedup}")
         self.autopilot = autopilot
-        self.speedup = speedup
+        autopilot.parameters.load({"SIM_SPEEDUP": speedup})
         self.driver = driver
         self.impairment = impairment or Impairment()
         self._clients: list[_Client] = []
@@ -85,6 +86,11 @@ class Server:
         self._leaving: list[_Client] = []
         self._requests: deque[Callable[[Autopilot], None]] = deque()
         self._closers: list[Callable[[], None]] = []
+
+    @property
+    def speedup(self) -> float:
+        """Simulated seconds a second: SIM_SPEEDUP, which any client may change."""
+        return min(max(self.autopilot.parameters["SIM_SPEEDUP"], SLOWEST_PACE), FASTEST_PACE)
 
     async def listen_tcp(self, host: str = "127.0.0.1", port: int = 0) -> int:
         """Accepts TCP clients, as SITL's first port does; returns the port.

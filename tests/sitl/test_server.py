@@ -15,6 +15,7 @@ from sitl.builtin.impairment import Impairment
 from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server
 from sitl.builtin.truth import Truth, random_imus
+from sitl.station import Station
 
 
 class Client(asyncio.DatagramProtocol):
@@ -199,3 +200,24 @@ async def test_port_in_use_is_one_clear_line():
     assert str(port) in str(result.exception)
     taken.close()
     await taken.wait_closed()
+
+
+async def test_pace_is_a_parameter_that_any_client_may_change():
+    server = Server(Autopilot("copter", Truth()), speedup=10.0)
+    port = await server.listen_udp()
+    async with running(server), Station.at("127.0.0.1", port) as station:
+        station.set_pace(3.0)
+        while server.speedup != 3.0:
+            station.set_pace(3.0)
+            await asyncio.sleep(0.02)
+
+
+async def test_station_flies_on_command_and_impatience_does_no_harm():
+    server = Server(Autopilot("copter", Truth(imus=random_imus(1), seed=1)), speedup=50.0)
+    port = await server.listen_udp()
+    async with running(server), Station.at("127.0.0.1", port) as station:
+        await station.take_off()
+        await station.until_time(station.time + 40.0)
+        await asyncio.gather(*(station.land() for _ in range(5)))
+        await station.until_disarmed()
+    assert server.autopilot.instant().landed
