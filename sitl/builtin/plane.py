@@ -36,7 +36,7 @@ CLIMB_OUT = 4.0
 SINK = 3.5
 FLOOR, CEILING = 45.0, 110.0
 RANGE = 700.0
-SIDE_FORCE = 0.027
+SIDE_FORCE = 0.045
 """Side force per rad of sideslip and (m/s)^2 of dynamic speed, 1/m."""
 ZERO_LIFT, LIFT_SLOPE = -0.02, 0.07
 """Angle of attack without lift, and what 1 g of lift adds at cruise speed, rad."""
@@ -198,7 +198,7 @@ def _manoeuvre(
     kind = rng.random()
     if kind < 0.45:  # a turn, climbing or sinking, perhaps slipping
         bank = side * rng.uniform(0.35, 1.0) * max_bank
-        slip = rng.uniform(-0.10, 0.10) if rng.random() < 0.4 else 0.0
+        slip = rng.uniform(-0.12, 0.12) if rng.random() < 0.6 else 0.0
         return [(rng.uniform(4.0, 8.0), (bank, rng.uniform(-2.5, 2.5), speed, slip))]
     if kind < 0.65:  # pull up and push over
         climb = rng.uniform(2.5, 5.0) * (1.0 if rng.random() < 0.5 else -1.0)
@@ -213,7 +213,7 @@ def _manoeuvre(
             (rng.uniform(1.8, 3.0), (bank, 0.0, speed, 0.0)),
             (rng.uniform(1.8, 3.0), (-bank, 0.0, speed, 0.0)),
         ]
-    slip = side * rng.uniform(0.06, 0.14)  # steady sideslips, speed change
+    slip = side * rng.uniform(0.08, 0.18)  # steady sideslips, speed change
     return [
         (rng.uniform(2.5, 4.0), (-0.4 * slip, 0.0, speed, slip)),
         (rng.uniform(2.5, 4.0), (0.4 * slip, 0.0, speed, -slip)),
