@@ -86,7 +86,7 @@ class Outlets:
             self._announcer = Announcer(clock)
             notices.listen(self._announcer.hear)
         if configuration.mqtt.enabled:
-            from onboard.mqtt.publisher import Publisher  # noqa: PLC0415 - not all want its 10 MB
+            from onboard.mqtt.publisher import Publisher  # noqa: PLC0415 - not all want it
 
             self._publisher = Publisher(configuration.mqtt, service, notices, clock=clock)
 

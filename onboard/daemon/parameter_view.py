@@ -7,7 +7,7 @@ name               meaning
 ``OBC_ADVISE``     1: advise-only, nothing is ever written to this autopilot
 ``OBC_TRUST``      1: GPS is trusted now, and teaches
 ``OBC_DISTRUST``   why it is not, see :data:`REASONS`
-``OBC_TRUSTED``    seconds of trusted flight so far
+``OBC_TRUSTED``    seconds of trusted flight so far, in tens
 ``OBC_COVERAGE``   coverage of the worst accelerometer, percent
 ``OBC_PUSH``       policy, **writable**: 0 never, 1 landed, 2 in flight; until the next start
 ``OBC_APPROVE``    **writable**: 1 approves what waits; returns to 0 when that is done
@@ -36,7 +36,6 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from onboard.core.accelerometer import AXES
-from onboard.core.trust import Reason
 from onboard.daemon.snapshot import ImuView, Number, Snapshot, Three
 
 STATES: Final[Mapping[str, int]] = MappingProxyType(
@@ -56,7 +55,22 @@ STATUSES: Final[Mapping[str, int]] = MappingProxyType(
     {"collecting": 1, "calibrated": 2, "insufficient": 3, "invalid": 4}
 )
 REASONS: Final[Mapping[str, int]] = MappingProxyType(
-    {reason.value: number for number, reason in enumerate(Reason, start=1)}
+    {
+        "spoofed": 1,
+        "jammed": 2,
+        "no_fix": 3,
+        "few_satellites": 4,
+        "hdop": 5,
+        "speed_accuracy": 6,
+        "gps_glitch": 7,
+        "ekf_gps_glitch": 8,
+        "ekf_unhealthy": 9,
+        "stale": 10,
+        "gps_gap": 11,
+        "restarted": 12,
+        "configured_end": 13,
+        "end_of_data": 14,
+    }
 )
 
 NO_DIAGNOSIS, CLEAN, INSUFFICIENT, UNEXPLAINED, UNKNOWN_EFFECT = -1, 0, 90, 99, 98
@@ -105,7 +119,7 @@ def parameter_values(snapshot: Snapshot, *, imus: int, approving: bool = False) 
         "OBC_ADVISE": float(snapshot.mode == "advise_only"),
         "OBC_TRUST": float(snapshot.trust.open),
         "OBC_DISTRUST": float(REASONS.get(snapshot.trust.reason or "", 0)),
-        "OBC_TRUSTED": float(math.floor(snapshot.trust.trusted_s)),
+        "OBC_TRUSTED": 10.0 * math.floor(snapshot.trust.trusted_s / 10.0),
         "OBC_COVERAGE": float(math.floor(min(coverage, default=0.0))),
         "OBC_PUSH": float(POLICIES.index(snapshot.push.policy)),
         "OBC_APPROVE": float(approving),

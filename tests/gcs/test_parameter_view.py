@@ -1,6 +1,7 @@
 """OBC_* parameters: names and numbers that stations can show, for any state of the service."""
 
 import re
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -116,6 +117,24 @@ def test_tables_know_every_word_of_the_service():
     assert set(REASONS) == {reason.value for reason in Reason}
     for table in (STATES, STATUSES, REASONS, FINDINGS):
         assert len(set(table.values())) == len(table)
+
+
+def test_the_manual_has_every_name_and_number():
+    manual = (Path(__file__).parents[2] / "docs" / "ground-station.md").read_text(encoding="utf-8")
+    for name in values(seen()):
+        general = re.sub(r"[YZ]$", "X", re.sub(r"_\d_", "_n_", name))
+        assert f"`{general if '_n_' in general else name}`" in manual, name
+    sections = re.split(r"^### (\w+)$", manual, flags=re.MULTILINE)
+    told = {
+        name: {word: int(n) for n, word in re.findall(r"\n\| (-?\d+) \| `(\w+)` \|", text)}
+        for name, text in zip(sections[1::2], sections[2::2], strict=True)
+    }
+    assert told == {
+        "OBC_STATE": dict(STATES),
+        "OBC_n_STAT": dict(STATUSES),
+        "OBC_DISTRUST": dict(REASONS),
+        "OBC_FINDING": dict(FINDINGS),
+    }
 
 
 def effect(name, share):

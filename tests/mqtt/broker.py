@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import shutil
+import signal
 import socket
 
 import aiomqtt
@@ -65,6 +66,13 @@ class Broker:
                 self._process.kill()
             await self._process.wait()
             self._process = None
+
+    def freeze(self):
+        """It holds its connections and answers nothing, as when its disk or machine hangs."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self):
+        self._process.send_signal(signal.SIGCONT)
 
     @property
     def log(self):
