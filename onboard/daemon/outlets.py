@@ -79,6 +79,7 @@ class Outlets:
         self._clock = clock
         self._last_denied = ("", 0.0)
         self._finding: tuple[int, str] = (0, "")
+        self._approval_needed = False
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
         self._publisher: Publisher | None = None
@@ -118,10 +119,9 @@ class Outlets:
 
     def publish(self) -> None:
         """A tick has passed."""
-        if self._server is None and self._publisher is None and self._announcer is None:
-            return
         snapshot = self._service.snapshot()
         self._tell_of_physics(snapshot)
+        self._tell_of_approval(snapshot)
         if self._server is not None:
             self._server.update(self._values(snapshot))
         if self._publisher is not None:
@@ -184,6 +184,13 @@ class Outlets:
         self._last_denied = (text, now)
         if text != last or now - at > REPEATED_S:
             self._notices.post("parameter_denied", text, warning=True)
+
+    def _tell_of_approval(self, snapshot: Snapshot) -> None:
+        """Say when a person is waited for, once each time."""
+        needed = snapshot.push.approval_needed
+        if needed and not self._approval_needed:
+            self._notices.post("approval_needed", "a calibration waits for approval")
+        self._approval_needed = needed
 
     # Diagnosis
 

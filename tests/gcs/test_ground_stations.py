@@ -84,6 +84,7 @@ async def test_two_ground_stations_see_the_same_and_one_approves(airfield):
         assert one.values == other.values
         assert one.values["OBC_STATE"] == STATES["approval"]
         assert one.values["OBC_WAITING"] == 2.0
+        await one.until(lambda: "OBC: calibration waits for OBC_APPROVE 1" in one.texts)
         assert one.values["OBC_1_SCAL_X"] == pytest.approx(1.02)
         assert not any(name.startswith("INS_") for name, _ in vehicle.sets)
         one.set("OBC_APPROVE", 1.0)

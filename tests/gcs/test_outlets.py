@@ -1,0 +1,83 @@
+"""What the outlets make of a snapshot: the news in it, once."""
+
+import pytest
+from vehicles_state import accelerometer, proposal, seen
+
+from onboard.daemon.configuration import from_mapping
+from onboard.daemon.notices import Notices
+from onboard.daemon.outlets import Outlets
+
+
+class Stage:
+    """Outlets around a service whose snapshot a test sets."""
+
+    def __init__(self, **sections):
+        self.now = 0.0
+        self.shown = seen()
+        self.kept = []
+        notices = Notices(lambda: 0.0)
+        notices.listen(self.kept.append)
+        self.outlets = Outlets(
+            from_mapping(sections, source="test"), self, notices, clock=lambda: self.now
+        )
+        self.participants = self.outlets.participants
+
+    def snapshot(self):
+        return self.shown
+
+    def show(self, **changes):
+        self.shown = seen(**changes)
+        self.outlets.publish()
+
+    def told(self, kind):
+        return [notice.text for notice in self.kept if notice.kind == kind]
+
+
+def diagnosis(*names, verdict="explained"):
+    effects = [{"name": n, "share_of_mismatch": 1.0 / (i + 1)} for i, n in enumerate(names)]
+    return {"verdict": verdict, "effects": effects}
+
+
+def test_missing_physics_is_told_once_for_each_answer():
+    stage = Stage()
+    for _ in range(3):
+        stage.show(diagnosis=diagnosis("gps_latency", "heading_error"))
+    stage.show(diagnosis=diagnosis("heading_error"))
+    stage.show(diagnosis=diagnosis(verdict="clean"))
+    stage.show(diagnosis=diagnosis(verdict="unexplained"))
+    assert stage.told("physics_missing") == [
+        "physics missing: gps latency",
+        "physics missing: heading error",
+        "physics missing: no known effect",
+    ]
+
+
+@pytest.mark.parametrize("verdict", ["clean", "insufficient"])
+def test_a_clean_flight_is_no_news(verdict):
+    stage = Stage()
+    stage.show(diagnosis=None)
+    stage.show(diagnosis=diagnosis(verdict=verdict))
+    assert stage.kept == []
+
+
+def test_a_person_is_called_each_time_one_is_waited_for():
+    stage = Stage()
+    for held_back in (["approval", "armed"], ["approval"], ["approval"], [], ["approval"]):
+        stage.show(imus=[accelerometer(1)], proposals=[proposal(*held_back)])
+    assert len(stage.told("approval_needed")) == 2
+
+
+def test_every_tick_reaches_the_parameters():
+    stage = Stage()
+    (server, _announcer) = stage.participants
+    assert server.values["OBC_1_STAT"] == 0.0
+    stage.show(imus=[accelerometer(1)])
+    assert server.values["OBC_1_STAT"] == 2.0
+
+
+def test_what_is_switched_off_is_not_there_but_the_log_has_the_news():
+    stage = Stage(parameters={"enabled": False, "messages": False})
+    assert list(stage.participants) == []
+    stage.show(diagnosis=diagnosis("gps_latency"))
+    assert stage.outlets.counters == {}
+    assert len(stage.told("physics_missing")) == 1
