@@ -1,0 +1,1 @@
+"""The status page: static files and the handler that serves them."""

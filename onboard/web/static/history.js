@@ -1,0 +1,79 @@
+// What the page remembers of each accelerometer, bounded: a page open for a day does not grow.
+
+const POINTS_MAX = 600;
+
+/**
+ * Rows of (time, values...) in a fixed budget.  When it is full every second row is dropped and
+ * from then on rows are taken half as often, so that the whole time since the start stays
+ * visible, only coarser.
+ */
+export class History {
+  constructor(limit = POINTS_MAX) {
+    this.limit = limit;
+    this.clear();
+  }
+
+  clear() {
+    this.rows = [];
+    this.every = 1;
+    this.skipped = 0;
+    this.provisional = false;
+  }
+
+  /** Add a row; a time that does not advance is dropped. */
+  add(row) {
+    if (this.provisional) this.rows.pop(); // the newest is always shown, even if not kept
+    const last = this.rows.at(-1);
+    if (last && row[0] <= last[0]) {
+      this.provisional = false;
+      return;
+    }
+    this.rows.push(row);
+    this.skipped += 1;
+    this.provisional = this.skipped < this.every && this.rows.length > 1;
+    if (this.provisional) return;
+    this.skipped = 0;
+    if (this.rows.length >= this.limit) {
+      this.rows = this.rows.filter((_, index) => index % 2 === 0);
+      this.every *= 2;
+    }
+  }
+
+  get length() {
+    return this.rows.length;
+  }
+
+  /** One column of all rows. */
+  column(index) {
+    return this.rows.map((row) => row[index]);
+  }
+}
+
+/** Histories by accelerometer; each row is time, then six values, six sigmas, six in force. */
+export class Remembered {
+  constructor() {
+    this.byImu = new Map();
+    this.trusted = new Map();
+  }
+
+  of(imu) {
+    if (!this.byImu.has(imu)) this.byImu.set(imu, new History());
+    return this.byImu.get(imu);
+  }
+
+  /** Take a snapshot in; what was learned being forgotten begins the history anew. */
+  take(snapshot) {
+    for (const view of snapshot.imus) {
+      const history = this.of(view.imu);
+      if (view.trusted_s + 1 < (this.trusted.get(view.imu) ?? 0)) history.clear();
+      this.trusted.set(view.imu, view.trusted_s);
+      const c = view.calibration;
+      history.add([
+        snapshot.time,
+        ...c.scale, ...c.offset,
+        ...c.scale_sigma, ...c.offset_sigma,
+        ...view.in_force_scale, ...view.in_force_offset,
+      ]);
+    }
+  }
+}

@@ -1,0 +1,61 @@
+// Link health, message rates and the journal.
+
+import { byId, h, renew } from "./dom.js";
+import { clockTime, fixed, plain } from "./words.js";
+
+const SLOW = 0.7; // of the rate that was granted
+
+export function showLink(link) {
+  const { frames = 0, lost = 0, bad_frames: damaged = 0, reboots = 0 } = link.counters;
+  const share = frames + lost > 0 ? (100 * lost) / (frames + lost) : 0;
+  const facts = [
+    ["Autopilot", link.system_id === null ? "none heard yet" : `${link.autopilot} ${link.vehicle}, system ${link.system_id}, ${link.state}`],
+    ...link.endpoints.map((e) => [e.endpoint, e.reason ? `${e.state}: ${e.reason}` : e.state]),
+    ["Frames", `${frames.toLocaleString("en")}, lost ${fixed(share, 1)} %, damaged ${damaged}`],
+    ["Signed", link.signed ? "yes" : "no"],
+    ...(reboots ? [["Reboots", String(reboots)]] : []),
+  ];
+  const rates = Object.entries(link.messages)
+    .map(([name, rate]) => [name, rate.rate_hz, rate.granted_hz ?? rate.wanted_hz, rate.stream])
+    .filter(([, rate, wanted]) => rate > 0 || wanted !== null)
+    .sort((a, b) => Number(b[2] !== null) - Number(a[2] !== null) || (a[0] < b[0] ? -1 : 1));
+  renew(byId("link-body"), [facts, rates], () => [
+    h("dl", { class: "facts" }, ...facts.flatMap(([name, text]) => [h("dt", { text: name }), h("dd", { text })])),
+    ...(rates.length ? [ratesTable(rates)] : []),
+  ]);
+}
+
+function ratesTable(rates) {
+  return h(
+    "div",
+    { class: "scroll" },
+    h(
+      "table",
+      { class: "rates" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Message" }), h("th", { scope: "col", class: "number", text: "Hz" }), h("th", { scope: "col", class: "number", text: "asked for" }))),
+      h("tbody", {}, ...rates.map(([name, rate, wanted, stream]) => {
+        const slow = wanted !== null && rate < SLOW * wanted;
+        return h(
+          "tr",
+          {},
+          h("td", { class: "name", text: name }),
+          h("td", { class: `number ${slow ? "warn" : ""}`, text: fixed(rate, 1) + (slow ? " (slow)" : "") }),
+          h("td", { class: "number soft", text: wanted === null ? "" : fixed(wanted, 1) + (stream === "granted" || stream === null ? "" : ` (${plain(stream)})`) }),
+        );
+      })),
+    ),
+  );
+}
+
+/** Journal and notices in one list, newest first. */
+export function showJournal(journal, notices) {
+  const lines = [
+    ...journal.map((line) => ({ at: line.at, text: line.imu ? `IMU ${line.imu}: ${line.text}` : line.text, kind: "" })),
+    ...notices.map((notice) => ({ at: notice.at, text: notice.text, kind: notice.warning ? "warn" : "" })),
+  ].sort((a, b) => b.at - a.at);
+  renew(byId("journal-lines"), lines, () =>
+    lines.length
+      ? lines.map((line) => h("li", {}, h("time", { datetime: new Date(line.at * 1000).toISOString(), text: clockTime(line.at) }), h("span", { class: line.kind, text: line.text })))
+      : [h("li", {}, h("span", { class: "soft", text: "nothing yet" }))],
+  );
+}

@@ -1,0 +1,156 @@
+// What will be written, and the three things that a person may say to it.
+
+import { byId, h, renew, say } from "./dom.js";
+import { brief, capital, fixed, plain, policyInWords } from "./words.js";
+
+const TOKEN_KEY = "onboard token";
+const WAIT_MS = 15000;
+const PEOPLE = ["approval", "refused"]; // reasons that a person lifts
+
+const QUESTIONS = {
+  approve: (imus) => [`Write the new values for ${imus}?`, "They are written as soon as policy and flight state allow, read back, and watched in the next flight."],
+  reject: (imus) => [`Reject the new values for ${imus}?`, "Nothing is written until it is approved or what was learned is forgotten."],
+  rollback: (imus) => [`Roll back ${imus}?`, "The values from before the last push are written again."],
+  reset: () => ["Forget what was learned?", "Of all accelerometers: learning begins anew. The autopilot's parameters stay as they are."],
+};
+const LABELS = { approve: "Approve", reject: "Reject", rollback: "Roll back", reset: "Forget what was learned" };
+
+export class Push {
+  constructor() {
+    this.token = byId("token-field");
+    this.token.value = sessionStorage.getItem(TOKEN_KEY) ?? "";
+    this.token.addEventListener("change", () => sessionStorage.setItem(TOKEN_KEY, this.token.value));
+    this.asked = null;
+    const dialog = byId("confirm");
+    byId("confirm-no").addEventListener("click", () => dialog.close());
+    byId("confirm-yes").addEventListener("click", () => {
+      const asked = this.asked;
+      dialog.close();
+      if (asked) this.send(asked.action, asked.imus);
+    });
+    dialog.addEventListener("close", () => {
+      this.asked = null;
+    });
+  }
+
+  show(push, imus) {
+    this.push = push;
+    const approval = push.approval_required ? ", after a person has approved" : "";
+    const doing = push.state === "idle" ? "" : ` Now: ${plain(push.state)}${push.active_imu ? `, IMU ${push.active_imu}` : ""}.`;
+    const last = push.last_outcome ? ` Last time: ${push.last_outcome}` : "";
+    say(byId("push-state"), `Policy: ${policyInWords(push.policy)}${approval}.${doing}${last}`);
+    renew(byId("proposals"), push.proposals, () =>
+      push.proposals.length
+        ? push.proposals.map((proposal) => this.proposal(proposal))
+        : [h("p", { class: "soft", text: "Nothing is proposed yet: no accelerometer has an answer that differs from the values in force." })],
+    );
+    renew(byId("judged"), push.judged ?? [], () => (push.judged ?? []).map(judged));
+    renew(byId("push-all"), [push.can_roll_back, imus.length > 0], () => [
+      ...push.can_roll_back.map((imu) => this.button("rollback", [imu], { text: `Roll back IMU ${imu}` })),
+      ...(imus.length ? [this.button("reset", [])] : []),
+    ]);
+  }
+
+  proposal(proposal) {
+    const reasons = Object.entries(proposal.held_back);
+    const waits = reasons.some(([name]) => PEOPLE.includes(name));
+    const said = proposal.rejected ? "rejected" : proposal.approved ? "approved" : "";
+    const state = said || (reasons.length ? "held back" : "about to be written");
+    const imus = [proposal.imu];
+    return h(
+      "div",
+      { class: "proposal", "data-imu": proposal.imu },
+      h("h3", { text: `IMU ${proposal.imu}: ${state}` }),
+      changesTable(proposal.changes),
+      ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([, sentence]) => h("li", { text: sentence })))] : []),
+      h(
+        "div",
+        { class: "row actions" },
+        this.button("approve", imus, { class: waits ? "primary" : "", disabled: !waits }),
+        this.button("reject", imus, { disabled: proposal.rejected }),
+      ),
+    );
+  }
+
+  button(action, imus, attributes = {}) {
+    return h("button", {
+      type: "button",
+      text: LABELS[action],
+      "data-key": `${action}-${imus.join("-")}`,
+      "data-action": action,
+      "aria-label": imus.length ? `${LABELS[action]} IMU ${imus.join(", ")}` : LABELS[action],
+      ...attributes,
+      onclick: () => this.ask(action, imus),
+    });
+  }
+
+  ask(action, imus) {
+    const named = imus.map((imu) => `IMU ${imu}`).join(", ");
+    const [title, text] = QUESTIONS[action](named);
+    const proposal = this.push.proposals.find((p) => imus.includes(p.imu));
+    this.asked = { action, imus };
+    say(byId("confirm-title"), title);
+    say(byId("confirm-text"), text);
+    say(byId("confirm-yes"), LABELS[action]);
+    byId("confirm-changes").replaceChildren(...(action === "approve" && proposal ? [changesTable(proposal.changes)] : []));
+    byId("confirm").showModal();
+    byId("confirm-no").focus(); // Enter by mistake changes nothing
+  }
+
+  async send(action, imus) {
+    const headers = { "Content-Type": "application/json" };
+    if (this.token.value) headers.Authorization = `Bearer ${this.token.value}`;
+    this.answer("", "");
+    try {
+      const response = await fetch(`/api/${action}`, {
+        method: "POST",
+        headers,
+        body: JSON.stringify(imus.length ? { imus } : {}),
+        signal: AbortSignal.timeout(WAIT_MS),
+      });
+      const answer = await response.json();
+      if (response.ok) return this.answer(answer.done, "");
+      this.answer(`${LABELS[action]}: ${answer.error.message}`, "bad");
+      if (response.status === 401) {
+        byId("token").open = true;
+        this.token.focus();
+      }
+    } catch (error) {
+      this.answer(`${LABELS[action]}: the service does not answer (${error.message})`, "bad");
+    }
+  }
+
+  answer(text, kind) {
+    const result = byId("push-result");
+    result.classList.toggle("bad", kind === "bad");
+    say(result, text && capital(text));
+  }
+}
+
+function changesTable(changes) {
+  const decimals = (change) => (change.name.includes("SCAL") ? 4 : 3);
+  return h(
+    "div",
+    { class: "scroll" },
+    h(
+      "table",
+      { class: "changes" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Parameter" }), h("th", { scope: "col", class: "number", text: "before" }), h("th", { scope: "col", class: "number", text: "after" }), h("th", { scope: "col", class: "number", text: "±" }))),
+      h("tbody", {}, ...changes.map((change) =>
+        h(
+          "tr",
+          { class: change.kept ? "kept" : "" },
+          h("td", { class: "name", text: change.name }),
+          h("td", { class: "number", text: fixed(change.before, decimals(change)) }),
+          h("td", { class: "number to", text: change.kept ? "kept" : fixed(change.after, decimals(change)) }),
+          h("td", { class: "number soft", text: change.kept ? "" : brief(change.sigma, 2) }),
+        ),
+      )),
+    ),
+  );
+}
+
+function judged(view) {
+  const numbers = view.held_out_before_push === null ? "" : ` Residual ${brief(view.held_out_before_push)} → ${brief(view.held_out_after_push)}.`;
+  return h("p", { class: view.verdict === "worse" ? "bad" : "", text: `IMU ${view.imu}, flight after the push: ${plain(view.verdict)}: ${view.sentence}.${numbers}` });
+}

@@ -1,0 +1,110 @@
+// Names of the snapshot in words, numbers in the digits that their sigma supports.
+
+const REASONS = {
+  spoofed: "the receiver reports spoofing",
+  jammed: "the receiver reports jamming",
+  no_fix: "no 3D fix",
+  few_satellites: "too few satellites",
+  hdop: "satellites badly spread (HDOP)",
+  speed_accuracy: "speed too inaccurate",
+  gps_glitch: "velocity jumped (glitch)",
+  ekf_gps_glitch: "the autopilot reports a GPS glitch",
+  ekf_unhealthy: "the autopilot's state estimate is unhealthy",
+  stale: "no fresh GPS",
+  gps_gap: "a gap in GPS",
+  restarted: "the recording or the autopilot began anew",
+  configured_end: "the configured time is over",
+  end_of_data: "no more data",
+};
+const STATUS = {
+  collecting: ["collecting", "warn"],
+  calibrated: ["calibrated", "good"],
+  insufficient: ["not enough yet", "warn"],
+  invalid: ["invalid", "bad"],
+};
+const EFFECTS = {
+  gps_latency: "GPS arrives late",
+  gps_smoothing: "The receiver smooths its velocity",
+  gps_lever_arm: "The antenna is away from the accelerometer",
+  imu_delay: "Attitude and accelerometer are apart in time",
+  cross_axis: "The axes are not square to each other",
+  mount_tilt: "The autopilot is mounted at a tilt",
+  heading_error: "The heading is off",
+  heading_by_throttle: "Throttle pulls the heading",
+  temperature_drift: "The offsets drift with temperature",
+  bias_ramp: "The offsets drift with time",
+  bias_step: "The offsets jumped",
+  scale_nonlinearity: "The scale bends with load",
+  vibration_rectification: "Vibration shifts the offsets",
+  throttle_coupling: "Throttle shifts the offsets",
+  saturation: "The accelerometer hit its limit",
+  gps_fault: "GPS was wrong for a while",
+  clock_skew: "The clocks run at different rates",
+  gravity: "Gravity differs from the assumed value",
+  load_flex: "The mount bends under load",
+  rotor_drag: "Rotor drag",
+  empirical: "A term without a physical name",
+};
+const VERDICTS = {
+  clean: ["Nothing is missing beyond the six numbers and the timing.", "good"],
+  explained: ["What was missing is found.", "good"],
+  partly_explained: ["Part of what is missing is found.", "warn"],
+  unexplained: ["Something is missing and no known effect explains it.", "bad"],
+  insufficient: ["Too little excitation to say.", "warn"],
+};
+const POLICIES = {
+  never: "nothing is ever written",
+  landed: "written when landed and disarmed",
+  in_flight: "written in flight in bounded steps",
+};
+
+const plain = (name) => String(name).replaceAll("_", " ");
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+export const reasonInWords = (name) => REASONS[name] ?? plain(name);
+export const statusInWords = (name) => STATUS[name] ?? [plain(name), "warn"];
+export const effectInWords = (name) => EFFECTS[name] ?? capital(plain(name));
+export const verdictInWords = (name) => VERDICTS[name] ?? [capital(plain(name)), "warn"];
+export const policyInWords = (name) => POLICIES[name] ?? plain(name);
+export { plain, capital };
+
+/** A number with as many decimals as `sigma` has two digits of; "–" where there is none. */
+export function measured(value, sigma, unit = "") {
+  if (value === null || value === undefined) return "–";
+  const digits = sigma > 0 ? Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma)))) : 4;
+  return signed(value.toFixed(digits)) + unit;
+}
+
+/** `digits` significant digits, a true minus sign. */
+export function brief(value, digits = 3) {
+  if (value === null || value === undefined) return "–";
+  if (value === 0) return "0";
+  const decimals = Math.min(6, Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(value)))));
+  return signed(value.toFixed(decimals));
+}
+
+export const fixed = (value, decimals) =>
+  value === null || value === undefined ? "–" : signed(value.toFixed(decimals));
+
+const signed = (text) => (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−"));
+
+/** A duration in seconds as people say it. */
+export function duration(seconds) {
+  if (seconds < 100) return `${Math.round(seconds)} s`;
+  if (seconds < 6000) return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
+  return `${Math.floor(seconds / 3600)} h ${Math.round((seconds % 3600) / 60)} min`;
+}
+
+/** Unix time as the clock of whoever reads. */
+export function clockTime(unix) {
+  return new Date(unix * 1000).toLocaleTimeString([], { hour12: false });
+}
+
+const AXES = ["X", "Y", "Z"];
+
+/** ArduPilot's name of number `index` (x, y, z scale, x, y, z offset) of accelerometer `imu`. */
+export function parameterName(imu, index) {
+  const quantity = index < 3 ? "SCAL" : "OFFS";
+  const prefix = imu === 1 ? "INS_ACC" : imu <= 3 ? `INS_ACC${imu}` : `INS${imu}_ACC`;
+  return `${prefix}${quantity}_${AXES[index % 3]}`;
+}
