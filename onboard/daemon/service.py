@@ -60,6 +60,7 @@ from onboard.mavlink.streams import Streams
 from onboard.mavlink.timesync import TimeSync
 from onboard.push.journal import Journal
 from onboard.push.policy import Mode
+from onboard.web.page import status_page
 
 if TYPE_CHECKING:
     from onboard.daemon.control import Page
@@ -410,7 +411,8 @@ class Service:
         token = http.token
         if http.token_file is not None:
             token = read_secret(http.token_file, key="[http] token_file")
-        return Door(self, address=http.address, port=http.port, token=token, pages=self._pages)
+        pages = (status_page, *self._pages)
+        return Door(self, address=http.address, port=http.port, token=token, pages=pages)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:

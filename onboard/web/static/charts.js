@@ -55,14 +55,12 @@ export class Chart {
     return {
       width,
       height,
+      padding: [6, 4, 6, 0],
       legend: { show: false },
       cursor: { show: false },
       scales: { x: { time: true }, y: { range: span } },
       axes: [
-        {
-          ...axis, size: 18, space: 70, grid: { show: false },
-          values: (_, times) => times.map((t) => new Date(t * 1000).toLocaleTimeString([], { hour12: false })),
-        },
+        { show: false }, // the legend says how long it is
         { ...axis, size: 44, space: 28, grid: { stroke: line, width: 1 } },
       ],
       series: [

@@ -43,6 +43,11 @@ export class History {
     return this.rows.length;
   }
 
+  /** From the first row to the last. */
+  get seconds() {
+    return this.rows.length ? this.rows.at(-1)[0] - this.rows[0][0] : 0;
+  }
+
   /** One column of all rows. */
   column(index) {
     return this.rows.map((row) => row[index]);

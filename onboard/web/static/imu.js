@@ -2,7 +2,7 @@
 
 import { Chart } from "./charts.js";
 import { byId, h, renew, say } from "./dom.js";
-import { brief, fixed, measured, parameterName, statusInWords } from "./words.js";
+import { brief, duration, fixed, measured, parameterName, statusInWords } from "./words.js";
 
 const NAMES = ["x scale", "y scale", "z scale", "x offset", "y offset", "z offset"];
 const ENOUGH_PERCENT = 60;
@@ -76,6 +76,8 @@ export class Imus {
     byId("residual").hidden = view === undefined;
     if (view === undefined) return;
     for (const axis of this.axes) axis.show(view);
+    const seconds = this.remembered.of(view.imu).seconds;
+    say(byId("axes-span"), seconds > 0 ? `the last ${duration(seconds)}` : "");
     say(byId("imu-note"), view.calibration.note);
     this.showResidual(view);
     this.redraw();

@@ -20,6 +20,7 @@ export class Push {
     this.token = byId("token-field");
     this.token.value = sessionStorage.getItem(TOKEN_KEY) ?? "";
     this.token.addEventListener("change", () => sessionStorage.setItem(TOKEN_KEY, this.token.value));
+    byId("token-form").addEventListener("submit", (event) => event.preventDefault());
     this.asked = null;
     const dialog = byId("confirm");
     byId("confirm-no").addEventListener("click", () => dialog.close());
@@ -54,8 +55,9 @@ export class Push {
   proposal(proposal) {
     const reasons = Object.entries(proposal.held_back);
     const waits = reasons.some(([name]) => PEOPLE.includes(name));
+    const asked = reasons.length === 1 && waits;
     const said = proposal.rejected ? "rejected" : proposal.approved ? "approved" : "";
-    const state = said || (reasons.length ? "held back" : "about to be written");
+    const state = said || (asked ? "waits for your approval" : reasons.length ? "held back" : "about to be written");
     const imus = [proposal.imu];
     return h(
       "div",
