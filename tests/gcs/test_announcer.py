@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.daemon import announcer
@@ -151,6 +151,7 @@ def test_of_too_much_the_least_severe_is_lost():
     assert cockpit.announcer.counters["texts_dropped"] == 31 - announcer.WAITING_MAX
 
 
+@settings(deadline=None)
 @given(st.text(max_size=200))
 def test_any_sentence_fits(sentence):
     text = statustext(sentence)

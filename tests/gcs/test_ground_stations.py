@@ -126,16 +126,14 @@ async def test_the_policy_is_set_and_told(airfield):
         assert station.values["OBC_PUSH"] == 0.0
 
 
-async def test_approving_what_does_not_wait_is_refused_in_words(airfield):
-    async with airfield() as (service, vehicle, router), Ground(router.port) as station:
-        await service.approve(())
-        await station.until(lambda: six(vehicle, 2)[0] == pytest.approx(1.02))
-        await station.until(lambda: not service.snapshot().push.approval_needed)
-        sets = len(vehicle.sets)
+async def test_approving_where_nobody_is_asked_is_refused_in_words(airfield):
+    never = {"push": {"approval": False, "policy": "never", "disarmed_s": 0.0}}
+    async with airfield(never) as (_, vehicle, router), Ground(router.port) as station:
         station.set("OBC_APPROVE", 1.0)
-        await station.until(lambda: approvals(station) or station.texts)
-        assert set(approvals(station)) <= {0.0}
-        assert len(vehicle.sets) == sets
+        await station.until(lambda: approvals(station))
+        assert set(approvals(station)) == {0.0}
+        await station.until(lambda: "OBC: OBC_APPROVE: nothing waits for approval" in station.texts)
+        assert not any(name.startswith("INS_") for name, _ in vehicle.sets)
 
 
 async def test_look_but_do_not_touch(airfield):

@@ -4,7 +4,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from stations import COMPONENT, SYSTEM, Line, Station
 
@@ -249,6 +249,7 @@ def test_a_negative_number_as_bytes_is_no_other_number(layout):
     assert desk.set == []
 
 
+@settings(deadline=None)
 @given(
     name=st.sampled_from([*VALUES, "OBC_NO", ""]),
     value=st.floats(width=32),
