@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from onboard.daemon.announcer import Announcer
@@ -91,16 +91,13 @@ class Outlets:
 
             self._publisher = Publisher(configuration.mqtt, service, notices, clock=clock)
 
-    @property
-    def participants(self) -> Sequence[Participant]:
-        """Who speaks on the link; asked once, when the service starts."""
-        found: list[Participant] = []
+    def join(self, attach: Callable[[Participant], None]) -> None:
+        """Take part in the link, before it runs."""
         if self._settings.enabled:
             self._server = self._make_server()
-            found.append(self._server)
+            attach(self._server)
         if self._announcer is not None:
-            found.append(self._announcer)
-        return found
+            attach(self._announcer)
 
     @property
     def counters(self) -> dict[str, int]:

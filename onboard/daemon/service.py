@@ -181,8 +181,7 @@ class Service:
         self.link.subscribe(self.on_message, Decoder.names)
         for participant in (self._streams, self._timesync, self._parameters, self._pusher):
             self.link.attach(participant)
-        for outlet in self._outlets.participants:
-            self.link.attach(outlet)
+        self._outlets.join(self.link.attach)
         if self.configuration.http.enabled:
             self.server = self._make_server()
             self.server.listen()

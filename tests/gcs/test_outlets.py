@@ -20,7 +20,8 @@ class Stage:
         self.outlets = Outlets(
             from_mapping(sections, source="test"), self, notices, clock=lambda: self.now
         )
-        self.participants = self.outlets.participants
+        self.participants = []
+        self.outlets.join(self.participants.append)
 
     def snapshot(self):
         return self.shown
@@ -77,7 +78,7 @@ def test_every_tick_reaches_the_parameters():
 
 def test_what_is_switched_off_is_not_there_but_the_log_has_the_news():
     stage = Stage(parameters={"enabled": False, "messages": False})
-    assert list(stage.participants) == []
+    assert stage.participants == []
     stage.show(diagnosis=diagnosis("gps_latency"))
     assert stage.outlets.counters == {}
     assert len(stage.told("physics_missing")) == 1
