@@ -150,7 +150,8 @@ class Assembly:
         stamps, rows = track.arrays()
         if len(stamps) < 8 or len(self._attitude) < 2:
             return []
-        if (len(stamps) - 1) / (stamps[-1] - stamps[0]) < self._settings.slowest_imu_hz:
+        # The median: a gap does not make the rest of the stream slow.
+        if self._settings.slowest_imu_hz * float(np.median(np.diff(stamps))) > 1.0:
             return []
         t = stamps - parameters.imu_delay
         breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1

@@ -19,6 +19,7 @@ from onboard.core.assembly import Assembly
 from onboard.core.engine import Chunk, Engine
 from onboard.core.impossible import impossible
 from onboard.core.parameters import ParametersInForce
+from onboard.core.passes import merged
 from onboard.core.report import calibration_of
 from onboard.core.result import Calibration
 from onboard.core.samples import (
@@ -33,13 +34,19 @@ from onboard.core.samples import (
     VehicleState,
     Vibration,
 )
-from onboard.core.saving import SavedEngine, dump, load, merged
+from onboard.core.saving import SavedEngine, dump, load
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import TrustWindow, WindowClosed, WindowOpened
 
 Array = NDArray[np.float64]
 
 OF_ACCELEROMETER = {name: imu for imu in range(1, 6) for name in parameter_names(imu).six}
+OTHER_CLOCK_S = 60.0
+"""No stream lags the inertial one by more: what does is of another source, or garbage."""
+AHEAD_OF_IMU_S = 5.0
+"""Nor is one further ahead: taken in, a single such stamp would make all that follow late."""
+MOST_SAVED = 16
+"""Portions that are saved: enough for folds and clusters."""
 BACKWARDS_S = 1.0
 """A clock that goes back by more is a reboot; by less, a message that was overtaken."""
 
@@ -129,6 +136,9 @@ class Calibrator:
             self._assembly.imu(sample, self.parameters)
             return events
         if isinstance(sample, AttitudeSample):
+            if self._ahead(sample.t):
+                self._counts["attitude_ahead"] += 1
+                return ()
             self._assembly.attitude(sample)
             return ()
         if isinstance(sample, ParameterValue):
@@ -188,7 +198,7 @@ class Calibrator:
         """Sums of every accelerometer, to go on with after a restart."""
         saved = []
         for imu, engine in sorted(self._engines.items()):
-            portions = merged(engine.all_portions)
+            portions = merged(engine.all_portions, MOST_SAVED)
             if portions:
                 prior = engine.model.prior[:6]
                 saved.append(
@@ -255,14 +265,21 @@ class Calibrator:
         self._counts["reboots"] += 1
         return self.restart("reboot")
 
+    def _ahead(self, t: float) -> bool:
+        """True for a stamp that the inertial stream is too far from reaching."""
+        return bool(np.isfinite(self._newest)) and t - self._newest > AHEAD_OF_IMU_S
+
     def _fix(self, fix: GpsFix) -> tuple[Event, ...]:
-        if abs(fix.t - self._newest) > 60.0 and np.isfinite(self._newest):
+        if abs(fix.t - self._newest) > OTHER_CLOCK_S and np.isfinite(self._newest):
             # Its clock is not the boot clock (another source, or garbage); a reboot shows in the
             # inertial samples first.
             self._counts["gps_other_clock"] += 1
             return ()
         events = tuple(self._trust.feed(fix))
         if self._trust.receiver not in (None, fix.receiver):
+            return events
+        if self._ahead(fix.t):
+            self._counts["gps_ahead"] += 1
             return events
         if self._assembly.fix(fix, trusted=self._trust.is_open):
             self._finished = False

@@ -26,7 +26,7 @@ from onboard.core.calibration_columns import (
 )
 from onboard.core.columns import Family, Model
 from onboard.core.noise import NoiseLevels, distance, star, stepped
-from onboard.core.passes import EpochState, Linearisation, Pass, PassResult, Portion
+from onboard.core.passes import EpochState, Linearisation, Pass, PassResult, Portion, merged
 from onboard.core.settings import EstimatorSettings
 from onboard.core.solution import Solution, solve, total
 from onboard.core.stretch import Fixes, Stretch
@@ -40,7 +40,10 @@ NOISE_ROUNDS = 2
 """Each round may change a level by four; refinements follow each other as the flight goes on."""
 MOST_STATES = 12000
 """Epochs whose state is kept for certificates: 20 minutes at 10 Hz."""
+MOST_AGED = 24
 LONGEST_WINDOW_S = 0.45
+LONGEST_FIX_GAP_S = 2.5
+"""Receivers report at 1 Hz or faster: longer without a fix is an outage, not trusted flight."""
 DELAY_RANGE_S = (-0.1, 0.45)
 
 
@@ -57,6 +60,12 @@ class Chunk:
     def duration(self) -> float:
         """Length between first and last epoch, s."""
         return float(self.fixes.t[-1] - self.fixes.t[0])
+
+    @property
+    def trusted_s(self) -> float:
+        """Time between neighbouring fixes that are both to be believed, s."""
+        step = np.diff(self.fixes.t)
+        return float(step[self.trusted[1:] & self.trusted[:-1] & (step < LONGEST_FIX_GAP_S)].sum())
 
 
 def calibration_model(
@@ -165,8 +174,7 @@ class Engine:
         """Process a chunk; refine when it is time."""
         self.chunks.append(chunk)
         self._buffered_s += chunk.duration
-        trusted = chunk.duration * float(np.mean(chunk.trusted))
-        before, self.trusted_s = self.trusted_s, self.trusted_s + trusted
+        before, self.trusted_s = self.trusted_s, self.trusted_s + chunk.trusted_s
         self._run(chunk)
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
@@ -198,11 +206,8 @@ class Engine:
             keep = float(np.exp(-gone.duration / self.settings.memory_s))
             self.aged = [Portion(p.start, p.end, p.sums.scaled(keep)) for p in self.aged]
             # A few dozen portions are enough for folds and clusters.
-            if len(self.aged) > 24:
-                self.aged = [
-                    Portion(a.start, b.end, a.sums + b.sums)
-                    for a, b in zip(self.aged[::2], self.aged[1::2], strict=False)
-                ]
+            if len(self.aged) > MOST_AGED:
+                self.aged = merged(self.aged, MOST_AGED)
 
     def refine(self, rounds: int = ROUNDS, noise_rounds: int = NOISE_ROUNDS) -> None:
         """Estimate timing and noise from the buffer and make its sums anew.

@@ -96,6 +96,17 @@ class Portion:
     sums: NormalSums
 
 
+def merged(portions: list[Portion], most: int) -> list[Portion]:
+    """At most ``most`` portions, neighbours added up."""
+    while len(portions) > most:
+        pairs = [
+            Portion(a.start, b.end, a.sums + b.sums)
+            for a, b in zip(portions[::2], portions[1::2], strict=False)
+        ]
+        portions = pairs + ([portions[-1]] if len(portions) % 2 else [])
+    return portions
+
+
 @dataclass(slots=True)
 class PassResult:
     """What :meth:`Pass.process` adds for one stretch."""
@@ -193,6 +204,12 @@ class Pass:
             fixes: GPS epochs on the boot clock as stamped (delay not removed).
             trusted: (n,) whether the receiver is to be believed there.
         """
+        if not self._running:
+            first_good = _first_believed(fixes, trusted)
+            if len(fixes) - first_good < 2:
+                at = float(fixes.t[-1])
+                return PassResult(Portion(at, at, NormalSums.zeros(self.model.size)))
+            fixes, trusted = fixes.between(first_good, len(fixes)), trusted[first_good:]
         epoch_t = self.point.true_time(fixes.t)
         maker = NodeMaker(
             stretch, self.bias_b, self.point.six, recorded_attitude=self.uses.recorded_attitude
@@ -342,6 +359,12 @@ class Pass:
             )
             for e in range(len(fixes))
         ]
+
+
+def _first_believed(fixes: Fixes, trusted: NDArray[np.bool_]) -> int:
+    """Index of the first fix that a filter may start from; their number if there is none."""
+    good = np.flatnonzero(trusted & np.all(np.isfinite(fixes.v_n[:, :2]), axis=1))
+    return int(good[0]) if len(good) else len(fixes)
 
 
 def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:

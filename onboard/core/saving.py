@@ -9,16 +9,17 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import Linearisation, Portion
+from onboard.core.samples import Vector3
 from onboard.core.sums import NormalSums
 from onboard.errors import StateError
 
 VERSION = 1
-MOST_PORTIONS = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +37,6 @@ class SavedEngine:
     noise: NoiseLevels
     trusted_s: float
     portions: tuple[Portion, ...]
-
-
-def merged(portions: list[Portion], most: int = MOST_PORTIONS) -> list[Portion]:
-    """At most ``most`` portions, neighbours added up."""
-    while len(portions) > most:
-        pairs = [
-            Portion(a.start, b.end, a.sums + b.sums)
-            for a, b in zip(portions[::2], portions[1::2], strict=False)
-        ]
-        portions = pairs + ([portions[-1]] if len(portions) % 2 else [])
-    return portions
 
 
 def dump(engines: list[SavedEngine]) -> bytes:
@@ -84,31 +74,60 @@ def load(data: bytes) -> list[SavedEngine]:
         if document["version"] != VERSION:
             raise StateError(f"saved state is of version {document['version']}, not {VERSION}")
         return [_engine(e) for e in document["engines"]]
-    except (KeyError, TypeError, ValueError, UnicodeDecodeError, binascii.Error) as error:
+    except (
+        KeyError,
+        TypeError,
+        AttributeError,
+        ValueError,
+        OverflowError,
+        RecursionError,
+        binascii.Error,
+    ) as error:
         raise StateError(f"saved state is damaged: {error}") from error
 
 
 def _engine(e: dict[str, Any]) -> SavedEngine:
     point = e["point"]
+    prior = tuple(_finite(x) for x in e["prior"])
+    if len(prior) != 6:
+        raise StateError("saved state is damaged: the prior is not six numbers")
+    portions = tuple(
+        Portion(
+            _finite(p["start"]),
+            _finite(p["end"]),
+            NormalSums.from_bytes(base64.b64decode(p["sums"], validate=True)),
+        )
+        for p in e["portions"]
+    )
+    if not portions:
+        raise StateError("saved state is damaged: an accelerometer without sums")
+    noise = NoiseLevels(**{k: _finite(v) for k, v in e["noise"].items()})
+    if min(asdict(noise).values()) <= 0.0:
+        raise StateError("saved state is damaged: noise levels that are not positive")
     return SavedEngine(
         int(e["imu"]),
-        None if e["device_id"] is None else float(e["device_id"]),
-        tuple(float(x) for x in e["prior"]),
+        None if e["device_id"] is None else _finite(e["device_id"]),
+        prior,
         Linearisation(
-            scale=tuple(point["scale"]),
-            beta=tuple(point["beta"]),
-            delay=float(point["delay"]),
-            window=float(point["window"]),
-            attitude_delay=float(point["attitude_delay"]),
+            scale=_three(point["scale"]),
+            beta=_three(point["beta"]),
+            delay=_finite(point["delay"]),
+            window=_finite(point["window"]),
+            attitude_delay=_finite(point["attitude_delay"]),
         ),
-        NoiseLevels(**{k: float(v) for k, v in e["noise"].items()}),
-        float(e["trusted_s"]),
-        tuple(
-            Portion(
-                float(p["start"]),
-                float(p["end"]),
-                NormalSums.from_bytes(base64.b64decode(p["sums"], validate=True)),
-            )
-            for p in e["portions"]
-        ),
+        noise,
+        _finite(e["trusted_s"]),
+        portions,
     )
+
+
+def _finite(value: float | str) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("a number that is not finite")
+    return number
+
+
+def _three(values: tuple[float, ...]) -> Vector3:
+    x, y, z = values
+    return (_finite(x), _finite(y), _finite(z))

@@ -174,10 +174,9 @@ class FixTrack:
         """Keep a new fix; False for the repeats that a faster stream sends between fixes."""
         if self._fixes:
             before = self._fixes[-1][0]
-            if not fix.t > before.t or (
-                fix.t_receiver is not None and fix.t_receiver == before.t_receiver
-            ):
-                self.refused["gps_repeated" if fix.t == before.t else "gps_late"] += 1
+            same = fix.t_receiver is not None and fix.t_receiver == before.t_receiver
+            if same or not fix.t > before.t:
+                self.refused["gps_repeated" if same or fix.t == before.t else "gps_late"] += 1
                 return False
         self._fixes.append((fix, trusted))
         return True

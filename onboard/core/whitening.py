@@ -298,10 +298,13 @@ class WhiteningFilter:
         Q[:, CV] = self._colour_var[:, None] * (1.0 - keep_cv**2)
         if self.uses.recorded_attitude:
             Q[:, PSI] = Q[:, BIAS] = Q[:, ATT] = 0.0
-        # Noise acts along the interval: half of it before, half after the transition.
-        Q *= 0.5
+        # Walks act along the interval: half of it before, half after the transition.  What decays
+        # has its exact share already.
+        before = 0.5 * Q
+        before[:, ATT] = before[:, CV] = 0.0
+        Q -= before
         P, diagonal = self._P, _DIAGONAL
-        P[:, diagonal, diagonal] += Q
+        P[:, diagonal, diagonal] += before
         Ft = F.T
         P = F @ P @ Ft
         P[:, diagonal, diagonal] += Q
