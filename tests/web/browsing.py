@@ -18,6 +18,7 @@ FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    "--hide-scrollbars",
     "--force-color-profile=srgb",
 )
 PHONE, LAPTOP = (390, 844), (1440, 900)

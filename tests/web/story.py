@@ -181,7 +181,7 @@ def _link(second):
         signed=False,
         system_id=1,
         component_id=1,
-        autopilot="ArduPilot",
+        autopilot="ardupilot",
         vehicle="copter",
         armed=True,
         landed=False,

@@ -41,8 +41,8 @@ class Axis {
     say(this.parameter, parameterName(view.imu, this.index));
     say(this.number, measured(value, sigma));
     const seen = c.observable[this.index] ? "" : ", not observed yet";
-    say(this.sigma, value === null ? "no estimate yet" : `± ${brief(sigma, 2)}${unit}${seen}`);
-    say(this.force, `in force ${view.parameters_known ? "" : "(assumed) "}${measured(inForce, sigma)}`);
+    say(this.sigma, value === null ? "no estimate yet" : `± ${brief(sigma, 2)}${unit}`);
+    say(this.force, `in force ${view.parameters_known ? "" : "(assumed) "}${measured(inForce, sigma)}${seen}`);
     say(this.percent, `${Math.round(covered)} %`);
     const width = `${Math.max(0, Math.min(100, covered))}%`;
     if (this.fill.style.width !== width) this.fill.style.width = width;

@@ -1,7 +1,7 @@
 // Link health, message rates and the journal.
 
 import { byId, h, renew } from "./dom.js";
-import { clockTime, fixed, plain } from "./words.js";
+import { clockTime, fixed, plain, vehicleInWords } from "./words.js";
 
 const SLOW = 0.7; // of the rate that was granted
 
@@ -9,7 +9,7 @@ export function showLink(link) {
   const { frames = 0, lost = 0, bad_frames: damaged = 0, reboots = 0 } = link.counters;
   const share = frames + lost > 0 ? (100 * lost) / (frames + lost) : 0;
   const facts = [
-    ["Autopilot", link.system_id === null ? "none heard yet" : `${link.autopilot} ${link.vehicle}, system ${link.system_id}, ${link.state}`],
+    ["Autopilot", link.system_id === null ? "none heard yet" : `${vehicleInWords(link)}, ${link.state}`],
     ...link.endpoints.map((e) => [e.endpoint, e.reason ? `${e.state}: ${e.reason}` : e.state]),
     ["Frames", `${frames.toLocaleString("en")}, lost ${fixed(share, 1)} %, damaged ${damaged}`],
     ["Signed", link.signed ? "yes" : "no"],

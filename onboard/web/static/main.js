@@ -8,7 +8,7 @@ import { Imus } from "./imu.js";
 import { showJournal, showLink } from "./link.js";
 import { Live } from "./live.js";
 import { Push } from "./push.js";
-import { clockTime, duration } from "./words.js";
+import { clockTime, duration, vehicleInWords } from "./words.js";
 
 const SCHEMA = "onboard.state/1";
 const remembered = new Remembered();
@@ -33,7 +33,7 @@ function showSnapshot(snapshot) {
 }
 
 function showHeader({ link, mode, mode_reason: why, phase, version: number, uptime_s: uptime }) {
-  say(byId("vehicle"), link.system_id === null ? "accelerometer calibration" : `${link.autopilot} ${link.vehicle}, system ${link.system_id}`);
+  say(byId("vehicle"), link.system_id === null ? "accelerometer calibration" : vehicleInWords(link));
   const flags = [];
   if (link.armed !== null) flags.push([link.armed ? "armed" : "disarmed", ""]);
   if (link.landed !== null) flags.push([link.landed ? "on the ground" : "in the air", ""]);

@@ -64,6 +64,7 @@ export class Push {
       { class: "proposal", "data-imu": proposal.imu },
       h("h3", { text: `IMU ${proposal.imu}: ${state}` }),
       changesTable(proposal.changes),
+      ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
       ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([, sentence]) => h("li", { text: sentence })))] : []),
       h(
         "div",

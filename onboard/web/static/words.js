@@ -58,8 +58,14 @@ const POLICIES = {
   in_flight: "written in flight in bounded steps",
 };
 
+const FIRMWARE = { ardupilot: "ArduPilot", px4: "PX4" };
+
 const plain = (name) => String(name).replaceAll("_", " ");
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Who is behind the link, in a few words. */
+export const vehicleInWords = ({ autopilot, vehicle, system_id: system }) =>
+  `${FIRMWARE[autopilot] ?? autopilot ?? "autopilot"} ${vehicle ?? ""}, system ${system}`;
 
 export const reasonInWords = (name) => REASONS[name] ?? plain(name);
 export const statusInWords = (name) => STATUS[name] ?? [plain(name), "warn"];

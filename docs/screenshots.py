@@ -1,0 +1,145 @@
+"""Makes the pictures of the status page that the README shows, from the demo.
+
+    python docs/screenshots.py [FOLDER]
+
+Needs a checkout with the development extras, chromium and chromedriver on PATH, and Pillow.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+
+Shot = tuple[str, int, int, str]
+LIMIT_S = 300.0
+BYTES_MAX = 150_000
+COLOURS = 96
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+)
+IN_FLIGHT: tuple[Shot, ...] = (
+    ("status-laptop.png", 1440, 900, "light"),
+    ("status-phone.png", 390, 844, "light"),
+    ("status-phone-dark.png", 390, 844, "dark"),
+)
+WRITTEN: tuple[Shot, ...] = (("written-laptop-dark.png", 1440, 900, "dark"),)
+
+
+def main(folder: Path) -> None:
+    """Run the demo, look at its page in flight and after the values are written."""
+    folder.mkdir(parents=True, exist_ok=True)
+    port = _free_port()
+    url = f"http://127.0.0.1:{port}"
+    with _demo(port) as demo, _browser() as browser:
+        _until(demo, lambda: _snapshot(url) is not None)
+        browser.get(url)
+        _until(demo, lambda: any(i["status"] == "calibrated" for i in _imus(url)))
+        for shot in IN_FLIGHT:
+            _take(browser, folder, shot)
+        _until(demo, lambda: bool((_snapshot(url) or {}).get("push", {}).get("can_roll_back")))
+        for shot in WRITTEN:
+            _take(browser, folder, shot)
+
+
+def _take(browser: webdriver.Chrome, folder: Path, shot: Shot) -> None:
+    name, width, height, theme = shot
+    browser.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
+    )
+    browser.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia",
+        {"features": [{"name": "prefers-color-scheme", "value": theme}]},
+    )
+    time.sleep(1.5)  # a snapshot or two, drawn in the new size
+    picture = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
+    file = folder / name
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    size = file.stat().st_size
+    sys.stdout.write(f"{file} {size} bytes\n")
+    if size > BYTES_MAX:
+        raise SystemExit(f"{file} has {size} bytes, more than {BYTES_MAX}")
+
+
+def _snapshot(url: str) -> dict[str, Any] | None:
+    try:
+        with urllib.request.urlopen(f"{url}/api/snapshot", timeout=5.0) as answer:  # noqa: S310 - loopback
+            document: dict[str, Any] = json.load(answer)
+    except (urllib.error.URLError, ConnectionError):
+        return None
+    return document
+
+
+def _imus(url: str) -> list[dict[str, Any]]:
+    snapshot = _snapshot(url)
+    return [] if snapshot is None else list(snapshot["imus"])
+
+
+def _until(demo: subprocess.Popen[bytes], condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + LIMIT_S
+    while not condition():
+        if demo.poll() is not None:
+            raise SystemExit("the demo ended before the picture was taken")
+        if time.monotonic() > end:
+            raise SystemExit("the demo did not come so far")
+        time.sleep(0.3)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def _demo(port: int) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "onboard", "demo", "--port", str(port)]
+    demo = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # noqa: S603 - ours
+    try:
+        yield demo
+    finally:
+        demo.terminate()
+        demo.wait()
+
+
+@contextmanager
+def _browser() -> Iterator[webdriver.Chrome]:
+    options = Options()
+    driver = shutil.which("chromedriver")
+    options.binary_location = shutil.which("chromium") or ""
+    if driver is None or not options.binary_location:
+        raise SystemExit("chromium and chromedriver are not on PATH")
+    with tempfile.TemporaryDirectory() as profile:
+        for flag in (*FLAGS, f"--user-data-dir={profile}"):
+            options.add_argument(flag)
+        browser = webdriver.Chrome(options=options, service=Service(driver))
+        try:
+            yield browser
+        finally:
+            browser.quit()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "pictures")
