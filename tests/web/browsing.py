@@ -7,7 +7,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-LIMIT_S = 60.0  # only ends a hopeless test
+LIMIT_S = 400.0  # only ends a hopeless test
 FLAGS = (
     "--headless",
     "--no-sandbox",
