@@ -335,3 +335,11 @@ def test_a_slow_track_refuses_what_is_late_and_keeps_two():
     assert track.add(2.0, (1.0,))
     track.drop_before(100.0)
     assert len(track) == 2
+
+
+def test_flight_that_left_the_buffer_stays_in_the_sums(flight):
+    every = replace(ONCE, chunk_s=2.0, memory_s=1e12)
+    short = fed(flight, replace(every, buffer_s=10.0))[0].engine(1)
+    long = fed(flight, every)[0].engine(1)
+    assert len(short.aged) > 12
+    assert short.total_rows() == pytest.approx(long.total_rows(), rel=5e-3)
