@@ -168,6 +168,8 @@ def test_an_outage_is_bridged_or_begun_anew_and_is_not_trusted(flight, plain, ou
     near_truth(got)
     lost = plain.calibration(1).trusted_s - got.calibration(1).trusted_s
     assert seconds - 1.0 < lost < seconds + 12.0
+    # Less than half of the flight may be left: it says less, but far more than the prior.
+    assert np.all(six(got)[1] < 3.0 * six(plain)[1])
 
 
 def test_a_gap_in_the_inertial_stream(flight, plain):
