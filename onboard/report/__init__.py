@@ -1,1 +1,1 @@
-"""Reports for people: one self-contained HTML page, and parameter files for ground stations."""
+"""Reports for people: a diagnosis as one self-contained page, and as a parameter file."""

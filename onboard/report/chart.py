@@ -1,113 +1,178 @@
-"""Small SVG charts, drawn as text: they scale with the page and follow its light or dark look."""
+"""Small charts as inline SVG.
+
+The drawing stretches with the page and its labels are page text, so that a phone shows the same
+chart with letters of the same size.  Colours come from the page's style sheet by class.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
-from html import escape
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT = 720.0, 220.0
-LEFT, RIGHT, TOP, BOTTOM = 52.0, 10.0, 12.0, 28.0
-MOST_POINTS = 1200
+WIDTH, HEIGHT = 1000.0, 300.0
+MOST_POINTS = 1400
+LONGEST_STEP_S = 5.0
+"""A longer pause in the data is drawn as a gap."""
 
 
-def decimated(t: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
-    """At most ``most`` points: of each bin its largest magnitude, so that no peak is lost."""
-    good = np.isfinite(t) & np.isfinite(y)
-    t, y = t[good], y[good]
-    if len(t) <= most:
-        return t, y
-    edges = np.linspace(0, len(t), most + 1).astype(int)
-    pick = np.array([a + int(np.argmax(np.abs(y[a:b]))) for a, b in pairwise(edges.tolist())])
-    return t[pick], y[pick]
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One curve: ``x``, ``y`` (n,), CSS class and words for the legend."""
+
+    x: Array
+    y: Array
+    kind: str
+    label: str
 
 
-def ticks(low: float, high: float, count: int = 5) -> list[float]:
-    """Round numbers inside a range."""
-    if not high > low:
-        return [low]
-    raw = (high - low) / count
-    power = 10.0 ** np.floor(np.log10(raw))
-    step = float(next((m * power for m in (1, 2, 5, 10) if m * power >= raw), 10 * power))
-    first = np.ceil(low / step) * step
-    return [float(x) for x in np.arange(first, high + step * 1e-6, step)]
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A shaded interval of the horizontal axis."""
+
+    start: float
+    end: float
+    kind: str
 
 
-def series_chart(
+def decimate(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
+    """At most ``most`` finite points of a curve, extremes kept.
+
+    The axis is cut into bins; each leaves its lowest and its highest point, in order of ``x``.
+    """
+    finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[finite], y[finite]
+    if len(x) <= most:
+        return x, y
+    edges = np.linspace(0, len(x), most // 2 + 1).astype(np.intp)
+    keep: list[int] = []
+    for a, b in itertools.pairwise(edges):
+        low, high = a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))
+        keep += sorted({low, high})
+    return x[keep], y[keep]
+
+
+def ticks(low: float, high: float, most: int = 5) -> list[float]:
+    """Round numbers within ``low`` ... ``high``: steps of 1, 2, 5 times a power of ten."""
+    span = high - low
+    if not (math.isfinite(span) and span > 0.0):
+        return []
+    raw = span / most
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= raw * (1.0 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
+
+
+def line_chart(
     title: str,
     unit: str,
-    lines: Sequence[tuple[str, str, Array, Array]],
-    shaded: Sequence[tuple[float, float]] = (),
-) -> str:
-    """Lines over time.
+    lines: Sequence[Line],
+    bands: Sequence[Band] = (),
+    *,
+    x_unit: str = "s",
+    symmetric: bool = True,
+) -> Markup:
+    """Curves over a common axis; a sentence instead if there is not one finite point.
 
-    Args:
-        title: spoken description.
-        unit: of the vertical axis.
-        lines: (name, CSS class, t, y) each.
-        shaded: intervals of t to shade.
+    The vertical range covers 99.5 % of all points, so that a single wild value does not flatten the
+    rest; what is beyond is cut at the edge.
     """
-    thinned = ((name, css, decimated(t, y)) for name, css, t, y in lines)
-    drawn = [(name, css, t, y) for name, css, (t, y) in thinned if len(t) > 1]
-    if not drawn:
-        return "<p>nothing to draw</p>"
-    t0 = min(float(d[2].min()) for d in drawn)
-    t1 = max(float(d[2].max()) for d in drawn)
-    top = max(float(np.max(np.abs(d[3]))) for d in drawn) or 1.0
-    low = -top if any(float(d[3].min()) < 0 for d in drawn) else 0.0
+    drawn = [(*decimate(line.x, line.y), line) for line in lines]
+    xs = np.concatenate([x for x, _, _ in drawn]) if drawn else np.zeros(0)
+    ys = np.concatenate([y for _, y, _ in drawn]) if drawn else np.zeros(0)
+    if len(xs) == 0:
+        return Markup('<p class="muted">{}: no data to draw.</p>').format(title)
+    x0, x1 = float(xs.min()), float(xs.max())
+    x1 = x1 if x1 > x0 else x0 + 1.0
+    y0, y1 = _range(ys, symmetric=symmetric)
 
-    def x(t: float) -> float:
-        return LEFT + (t - t0) / max(t1 - t0, 1e-9) * (WIDTH - LEFT - RIGHT)
+    def px(x: float) -> float:
+        return WIDTH * (x - x0) / (x1 - x0)
 
-    def y(v: float) -> float:
-        return TOP + (top - v) / max(top - low, 1e-9) * (HEIGHT - TOP - BOTTOM)
+    def py(y: float) -> float:
+        return HEIGHT * (y1 - min(max(y, y0), y1)) / (y1 - y0)
 
-    parts = [
-        f'<svg viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}" role="img" aria-label="{escape(title)}">'
-    ]
-    for a, b in shaded:
-        left, right = x(max(a, t0)), x(min(b, t1))
-        if right > left:
-            parts.append(
-                f'<rect class="shade" x="{left:.1f}" y="{TOP}" width="{right - left:.1f}" '
-                f'height="{HEIGHT - TOP - BOTTOM:.1f}"/>'
-            )
-    parts.extend(
-        f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(v):.1f}" y2="{y(v):.1f}"/>'
-        f'<text class="tick" x="{LEFT - 6}" y="{y(v) + 4:.1f}" text-anchor="end">{v:g}</text>'
-        for v in ticks(low, top, 4)
+    shapes = [_band(px(max(b.start, x0)), px(min(b.end, x1)), b.kind) for b in bands]
+    labels = []
+    for v in ticks(x0, x1):
+        shapes.append(f'<path class="grid" d="M{px(v):.1f} 0V{HEIGHT:.0f}"/>')
+        labels.append(_label("x", "left", px(v) / WIDTH, v))
+    for v in ticks(y0, y1, 4):
+        kind = "zero" if v == 0 else "grid"
+        shapes.append(f'<path class="{kind}" d="M0 {py(v):.1f}H{WIDTH:.0f}"/>')
+        labels.append(_label("y", "top", py(v) / HEIGHT, v))
+    for x, y, line in drawn:
+        d = _path([px(float(v)) for v in x], [py(float(v)) for v in y], x)
+        shapes.append(f'<path class="line {escape(line.kind)}" d="{d}"/>')
+    return Markup(
+        '<figure><figcaption>{} <span class="muted">({} over {})</span></figcaption>'
+        '<div class="plot"><svg viewBox="0 0 {:.0f} {:.0f}" preserveAspectRatio="none" role="img" '
+        'aria-label="{}">{}</svg>{}</div></figure>'
+    ).format(
+        title,
+        unit,
+        x_unit,
+        WIDTH,
+        HEIGHT,
+        title,
+        Markup("".join(shapes)),  # noqa: S704  numbers and escaped classes only
+        Markup("".join(labels)),  # noqa: S704
     )
-    parts.extend(
-        f'<text class="tick" x="{x(t):.1f}" y="{HEIGHT - 8}" text-anchor="middle">{t:g}</text>'
-        for t in ticks(t0, t1, 8)
+
+
+def pair_bar(before: float, after: float, longest: float, title: str) -> Markup:
+    """Two horizontal bars, before above after, in units of ``longest``; nothing for NaN."""
+
+    def bar(value: float, y: int, kind: str) -> str:
+        if not (math.isfinite(value) and math.isfinite(longest) and longest > 0.0):
+            return ""
+        width = 100.0 * min(max(value / longest, 0.0), 1.0)
+        return f'<rect class="bar {kind}" x="0" y="{y}" width="{width:.2f}" height="7"/>'
+
+    return Markup(
+        '<svg class="bars" viewBox="0 0 100 17" preserveAspectRatio="none" role="img" '
+        'aria-label="{}">{}</svg>'
+    ).format(title, Markup(bar(before, 1, "before") + bar(after, 9, "after")))  # noqa: S704
+
+
+def _range(ys: Array, *, symmetric: bool) -> tuple[float, float]:
+    if symmetric:
+        most = float(np.percentile(np.abs(ys), 99.5)) * 1.1
+        most = most if most > 0.0 else 1.0
+        return -most, most
+    low, high = (float(v) for v in np.percentile(ys, [0.0, 99.5]))
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _band(a: float, b: float, kind: str) -> str:
+    if not (math.isfinite(a) and math.isfinite(b)) or b < a:
+        return ""
+    return (
+        f'<rect class="band {escape(kind)}" x="{a:.1f}" y="0" '
+        f'width="{max(b - a, 2.0):.1f}" height="{HEIGHT:.0f}"/>'
     )
-    parts.append(f'<text class="tick" x="4" y="{TOP + 4}">{escape(unit)}</text>')
-    for _, css, t, v in drawn:
-        points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t, v, strict=True))
-        parts.append(f'<polyline class="line {css}" points="{points}"/>')
-    parts.append("</svg>")
-    legend = " ".join(f'<span class="key {css}">{escape(name)}</span>' for name, css, _, _ in drawn)
-    caption = f"<figcaption>{legend} seconds since the start</figcaption>"
-    return f"<figure>{''.join(parts)}{caption}</figure>"
 
 
-def bar_pairs(rows: Sequence[tuple[str, float, float]]) -> str:
-    """Horizontal bars, before above after, one pair a row."""
-    most = max((v for _, a, b in rows for v in (a, b) if np.isfinite(v)), default=1.0) or 1.0
+def _label(axis: str, side: str, share: float, value: float) -> str:
+    text = f"{value:.6g}".replace("-", "−")
+    return f'<span class="tick {axis}" style="{side}:{100.0 * share:.2f}%">{text}</span>'
+
+
+def _path(px: Sequence[float], py: Sequence[float], x: Array) -> str:
+    steps = np.diff(x)
+    longest = max(LONGEST_STEP_S, 4.0 * float(np.median(steps))) if len(steps) else 0.0
     out = []
-    for name, before, after in rows:
-        bars = "".join(
-            f'<div class="bar {css}" style="width:{100 * min(v / most, 1.0):.1f}%"></div>'
-            f'<span class="value">{v:.2f}</span>'
-            for css, v in (("before", before), ("after", after))
-            if np.isfinite(v)
-        )
-        out.append(
-            f'<div class="pair"><div class="name">{escape(name)}</div><div>{bars}</div></div>'
-        )
-    return f'<div class="bars">{"".join(out)}</div>'
+    for k, (a, b) in enumerate(zip(px, py, strict=True)):
+        begins = k == 0 or steps[k - 1] > longest
+        out.append(f"{'M' if begins else 'L'}{a:.1f} {b:.1f}")
+    return "".join(out)

@@ -1,0 +1,169 @@
+"""The page: self-contained, well-formed, complete, small, and honest about what is not known."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from diagnoses_by_hand import diagnosis, effect, told_apart_not, unknown
+
+from onboard.core.findings import Diagnosis, Quantity, Verdict
+from onboard.explain import explain
+from onboard.report.explain import explain_html
+
+VOID = {"meta", "link", "br", "img", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Checks nesting; collects text, tags and addresses."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return " ".join(" ".join(self.text).split())
+
+
+def page(d: Diagnosis, files=("flight.tlog",), autopilot: str = "ardupilot") -> tuple[str, Page]:
+    html = explain_html(d, files=files, autopilot=autopilot, duration_s=300.0)
+    parsed = Page()
+    parsed.feed(html)
+    parsed.close()
+    assert parsed.open == []
+    return html, parsed
+
+
+@pytest.mark.parametrize("make", [diagnosis, unknown, told_apart_not])
+def test_is_well_formed_and_refers_to_nothing_outside(make):
+    html, parsed = page(make())
+    assert not re.search(r"https?:|//[a-z]|@import|url\(", html)
+    assert "script" not in {tag for tag, _ in parsed.tags}
+    for _, attributes in parsed.tags:
+        for name in ("src", "href", "xlink:href", "srcset"):
+            assert (attributes.get(name) or "data:").startswith("data:")
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_every_verdict_with_and_without_effects(verdict):
+    for effects in ((), (effect(),)):
+        _, parsed = page(diagnosis(verdict=verdict, effects=effects))
+        assert verdict.value.replace("_", " ") in parsed.words
+
+
+def test_says_what_how_sure_and_what_to_change():
+    _, parsed = page(diagnosis())
+    for said in (
+        "GPS is late",
+        "210.0 ± 4.0 ms",
+        "83 % of the mismatch",
+        "set GPS1_DELAY_MS",
+        "GPS1_DELAY_MS = 210",
+        "GPS averages its velocity",
+        "no temperature in the recording",
+        "+ gps_latency",
+        "1.0123",
+        "turning (60 s)",
+    ):
+        assert said in parsed.words
+
+
+def test_angles_are_shown_in_degrees():
+    tilt = effect("mount_tilt", unknowns={"roll": Quantity(0.0349066, 0.00174533, "rad")})
+    assert "2.00 ± 0.10 °" in page(diagnosis(effects=(tilt,)))[1].words
+
+
+def test_what_is_not_known_is_never_drawn_nor_printed_as_a_number():
+    html, parsed = page(unknown())
+    assert not re.search(r"\b(nan|inf)\b", html, re.IGNORECASE)
+    assert "not known" in parsed.words
+    assert "no data to draw" in parsed.words
+
+
+def test_long_recordings_stay_small_and_keep_their_peak():
+    d = diagnosis(n=200_000)
+    html, _ = page(d)
+    assert len(html.encode()) < 500_000
+    paths = re.findall(r'class="line \w+" d="([^"]+)"', html)
+    assert len(paths) == 6
+    for path in paths:
+        assert 500 < len(re.findall("[ML]", path)) < 1500
+
+
+def test_a_pause_is_a_gap_in_the_curve():
+    html, _ = page(diagnosis(n=3000))
+    paths = re.findall(r'class="line before" d="([^"]+)"', html)
+    assert [p.count("M") for p in paths] == [1, 2, 1]
+
+
+def test_intervals_are_shaded_within_the_chart():
+    html, _ = page(diagnosis())
+    bands = re.findall(r'class="band (\w+)" x="([\d.]+)" y="0" width="([\d.]+)"', html)
+    assert {kind for kind, _, _ in bands} == {"located", "interval"}
+    assert all(float(x) >= 0.0 and float(x) + float(w) <= 1000.0 for _, x, w in bands)
+
+
+def test_names_from_outside_are_escaped():
+    html, _ = page(diagnosis(note="<b>note</b>"), files=["<script>alert(1)</script>.tlog"])
+    assert "<script" not in html
+    assert "<b>" not in html
+
+
+def test_parameters_are_named_for_ardupilot_only():
+    assert "INS_ACCSCAL_X" in page(diagnosis())[1].words
+    assert "INS_ACCSCAL_X" not in page(diagnosis(), autopilot="px4")[1].words
+
+
+def luminance(colour: str) -> float:
+    parts = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("scheme", [0, 1])
+def test_text_is_readable_in_light_and_dark(scheme):
+    html, _ = page(diagnosis())
+    sets = re.findall(r":root \{(.*?)\}", html, re.DOTALL)
+    colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6,8})", sets[scheme]))
+    for ground in ("page", "card"):
+        for ink in ("ink", "muted", "before", "after", "good", "warn", "bad"):
+            one, two = sorted((luminance(colours[ink]), luminance(colours[ground])))
+            assert (two + 0.05) / (one + 0.05) >= 4.5, (ink, ground)
+
+
+@pytest.mark.recordings
+@pytest.mark.slow
+def test_a_real_diagnosis(recordings: Path):
+    result = explain([recordings / "sitl" / "i03.tlog"])
+    html = explain_html(
+        result.diagnosis,
+        files=result.files,
+        autopilot=result.source.autopilot,
+        duration_s=result.duration_s,
+    )
+    parsed = Page()
+    parsed.feed(html)
+    assert parsed.open == []
+    assert len(html.encode()) < 500_000
+    for e in result.diagnosis.effects:
+        assert e.name in parsed.words

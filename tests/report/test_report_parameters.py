@@ -1,0 +1,69 @@
+"""The parameter file: what a ground station would set, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+from diagnoses_by_hand import calibration, diagnosis, effect, told_apart_not, unknown
+
+from onboard.core.findings import Verdict
+from onboard.core.result import Status
+from onboard.report.parameters import param_file
+
+
+def loaded(text: str) -> dict[str, float]:
+    """As ground stations read it: comments dropped, name and value split at the comma."""
+    assert text.isascii()
+    assert text.endswith("\n")
+    out: dict[str, float] = {}
+    for line in text.splitlines():
+        if line.startswith("#"):
+            continue
+        name, value = line.split(",")
+        assert 0 < len(name) <= 16
+        assert name not in out
+        out[name] = float(value)
+    return out
+
+
+def test_observable_numbers_and_cures_and_nothing_else():
+    assert loaded(param_file(diagnosis())) == pytest.approx(
+        {
+            "INS_ACCSCAL_X": 1.01234567,
+            "INS_ACCSCAL_Y": 0.99,
+            "INS_ACCOFFS_X": 0.2,
+            "INS_ACCOFFS_Y": -0.1,
+            "GPS1_DELAY_MS": 210.0,
+        },
+        rel=1e-6,
+    )
+
+
+def test_names_follow_the_accelerometer():
+    d = diagnosis(imu=2, calibration=calibration(imu=2), effects=())
+    assert "INS_ACC2SCAL_X" in loaded(param_file(d))
+
+
+@pytest.mark.parametrize("status", [s for s in Status if s is not Status.CALIBRATED])
+def test_an_incomplete_calibration_is_only_a_comment(status):
+    text = param_file(diagnosis(calibration=calibration(status=status)))
+    assert set(loaded(text)) == {"GPS1_DELAY_MS"}
+    assert "INS_ACCSCAL_X" in text
+
+
+def test_cures_of_effects_not_told_apart_are_only_comments():
+    text = param_file(told_apart_not())
+    assert "GPS1_DELAY_MS" not in loaded(text)
+    assert "GPS1_DELAY_MS,210" in text
+
+
+def test_nothing_to_load_from_a_flight_that_says_too_little():
+    assert loaded(param_file(diagnosis(verdict=Verdict.INSUFFICIENT))) == {}
+
+
+def test_values_that_are_not_finite_do_not_come():
+    assert loaded(param_file(unknown())) == {}
+
+
+def test_a_parameter_comes_once():
+    twice = (effect(), effect("gps_smoothing", parameters={"GPS1_DELAY_MS": 5.0}))
+    assert loaded(param_file(diagnosis(effects=twice)))["GPS1_DELAY_MS"] == 210.0
