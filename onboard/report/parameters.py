@@ -7,7 +7,7 @@ as a comment, with the reason.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from onboard.core.accelerometer import parameter_names
@@ -65,6 +65,11 @@ def param_file(diagnosis: Diagnosis) -> str:
         else:
             lines.append(setting)
     return "".join(_plain(line) + "\n" for line in lines)
+
+
+def parameter_text(diagnosis: Diagnosis, files: Sequence[str]) -> str:
+    """:func:`param_file` with the names of the recordings on top."""
+    return _plain(f"# onboard explain: {', '.join(files)}") + "\n" + param_file(diagnosis)
 
 
 def _calibration(calibration: Calibration) -> Iterator[Change]:

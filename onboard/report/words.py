@@ -17,6 +17,15 @@ HEADLINES = {
     Verdict.INSUFFICIENT: "This flight cannot tell",
 }
 
+VERDICTS: dict[Verdict, tuple[str, str]] = {
+    Verdict.CLEAN: ("green", "Nothing is missing: six numbers and timing explain this flight."),
+    Verdict.EXPLAINED: ("yellow", "Physics is missing from the model, and it was found."),
+    Verdict.PARTLY_EXPLAINED: ("yellow", "Physics is missing; a part of it was found."),
+    Verdict.UNEXPLAINED: ("red", "Something is missing, and nothing in the catalogue explains it."),
+    Verdict.INSUFFICIENT: ("red", "This flight is too quiet to say."),
+}
+"""Colour and one line for terminals."""
+
 EFFECTS = {
     "gps_latency": "GPS is late",
     "gps_smoothing": "GPS averages its velocity",
