@@ -233,7 +233,7 @@ class Calibrator:
             return self._engines[imu]
         saved = self._waiting.pop(imu, None)
         identity = self.parameters.device_id(imu)
-        if saved is not None and saved.device_id in (None, identity):
+        if saved is not None and saved.device_id == identity:
             engine = Engine(self.settings, np.array(saved.prior), saved.point, saved.noise)
             sizes = {p.sums.size for p in saved.portions}
             if sizes == {engine.model.size}:
