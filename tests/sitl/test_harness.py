@@ -113,7 +113,7 @@ class Listener:
 @pytest.mark.slow
 async def test_flies_lands_and_gives_its_truth_away(kind, vehicle):
     """An estimate from what the vehicle sends is the truth that it was given."""
-    async with harness.simulator(kind, vehicle, speedup=40 if kind == "builtin" else 6) as sitl:
+    async with harness.simulator(kind, vehicle, speedup=15 if kind == "builtin" else 6) as sitl:
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
         assert await sitl.parameter("SIM_ACC1_SCAL_Y") == pytest.approx(SCALE[1])
         listener = Listener()
