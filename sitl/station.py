@@ -17,6 +17,8 @@ from sitl.errors import SitlError
 
 IDENTITY = (255, 190)
 ARMED = 128
+AUTOPILOT = 1
+"""Component id of the autopilot."""
 BEAT = 1.0
 RETRY = 0.5
 PATIENCE = 60.0
@@ -60,6 +62,8 @@ class Station(asyncio.DatagramProtocol):
         """Takes note of what is needed."""
         del addr
         for message in self._parser.parse_buffer(data) or []:
+            if message.get_srcComponent() != AUTOPILOT:
+                continue  # forwarded: a companion's heartbeat says nothing of the vehicle
             match message.get_type():
                 case "HEARTBEAT":
                     self.armed = bool(message.base_mode & ARMED)
