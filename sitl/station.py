@@ -87,12 +87,12 @@ class Station(asyncio.DatagramProtocol):
         Raises:
             SitlError: it never does.
         """
-        await self._insist(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-        await self._insist(mav.MAV_CMD_NAV_TAKEOFF)
+        # It disarms again when the take-off comes late, as on a busy machine at a quick pace.
+        await self._insist((mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0), (mav.MAV_CMD_NAV_TAKEOFF, 0.0))
 
     async def land(self) -> None:
         """Tells it to land."""
-        await self._insist(mav.MAV_CMD_NAV_LAND)
+        await self._insist((mav.MAV_CMD_NAV_LAND, 0.0))
 
     def set_pace(self, speedup: float) -> None:
         """Asks a simulation to run at so many times real time (SIM_SPEEDUP)."""
@@ -108,22 +108,33 @@ class Station(asyncio.DatagramProtocol):
         while self.time < time:
             await self._wait()
 
-    async def _insist(self, command: int, parameter: float = 0.0) -> None:
-        """Sends a command until it is accepted."""
+    async def _insist(self, *steps: tuple[int, float]) -> None:
+        """Sends commands in order, again from the first, until the last is accepted."""
         try:
             async with asyncio.timeout(PATIENCE):
-                while self._results.pop(command, None) != mav.MAV_RESULT_ACCEPTED:
-                    parameters = (parameter, 0, 0, 0, 0, 0, 0)
-                    self._send(mav.MAVLink_command_long_message(1, 1, command, 0, *parameters))
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(RETRY):
-                            while command not in self._results:
-                                await self._wait()
+                while not await self._all(steps):
+                    pass
         except TimeoutError:
             said = self.last_text or "nothing"
+            commands = ", ".join(str(command) for command, _ in steps)
             raise SitlError(
-                f"command {command} is not accepted; the autopilot said: {said}"
+                f"command {commands} is not accepted; the autopilot said: {said}"
             ) from None
+
+    async def _all(self, steps: tuple[tuple[int, float], ...]) -> bool:
+        """True if every command was accepted at once, in order."""
+        for command, parameter in steps:
+            self._results.pop(command, None)
+            parameters = (parameter, 0, 0, 0, 0, 0, 0)
+            self._send(mav.MAVLink_command_long_message(1, 1, command, 0, *parameters))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(RETRY):
+                    while command not in self._results:
+                        await self._wait()
+            if self._results.pop(command, None) != mav.MAV_RESULT_ACCEPTED:
+                await asyncio.sleep(RETRY / 10)
+                return False
+        return True
 
     async def _wait(self) -> None:
         self._news.clear()
