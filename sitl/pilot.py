@@ -15,7 +15,7 @@ import random
 from collections.abc import AsyncIterator, Callable
 from typing import Any, TypeAlias
 
-from mavsdk.asyncio import Configuration, Mavsdk
+from mavsdk.asyncio import Configuration, Mavsdk, MavsdkConnectionError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.logging import log_subscribe
@@ -55,7 +55,9 @@ class Pilot:
 
     @classmethod
     @contextlib.asynccontextmanager
-    async def at(cls, url: str, vehicle: str, *, seed: int = 1) -> AsyncIterator[Pilot]:
+    async def at(
+        cls, url: str, vehicle: str, *, seed: int = 1, patience: float = SILENCE
+    ) -> AsyncIterator[Pilot]:
         """A pilot connected to a MAVSDK connection string, such as ``tcpout://host:port``.
 
         Raises:
@@ -64,8 +66,11 @@ class Pilot:
         log_subscribe(_quiet)
         configuration = Configuration.create_manual(*GROUND_STATION, 1)
         async with Mavsdk(configuration) as mavsdk:
-            await mavsdk.add_any_connection(url)
-            system = await mavsdk.first_autopilot(timeout_s=SILENCE)
+            try:
+                await mavsdk.add_any_connection(url)
+            except MavsdkConnectionError as error:
+                raise SitlError(f"no connection to {url}: {error}") from error
+            system = await mavsdk.first_autopilot(timeout_s=patience)
             if system is None:
                 raise SitlError(f"no autopilot at {url}")
             pilot = cls(vehicle, system, seed=seed)

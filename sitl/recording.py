@@ -109,6 +109,7 @@ def run(spec: FlightSpec) -> Flight:
     autopilot.advance(LEAD)
     autopilot.arm(force=True)
     autopilot.take_off(spec.duration - LEAD)
+    autopilot.advance(1.0 / spec.loop_rate)
     # The world is complete from here on: keep its pieces before time passes them.
     pieces = list(autopilot.world.pieces)
     autopilot.advance(spec.duration - autopilot.clock)

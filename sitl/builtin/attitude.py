@@ -55,6 +55,8 @@ class AttitudeFilter:
         self._noise = np.diag(
             np.repeat([GYRO_NOISE, ACCEL_NOISE, 0.0, GYRO_BIAS_NOISE, ACCEL_BIAS_NOISE], 3) * STEP
         )
+        self._transition = np.eye(15)
+        self._transition[POS, VEL] = STEP * np.eye(3)
         self._rejected = 0
 
     @property
@@ -88,13 +90,13 @@ class AttitudeFilter:
         """
         x = self._error
         turned = R_nb @ (w_error_b - self.gyro_bias)
-        pushed = np.cross(x[PHI], f_n) + R_nb @ (f_error_b - self.accel_bias)
+        pushed = rotation.cross(x[PHI], f_n) + R_nb @ (f_error_b - self.accel_bias)
         x[POS] += STEP * x[VEL]
         x[VEL] += STEP * pushed
         x[PHI] += STEP * turned
-        F = np.eye(15)
-        F[VEL, PHI] = -STEP * rotation.cross_matrix(f_n)
-        F[POS, VEL] = STEP * np.eye(3)
+        F = self._transition
+        fx, fy, fz = STEP * f_n
+        F[VEL, PHI] = ((0.0, fz, -fy), (-fz, 0.0, fx), (fy, -fx, 0.0))
         F[PHI, BG] = F[VEL, BA] = -STEP * R_nb
         self.covariance = F @ self.covariance @ F.T + self._noise
         self.phi = self.phi + STEP * turned

@@ -8,13 +8,14 @@ brought.  Its parameters act on its sensors exactly as ArduPilot applies them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.builtin import commands, messages, streams
+from sitl.builtin import commands, messages, rotation, streams
 from sitl.builtin.arming import refusals
 from sitl.builtin.attitude import STEP, AttitudeFilter
 from sitl.builtin.defaults import initial_parameters, truth_in_force
@@ -38,21 +39,24 @@ PARAMETERS_PER_SECOND = 200.0
 ASSUMED_GPS_DELAY = 0.1
 """What the attitude filter takes where GPS1_DELAY_MS is 0, s."""
 IDLE_DISARM = 10.0
+FLIGHT_DURATION = 300.0
+"""How long a flight that a client begins goes on unless it is told to land, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Modes:
-    """Custom mode numbers; ``stop`` are those that end a flight."""
+    """Custom mode numbers; ``stop`` end a flight, ``go`` begin one as soon as it is armed."""
 
     idle: int
     flying: int
     landing: int
     stop: tuple[int, ...]
+    go: tuple[int, ...] = ()
 
 
 MODES = {
     "copter": Modes(idle=0, flying=4, landing=9, stop=(6, 9)),
-    "plane": Modes(idle=0, flying=10, landing=11, stop=(11, 20)),
+    "plane": Modes(idle=0, flying=10, landing=11, stop=(11, 20, 26), go=(13,)),
 }
 
 
@@ -100,7 +104,8 @@ class Autopilot:
 
     def _boot(self, start: Start) -> None:
         """Power on: clock at zero, filters fresh, intervals from the stream rates."""
-        self._rebooting = False
+        self._orders: deque[Callable[[], object]] = deque()
+        self._launching = False
         self.now = 0.0
         self._booted_at = self.clock
         self._loops = 0
@@ -186,8 +191,8 @@ class Autopilot:
             self._loop()
 
     def _loop(self) -> None:
-        if self._rebooting:
-            self._reboot()
+        while self._orders:
+            self._orders.popleft()()
         self._loops += 1
         self.now = self._loops * self._period
         self.clock = self._booted_at + self.now
@@ -199,8 +204,9 @@ class Autopilot:
             self.world.rebuild(self.truth, self._filters())
         while (self._block + 1) * STEP <= self.now:
             self._filter_step()
-        for value in self.parameters.poll(self.now):
-            self.say(value)
+        if self.parameters.saving:
+            for value in self.parameters.poll(self.now):
+                self.say(value)
         now_ms = self.now * 1e3
         instant: Instant | None = None
         for link in self.links:
@@ -262,7 +268,7 @@ class Autopilot:
         p = (1.0 - part) * piece.trajectory.p_n[row] + part * piece.trajectory.p_n[row + 1]
         arm = np.array(self.parameters.vector("GPS1_POS_"))
         R = piece.trajectory.R_nb[row]
-        v = v + R @ np.cross(piece.trajectory.w_b[row], arm)
+        v = v + R @ rotation.cross(piece.trajectory.w_b[row], arm)
         self.ahrs.fuse_gps(np.array(fix.v_n) - v, np.array(fix.p_n) - p - R @ arm)
 
     def instant(self) -> Instant:
@@ -291,9 +297,8 @@ class Autopilot:
     @property
     def flying(self) -> bool:
         """A flight is under way, from launch until it has disarmed."""
-        return (
-            self.world.at(self.now).flight is not None or self.world.pieces[-1].flight is not None
-        )
+        pieces = (self.world.at(self.now), self.world.pieces[-1])
+        return self._launching or any(piece.flight is not None for piece in pieces)
 
     def arm(self, *, force: bool = False) -> list[str]:
         """Arms; returns what stands against it, which STATUSTEXT says too."""
@@ -309,6 +314,8 @@ class Autopilot:
             self.armed = True
             self._armed_since = self.now
             self.say(Notice("Arming motors", 6))
+            if self._mode in MODES[self.vehicle].go:
+                self.take_off()
         return reasons
 
     def disarm(self) -> bool:
@@ -321,11 +328,12 @@ class Autopilot:
             self.say(Notice("Disarming motors", 6))
         return True
 
-    def take_off(self, duration: float) -> bool:
+    def take_off(self, duration: float = FLIGHT_DURATION) -> bool:
         """Starts a flight of about so many seconds, ground to ground; must be armed."""
         if not self.armed or self.flying:
             return False
-        self.world.launch(self.now, duration)
+        self._launching = True
+        self._orders.append(lambda: self._launch(duration))
         self._mode = MODES[self.vehicle].flying
         return True
 
@@ -334,8 +342,12 @@ class Autopilot:
         if not self.flying:
             return False
         self._mode = MODES[self.vehicle].landing
-        self.world.stop(self.now)
+        self._orders.append(lambda: self.world.stop(self.now))
         return True
+
+    def _launch(self, duration: float) -> None:
+        self.world.launch(self.now, duration)
+        self._launching = False
 
     def _watch_flight(self, piece: Piece, row: int) -> None:
         """Disarms after landing, or when nothing was done after arming."""
@@ -360,7 +372,7 @@ class Autopilot:
         """Reboots in the next loop, so that the answer still goes out; refused while armed."""
         if self.armed:
             return False
-        self._rebooting = True
+        self._orders.append(self._reboot)
         return True
 
     def _reboot(self) -> None:

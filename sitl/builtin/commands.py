@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 FORCE = 21196.0
 """Magic number of a forced arming or disarming."""
-FLIGHT_DURATION = 300.0
-"""How long a flight started by a take-off command manoeuvres unless it is told to land, s."""
 
 ACCEPTED = int(mav.MAV_RESULT_ACCEPTED)
 DENIED = int(mav.MAV_RESULT_DENIED)
@@ -170,7 +168,7 @@ def _arm_disarm(autopilot: Autopilot, link: Link, command: Command) -> int:
 
 def _take_off(autopilot: Autopilot, link: Link, command: Command) -> int:
     del link, command
-    return ACCEPTED if autopilot.take_off(FLIGHT_DURATION) else FAILED
+    return ACCEPTED if autopilot.take_off() else FAILED
 
 
 def _land(autopilot: Autopilot, link: Link, command: Command) -> int:

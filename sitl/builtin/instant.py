@@ -104,19 +104,19 @@ class Instant:
             row = piece.index(self.t_sample - late)
         R = piece.trajectory.R_nb[row]
         if self.world.truth.attitude_errors:
-            R = rotation.from_vector(self.ahrs.phi) @ R
+            R = rotation.one_from_vector(self.ahrs.phi) @ R
         yaw = 0.0
         for effect in self.world.truth.effects:
             match effect:
                 case fx.MountTilt(roll=roll, pitch=pitch):
-                    R = R @ rotation.from_vector(np.array([roll, pitch, 0.0]))
+                    R = R @ rotation.one_from_vector(np.array([roll, pitch, 0.0]))
                 case fx.HeadingError(yaw=error):
                     yaw += error
                 case fx.HeadingByThrottle(yaw_per_throttle=error):
                     yaw += error * float(piece.trajectory.throttle[row])
                 case _:
                     pass
-        euler = rotation.to_euler(R @ self.corrections.trim.T)
+        euler = rotation.one_to_euler(R @ self.corrections.trim.T)
         if yaw:
             euler[2] = (euler[2] + yaw + np.pi) % (2.0 * np.pi) - np.pi
         return euler

@@ -96,6 +96,11 @@ class ParameterStore:
     def __getitem__(self, name: str) -> float:
         return self._table[name].value
 
+    @property
+    def saving(self) -> bool:
+        """Whether something waits to be saved."""
+        return bool(self._saving)
+
     def names(self) -> Iterator[str]:
         """All names in the order of their index."""
         return iter(self._order)

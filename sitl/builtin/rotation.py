@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sitl.builtin.smoothing import Array
@@ -79,3 +81,34 @@ def rotate_back(R: Array, v: Array) -> Array:
     """``R^T v`` sample by sample."""
     out: Array = np.einsum("nji,nj->ni", R, v)
     return out
+
+
+def one_from_vector(v: Array) -> Array:
+    """:func:`from_vector` of a single vector (3,), quick: called for every message."""
+    x, y, z = (float(c) for c in v)
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle < 1e-8:
+        a, b = 1.0, 0.5
+    else:
+        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2
+    return np.array(
+        [
+            [1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)],
+        ]
+    )
+
+
+def one_to_euler(R_nb: Array) -> Array:
+    """:func:`to_euler` of a single matrix."""
+    roll = math.atan2(R_nb[2, 1], R_nb[2, 2])
+    pitch = -math.asin(min(1.0, max(-1.0, R_nb[2, 0])))
+    return np.array([roll, pitch, math.atan2(R_nb[1, 0], R_nb[0, 0])])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of two single vectors; numpy's own is made for large arrays."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

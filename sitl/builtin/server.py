@@ -39,7 +39,6 @@ class _Client:
     def __init__(self, link: Link, send: Callable[[bytes], None], system: int) -> None:
         self.link = link
         self.send = send
-        # Filled by the event loop while the simulation's thread empties it.
         self.inbox: deque[Message] = deque()
         self.forwarded: list[bytes] = []
         self._packer = mav.MAVLink(None, srcSystem=system, srcComponent=1)
@@ -85,7 +84,8 @@ class Server:
         self._joining: list[_Client] = []
         self._leaving: list[_Client] = []
         self._requests: deque[Callable[[Autopilot], None]] = deque()
-        self._closers: list[Callable[[], None]] = []
+        self._closers: list[Callable[[], object]] = []
+        self._handlers: set[asyncio.Task[None]] = set()
 
     @property
     def speedup(self) -> float:
@@ -142,25 +142,31 @@ class Server:
                 now = loop.time()
                 elapsed, last = min(now - last, SLOWEST), now
                 self._admit()
+                self._listen()
+                self._speak()  # answers leave at once, whatever is then to be computed
                 # A thread: generating a flight takes a second, and the sockets must not wait.
-                await asyncio.to_thread(self._step, elapsed * self.speedup)
-                for client in self._clients:
-                    for frame in client.frames():
-                        self._carry(lambda f=frame, c=client: c.send(f))  # type: ignore[misc]
+                await asyncio.to_thread(self.autopilot.advance, elapsed * self.speedup)
+                self._speak()
         finally:
             for close in self._closers:
                 close()
+            await asyncio.gather(*self._handlers, return_exceptions=True)
 
-    def _step(self, seconds: float) -> None:
+    def _speak(self) -> None:
+        """Sends what is in the outboxes."""
+        for client in self._clients:
+            for frame in client.frames():
+                self._carry(lambda f=frame, c=client: c.send(f))  # type: ignore[misc]
+
+    def _listen(self) -> None:
+        """Takes what has come in, and what else is asked for."""
         while self._requests:
             self._requests.popleft()(self.autopilot)
         for client in self._clients:
-            # What comes in meanwhile has to wait for the next step, or answers never leave.
-            for _ in range(len(client.inbox)):
+            while client.inbox:
                 self._route(client, client.inbox.popleft())
         if self.driver is not None:
             self.driver.step(self.autopilot)
-        self.autopilot.advance(seconds)
 
     def _route(self, client: _Client, message: Message) -> None:
         """As ArduPilot does: what is for all, or for another component, goes on to the others."""
@@ -218,6 +224,10 @@ class Server:
                 writer.write(frame)
 
         client = self.join(send)
+        self._closers.append(writer.close)
+        if task := asyncio.current_task():
+            self._handlers.add(task)
+            task.add_done_callback(self._handlers.discard)
         try:
             while data := await reader.read(4096):
                 # A stream loses nothing: TCP clients are spared the impairment on their way in.

@@ -128,12 +128,12 @@ class World:
 
     def stop(self, t: float) -> None:
         """Ends the flight under way at ``t`` early: what has been flown stays as it is."""
-        piece = self.at(t)
-        if piece.flight is None or piece is not self.pieces[-1]:
+        piece = self.pieces[-1]
+        if piece.flight is None:
             return
         if piece.flight.stop_at is not None:
             return  # on its way down already
-        flight = replace(piece.flight, stop_at=t - piece.start + 0.5)
+        flight = replace(piece.flight, stop_at=max(t - piece.start, 0.0) + 0.5)
         start = self.pieces[-2].trajectory.end if len(self.pieces) > 1 else self._start
         self._measure_again(piece, self._fly(flight, start), self.truth)
 

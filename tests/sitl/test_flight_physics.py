@@ -114,3 +114,13 @@ def test_stopping_early_changes_nothing_that_was_flown(vehicle):
 def test_seeds(vehicle):
     assert np.array_equal(flown(vehicle, 7, 60.0).f_b, flown(vehicle, 7, 60.0).f_b)
     assert not np.array_equal(flown(vehicle, 7, 60.0).f_b, flown(vehicle, 8, 60.0).f_b)
+
+
+def test_single_rotations_are_those_of_many():
+    rng = np.random.default_rng(0)
+    vectors = np.concatenate([rng.normal(size=(50, 3)), 1e-10 * rng.normal(size=(5, 3))])
+    many = rotation.from_vector(vectors)
+    for vector, R in zip(vectors, many, strict=True):
+        assert np.allclose(rotation.one_from_vector(vector), R, atol=1e-12)
+        assert np.allclose(rotation.one_to_euler(R), rotation.to_euler(R), atol=1e-12)
+        assert np.allclose(rotation.cross(vector, R[0]), np.cross(vector, R[0]), atol=1e-12)
