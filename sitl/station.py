@@ -110,6 +110,7 @@ class Station(asyncio.DatagramProtocol):
 
     async def _insist(self, *steps: tuple[int, float]) -> None:
         """Sends commands in order, again from the first, until the last is accepted."""
+        self._results.clear()
         try:
             async with asyncio.timeout(PATIENCE):
                 while not await self._all(steps):
@@ -124,14 +125,16 @@ class Station(asyncio.DatagramProtocol):
     async def _all(self, steps: tuple[tuple[int, float], ...]) -> bool:
         """True if every command was accepted at once, in order."""
         for command, parameter in steps:
-            self._results.pop(command, None)
             parameters = (parameter, 0, 0, 0, 0, 0, 0)
             self._send(mav.MAVLink_command_long_message(1, 1, command, 0, *parameters))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(RETRY):
                     while command not in self._results:
                         await self._wait()
-            if self._results.pop(command, None) != mav.MAV_RESULT_ACCEPTED:
+            # An acceptance that comes late still counts: sent again, a command of a flight that
+            # has begun is refused.
+            if self._results.get(command) != mav.MAV_RESULT_ACCEPTED:
+                self._results.pop(command, None)
                 await asyncio.sleep(RETRY / 10)
                 return False
         return True

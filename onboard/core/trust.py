@@ -198,6 +198,8 @@ class TrustWindow:
         """Take one sample; most kinds only carry time, if that."""
         if self._phase is Phase.ENDED:
             return ()
+        if sample.t is not None and not math.isfinite(sample.t):
+            return ()  # a time that is none cannot be put in order: nothing may rest on it
         match sample:
             case ImuSample() | AttitudeSample():
                 return self._tick(sample.t)

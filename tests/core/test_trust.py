@@ -346,8 +346,8 @@ anything = st.one_of(
         speed_accuracy=st.none() | number,
     ),
     st.builds(fix, st.floats(0, 60)),
-    st.builds(ImuSample, st.floats(0, 60), st.just(1), st.just((0.0, 0.0, -9.8))),
-    st.builds(EkfHealth, st.floats(0, 60), st.sampled_from([HEALTHY, 0, HEALTHY | 1 << 15])),
+    st.builds(ImuSample, number, st.just(1), st.just((0.0, 0.0, -9.8))),
+    st.builds(EkfHealth, number, st.sampled_from([HEALTHY, 0, HEALTHY | 1 << 15])),
     st.builds(GpsIntegrity, st.floats(0, 60), st.booleans(), st.booleans()),
     st.floats(0, 3),  # an innovation ratio
     st.none(),  # a reboot
@@ -374,7 +374,7 @@ def test_invariants_under_anything(inputs):
         assert window.is_open is is_open
         assert (window.reason is None) or not is_open
         assert sum(window.rejected.values()) - before in (0, 1)
-        assert window.trusted_s >= 0
+        assert 0 <= window.trusted_s < math.inf
         if is_open:
             assert window.reasons == ()
     assert isinstance(window.finish(), tuple)
