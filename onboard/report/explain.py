@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from onboard.core.findings import Diagnosis, Effect, Where
 from onboard.core.result import SIX_NAMES
 from onboard.report import words
 from onboard.report.chart import Band, Line, line_chart, pair_bar
+from onboard.report.page import render
 from onboard.report.parameters import changes
 
 TEMPLATE = "explain.html.j2"
@@ -36,14 +35,11 @@ def explain_html(
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
     """
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    source = resources.files("onboard.report").joinpath(TEMPLATE).read_text(encoding="utf-8")
     m = diagnosis.mismatch
     missing, sure, change = words.sentences(diagnosis)
     unclear = {n for a in diagnosis.ambiguous for n in a.names}
-    return environment.from_string(source).render(
+    return render(
+        TEMPLATE,
         files=list(files),
         autopilot=autopilot,
         duration=words.number(duration_s),

@@ -144,9 +144,9 @@ def luminance(colour: str) -> float:
 def test_text_is_readable_in_light_and_dark(scheme):
     html, _ = page(diagnosis())
     sets = re.findall(r":root \{(.*?)\}", html, re.DOTALL)
-    colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6,8})", sets[scheme]))
-    for ground in ("page", "card"):
-        for ink in ("ink", "muted", "before", "after", "good", "warn", "bad"):
+    colours = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", sets[scheme]))
+    for ground in ("ground", "surface"):
+        for ink in ("ink", "ink-soft", "before", "after", "good", "warn", "bad"):
             one, two = sorted((luminance(colours[ink]), luminance(colours[ground])))
             assert (two + 0.05) / (one + 0.05) >= 4.5, (ink, ground)
 
