@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -12,13 +10,13 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from onboard.cli.replay import STANDARD_OUTPUT, write_json
+from onboard.cli.progress import reading
+from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.core.result import SIX_NAMES
-from onboard.errors import UsageError
 from onboard.explain import Explanation
 from onboard.explain import explain as explain_recordings
-from onboard.report.parameters import parameter_text
+from onboard.report.parameters import is_qgc, parameter_text
 from onboard.report.words import EFFECTS, VERDICTS
 
 EXAMPLES = """\
@@ -34,7 +32,10 @@ onboard explain flight.BIN --json - | jq '.effects[].name'
 @click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
 @click.option("--report", "report_file", metavar="FILE", help="Write one self-contained HTML page.")
 @click.option(
-    "--param", "param_file", metavar="FILE", help="Write parameters for a ground station."
+    "--param",
+    "param_file",
+    metavar="FILE",
+    help="Write parameters for a ground station; QGroundControl's format if FILE ends in .params.",
 )
 @click.option(
     "--imu",
@@ -54,8 +55,8 @@ def explain(
     Says what is missing, how sure that is, what to change, and what this flight could not have
     shown.  Nothing is written to any autopilot.
     """
-    with _patience():
-        result = explain_recordings(logs, imu=imu)
+    with reading(logs, then="comparing models") as progress:
+        result = explain_recordings(logs, imu=imu, progress=progress)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if report_file is not None:
@@ -68,9 +69,10 @@ def explain(
             autopilot=result.source.autopilot,
             duration_s=result.duration_s,
         )
-        _write(report_file, page)
+        write_text(page, report_file)
     if param_file is not None:
-        _write(param_file, parameter_text(result.diagnosis, result.files))
+        text = parameter_text(result.diagnosis, result.files, qgc=is_qgc(param_file))
+        write_text(text, param_file)
     if json_file != STANDARD_OUTPUT:
         console = Console(highlight=False)
         for part in summary(result):
@@ -141,20 +143,3 @@ def _six(d: Diagnosis) -> Table:
     for name, value, sigma, force, seen in rows:
         table.add_row(name, f"{value:.4f}", f"{sigma:.4f}", f"{force:.4f}", "yes" if seen else "no")
     return table
-
-
-def _write(file: str, text: str) -> None:
-    try:
-        Path(file).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
-
-
-@contextmanager
-def _patience() -> Iterator[None]:
-    """A moving sign on standard error while a person watches."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    with Console(stderr=True).status("reading and comparing models"):
-        yield

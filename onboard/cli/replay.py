@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as ProgressBar
 
+from onboard.chronicle import Chronicle
+from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
 from onboard.core.calibrator import Calibrator
 from onboard.errors import UsageError
-from onboard.replay import Progress
+from onboard.replay import Estimator
 from onboard.replay import replay as replay_recordings
 
 STANDARD_OUTPUT = "-"
@@ -25,6 +22,7 @@ EXAMPLES = """\
 \b
 onboard replay flight.BIN
 onboard replay monday.tlog tuesday.tlog --imu 2
+onboard replay flight.BIN --report flight.html --param new.param
 onboard replay flight.BIN --json - | jq '.imus[0].calibration'
 """
 
@@ -37,17 +35,45 @@ onboard replay flight.BIN --json - | jq '.imus[0].calibration'
     metavar="FILE",
     help="Write the result as JSON, '-' for standard output (then without the table).",
 )
+@click.option("--report", "report_file", metavar="FILE", help="Write one self-contained HTML page.")
+@click.option(
+    "--param",
+    "param_file",
+    metavar="FILE",
+    help="Write parameters for a ground station; QGroundControl's format if FILE ends in .params.",
+)
 @click.option(
     "--imu", type=click.IntRange(1, 5), metavar="N", help="This accelerometer only, 1 to 5."
 )
-def replay(logs: tuple[Path, ...], json_file: str | None, imu: int | None) -> None:
+def replay(
+    logs: tuple[Path, ...],
+    json_file: str | None,
+    report_file: str | None,
+    param_file: str | None,
+    imu: int | None,
+) -> None:
     """Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
 
     Several LOGs of one vehicle are merged: what a single flight does not show, several may.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    with _progress(logs) as progress:
-        result = replay_recordings(logs, Calibrator(), imu=imu, progress=progress)
+    chronicle = Chronicle(Calibrator())
+    estimator: Estimator = chronicle.calibrator if report_file is None else chronicle
+    with reading(logs) as progress:
+        result = replay_recordings(logs, estimator, imu=imu, progress=progress)
+    if report_file is not None:
+        # jinja2 only when it is wanted.
+        from onboard.report.replay import replay_html
+
+        write_text(replay_html(result, chronicle), report_file)
+    if param_file is not None:
+        from onboard.report.parameters import calibration_text, is_qgc
+
+        if result.autopilot != "ardupilot":
+            raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
+        names = [recording.path.name for recording in result.recordings]
+        qgc = is_qgc(param_file)
+        write_text(calibration_text(result.calibrations, names, qgc=qgc), param_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if json_file != STANDARD_OUTPUT:
@@ -71,14 +97,13 @@ def write_json(document: bytes, file: str) -> None:
         raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
 
 
-@contextmanager
-def _progress(logs: tuple[Path, ...]) -> Iterator[Progress | None]:
-    """A bar on standard error while a person watches, else nothing."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    name = logs[0].name if len(logs) == 1 else f"{len(logs)} recordings"
-    columns = TextColumn("reading {task.description}"), BarColumn(), TimeRemainingColumn()
-    with ProgressBar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=1.0)
-        yield lambda done: bar.update(task, completed=done)
+def write_text(text: str, file: str) -> None:
+    """Write a text in UTF-8.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    try:
+        Path(file).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None

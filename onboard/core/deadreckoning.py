@@ -90,6 +90,59 @@ def free_drift(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class FreeErrors:
+    """Velocity errors of free integration, window after window.
+
+    Attributes:
+        t: (n,) epochs, s, boot clock.
+        error: (sets, n) length of integrated minus GPS velocity, m/s; NaN begins a window.
+    """
+
+    t: Array
+    error: Array
+
+
+def free_errors(
+    chain: Sequence[Interval],
+    states: Sequence[EpochState],
+    sixes: Sequence[Array],
+    *,
+    horizon_s: float,
+) -> FreeErrors:
+    """Integrate freely from each state that the window before has reached.
+
+    Args:
+        chain: integrals between epochs (:func:`intervals`), in order of time.
+        states: filter states at epochs.
+        sixes: sets of (6,) scale, beta to compare.
+        horizon_s: length of a window.
+    """
+    start = np.array([x.start for x in chain])
+    end = np.array([x.end for x in chain])
+    attitude = {round(state.t, 3): state.R_nb for state in states}
+    times, errors = [np.zeros(0)], [np.zeros((len(sixes), 0))]
+    reached = -np.inf
+    for state in states:
+        k = int(np.searchsorted(start, state.t - 1e-3))
+        if state.t < reached - 1e-3 or k >= len(chain) or abs(start[k] - state.t) > 1e-3:
+            continue
+        stop = k + 1
+        while (
+            stop < len(chain)
+            and abs(start[stop] - end[stop - 1]) < 1e-6
+            and end[stop] - state.t < horizon_s + 1e-3
+        ):
+            stop += 1
+        error = _errors(chain[k:stop], state, sixes, attitude)
+        seen = np.isfinite(error[0, :, 0])
+        length = np.linalg.norm(error[:, seen], axis=2)
+        times += [np.array([state.t]), end[k:stop][seen]]
+        errors += [np.full((len(sixes), 1), np.nan), length]
+        reached = float(end[stop - 1])
+    return FreeErrors(np.concatenate(times), np.concatenate(errors, axis=1))
+
+
 def intervals(pieces: Sequence[tuple[Stretch, Fixes]], point: Linearisation) -> list[Interval]:
     """Integrals between the epochs of chunks of flight, each with its fixes, in order of time.
 
@@ -141,12 +194,29 @@ def _drift(
     attitude: Mapping[float, Array],
 ) -> tuple[Array, Array] | None:
     """Drift at the end and mean square inside for each set; None without GPS at the end."""
+    error = _errors(chain, state, sixes, attitude)
+    seen = np.isfinite(error[0, :, 0])
+    if not np.any(seen):
+        return None
+    heard = error[:, seen]
+    square = np.sum(heard**2, axis=(1, 2)) / heard.shape[1]
+    return np.linalg.norm(heard[:, -1], axis=1), square
+
+
+def _errors(
+    chain: Sequence[Interval],
+    state: EpochState,
+    sixes: Sequence[Array],
+    attitude: Mapping[float, Array],
+) -> Array:
+    """(sets, n, 3) integrated minus GPS velocity at the ends of the chain, m/s.
+
+    A whole row is NaN where there is no GPS; down is 0 where the receiver has no vertical speed.
+    """
     R = state.R_nb
     v = np.tile(state.v_n, (len(sixes), 1))
-    square = np.zeros(len(sixes))
-    count = 0
-    error = np.full((len(sixes), 3), np.nan)
-    for x in chain:
+    error = np.full((len(sixes), len(chain), 3), np.nan)
+    for k, x in enumerate(chain):
         T = x.end - x.start
         # The bias turns the interval's increments by R(-b T) to first order.
         for i, six in enumerate(sixes):
@@ -158,9 +228,5 @@ def _drift(
         R = at_end
         seen = np.isfinite(x.velocity)
         if seen[0]:
-            error = np.where(seen, v - x.velocity, 0.0)
-            square += np.sum(error**2, axis=1)
-            count += 1
-    if count == 0 or np.any(np.isnan(error)):
-        return None
-    return np.linalg.norm(error, axis=1), square / count
+            error[:, k] = np.where(seen, v - x.velocity, 0.0)
+    return error

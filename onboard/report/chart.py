@@ -34,6 +34,16 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
+class Ribbon:
+    """A filled area between two curves: ``x``, ``low``, ``high`` (n,), all finite."""
+
+    x: Array
+    low: Array
+    high: Array
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
 class Band:
     """A shaded interval of the horizontal axis."""
 
@@ -78,22 +88,25 @@ def line_chart(
     lines: Sequence[Line],
     bands: Sequence[Band] = (),
     *,
+    ribbons: Sequence[Ribbon] = (),
     x_unit: str = "s",
+    x_range: tuple[float, float] | None = None,
+    y_range: tuple[float, float] | None = None,
     symmetric: bool = True,
 ) -> Markup:
     """Curves over a common axis; a sentence instead if there is not one finite point.
 
     The vertical range covers 99.5 % of all points, so that a single wild value does not flatten the
-    rest; what is beyond is cut at the edge.
+    rest; what is beyond is cut at the edge.  ``x_range`` and ``y_range`` set the ranges instead.
     """
     drawn = [(*decimate(line.x, line.y), line) for line in lines]
     xs = np.concatenate([x for x, _, _ in drawn]) if drawn else np.zeros(0)
     ys = np.concatenate([y for _, y, _ in drawn]) if drawn else np.zeros(0)
     if len(xs) == 0:
         return Markup('<p class="muted">{}: no data to draw.</p>').format(title)
-    x0, x1 = float(xs.min()), float(xs.max())
+    x0, x1 = x_range or (float(xs.min()), float(xs.max()))
     x1 = x1 if x1 > x0 else x0 + 1.0
-    y0, y1 = _range(ys, symmetric=symmetric)
+    y0, y1 = y_range or _range(ys, symmetric=symmetric)
 
     def px(x: float) -> float:
         return WIDTH * (x - x0) / (x1 - x0)
@@ -110,6 +123,12 @@ def line_chart(
         kind = "zero" if v == 0 else "grid"
         shapes.append(f'<path class="{kind}" d="M0 {py(v):.1f}H{WIDTH:.0f}"/>')
         labels.append(_label("y", "top", py(v) / HEIGHT, v))
+    for r in ribbons:
+        there = [f"{px(float(v)):.1f} {py(float(h)):.1f}" for v, h in zip(r.x, r.high, strict=True)]
+        back = [f"{px(float(v)):.1f} {py(float(w)):.1f}" for v, w in zip(r.x, r.low, strict=True)]
+        outline = "L".join(there + back[::-1])
+        if outline:
+            shapes.append(f'<path class="ribbon {escape(r.kind)}" d="M{outline}Z"/>')
     for x, y, line in drawn:
         d = _path([px(float(v)) for v in x], [py(float(v)) for v in y], x)
         shapes.append(f'<path class="line {escape(line.kind)}" d="{d}"/>')
@@ -142,6 +161,15 @@ def pair_bar(before: float, after: float, longest: float, title: str) -> Markup:
         '<svg class="bars" viewBox="0 0 100 17" preserveAspectRatio="none" role="img" '
         'aria-label="{}">{}</svg>'
     ).format(title, Markup(bar(before, 1, "before") + bar(after, 9, "after")))  # noqa: S704
+
+
+def share_bar(share: float, title: str, *, enough: bool) -> Markup:
+    """One horizontal bar, 0 ... 1 of its width."""
+    width = 100.0 * min(max(share, 0.0), 1.0) if math.isfinite(share) else 0.0
+    return Markup(
+        '<svg class="bars" viewBox="0 0 100 8" preserveAspectRatio="none" role="img" '
+        'aria-label="{}"><rect class="bar {}" x="0" y="0" width="{:.2f}" height="8"/></svg>'
+    ).format(title, "good" if enough else "low", width)
 
 
 def _range(ys: Array, *, symmetric: bool) -> tuple[float, float]:

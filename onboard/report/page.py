@@ -1,9 +1,8 @@
-"""One self-contained HTML document from a template: the look of the status page, nothing outside."""
+"""A self-contained HTML document from a template, with the look of the status page."""
 
 from __future__ import annotations
 
 from importlib import resources
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -11,7 +10,7 @@ from markupsafe import Markup
 from onboard.web.page import look
 
 
-def render(template: str, **shown: Any) -> str:
+def render(template: str, **shown: object) -> str:
     """A page in UTF-8 without script and without references to anything outside itself.
 
     Args:

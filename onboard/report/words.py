@@ -51,6 +51,31 @@ EFFECTS = {
 }
 
 
+TIMING = {
+    "gps_delay_s": "GPS is late by",
+    "gps_smoothing_window_s": "GPS averages over",
+    "imu_delay_s": "attitude is late by",
+}
+DISTRUST = {
+    "waiting": "nothing heard yet",
+    "spoofed": "the receiver reports spoofing",
+    "jammed": "the receiver reports jamming",
+    "no_fix": "no 3D fix",
+    "few_satellites": "too few satellites",
+    "hdop": "satellites badly spread (HDOP)",
+    "speed_accuracy": "speed too inaccurate",
+    "gps_glitch": "velocity jumped (glitch)",
+    "ekf_gps_glitch": "the autopilot reports a GPS glitch",
+    "ekf_unhealthy": "the autopilot's state estimate is not ready",
+    "stale": "no fresh GPS",
+    "gps_gap": "a gap in GPS",
+    "restarted": "the recording or the autopilot began anew",
+    "configured_end": "the configured time is over",
+    "end_of_data": "no more data",
+}
+"""Why GPS is not trusted."""
+
+
 def effect_title(name: str) -> str:
     """The effect as a short sentence; unknown names read as words."""
     return EFFECTS.get(name, name.replace("_", " "))
@@ -71,6 +96,16 @@ def number(value: float, digits: int = 3) -> str:
 def fixed(value: float, places: int) -> str:
     """``value`` with ``places`` decimals; words where it is not finite."""
     return f"{value:.{places}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
+
+
+def signed(value: float, places: int) -> str:
+    """``value`` with its sign and ``places`` decimals; words where it is not finite."""
+    return f"{value:+.{places}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
+
+
+def seconds(value: float, sigma: float) -> str:
+    """A time in ms with its sigma."""
+    return quantity(Quantity(value, sigma, "s")) if math.isfinite(value) else UNKNOWN
 
 
 def percent(share: float) -> str:

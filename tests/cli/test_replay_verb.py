@@ -50,6 +50,23 @@ def test_json_in_a_file_comes_with_the_table(log, tmp_path, capsys):
     assert json.loads((tmp_path / "out.json").read_text())["recording"]["autopilot"] == "ardupilot"
 
 
+def test_report_and_parameters_are_files_of_their_own(log, tmp_path, capsys):
+    page, plain, tabbed = (tmp_path / name for name in ("r.html", "p.param", "p.params"))
+    assert run(["replay", str(log), "--report", str(page), "--param", str(plain)]) == 0
+    assert run(["replay", str(log), "--json", "-", "--param", str(tabbed)]) == 0
+    assert capsys.readouterr().err == ""
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert "accelerometer 1: insufficient" in plain.read_text()
+    assert "INS_" not in tabbed.read_text()
+
+
+def test_parameters_of_another_autopilot_are_refused(tmp_path, capsys):
+    path = tmp_path / "x.ulg"
+    path.write_bytes(px4_log(5))
+    assert run(["replay", str(path), "--param", str(tmp_path / "p.param")]) == 2
+    assert "not of an ArduPilot" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["x.tlog", "x.ulg"])
 def test_other_kinds(tmp_path, capsys, name):
     path = tmp_path / name
@@ -67,6 +84,8 @@ def test_other_kinds(tmp_path, capsys, name):
         (["{log}", "--imu", "7"], "7"),
         (["{log}", "--imu", "3"], "no accelerometer 3"),
         (["{log}", "--json", "{log}/x.json"], "x.json"),
+        (["{log}", "--report", "{log}/x.html"], "x.html"),
+        (["{log}", "--param", "{log}/x.param"], "x.param"),
         (["{tmp}/text.tlog"], "text.tlog: not a"),
         (["{tmp}/empty.BIN"], "empty.BIN: is empty"),
         (["{tmp}"], "is a directory"),

@@ -3,55 +3,20 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from diagnoses_by_hand import diagnosis, effect, told_apart_not, unknown
+from html_page import Page
 
 from onboard.core.findings import Diagnosis, Quantity, Verdict
 from onboard.explain import explain
 from onboard.report.explain import explain_html
 
-VOID = {"meta", "link", "br", "img", "hr", "input"}
-
-
-class Page(HTMLParser):
-    """Checks nesting; collects text, tags and addresses."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text: list[str] = []
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag):
-        assert self.open, f"</{tag}> closes nothing"
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-    @property
-    def words(self) -> str:
-        return " ".join(" ".join(self.text).split())
-
 
 def page(d: Diagnosis, files=("flight.tlog",), autopilot: str = "ardupilot") -> tuple[str, Page]:
     html = explain_html(d, files=files, autopilot=autopilot, duration_s=300.0)
-    parsed = Page()
-    parsed.feed(html)
-    parsed.close()
-    assert parsed.open == []
-    return html, parsed
+    return html, Page.of(html)
 
 
 @pytest.mark.parametrize("make", [diagnosis, unknown, told_apart_not])
@@ -161,9 +126,7 @@ def test_a_real_diagnosis(recordings: Path):
         autopilot=result.source.autopilot,
         duration_s=result.duration_s,
     )
-    parsed = Page()
-    parsed.feed(html)
-    assert parsed.open == []
+    parsed = Page.of(html)
     assert len(html.encode()) < 500_000
     for e in result.diagnosis.effects:
         assert e.name in parsed.words

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from diagnoses_by_hand import calibration, diagnosis, effect, told_apart_not, unknown
 
+from onboard.core.accelerometer import parameter_names
 from onboard.core.findings import Verdict
 from onboard.core.result import Status
-from onboard.report.parameters import param_file
+from onboard.report.parameters import calibration_text, param_file
 
 
 def loaded(text: str) -> dict[str, float]:
@@ -67,3 +70,29 @@ def test_values_that_are_not_finite_do_not_come():
 def test_a_parameter_comes_once():
     twice = (effect(), effect("gps_smoothing", parameters={"GPS1_DELAY_MS": 5.0}))
     assert loaded(param_file(diagnosis(effects=twice)))["GPS1_DELAY_MS"] == 210.0
+
+
+def test_qgroundcontrol_gets_tabs_and_the_types_that_the_autopilot_declares():
+    text = param_file(diagnosis(), qgc=True)
+    rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+    assert rows
+    assert all(len(row) == 5 and row[:2] == ["1", "1"] for row in rows)
+    kinds = {row[2]: (row[3], row[4]) for row in rows}
+    assert kinds["GPS1_DELAY_MS"] == ("210", "4")
+    assert kinds["INS_ACCSCAL_X"][1] == "9"
+
+
+def test_both_forms_hold_the_same_settings():
+    plain = [x.split(",") for x in param_file(diagnosis()).splitlines() if x[0] != "#"]
+    tabbed = [x.split("\t") for x in param_file(diagnosis(), qgc=True).splitlines() if x[0] != "#"]
+    assert [(n, float(v)) for n, v in plain] == [(r[2], float(r[3])) for r in tabbed]
+
+
+def test_a_replay_gives_what_was_observed_of_every_accelerometer():
+    c = diagnosis().calibration
+    two = replace(c, imu=2, status=Status.INSUFFICIENT)
+    text = calibration_text([c, two], ["a.BIN"])
+    set_now = [line.split(",")[0] for line in text.splitlines() if not line.startswith("#")]
+    assert set(set_now) <= set(parameter_names(1).six)
+    assert len(set_now) == sum(c.observable)
+    assert "not set, the calibration is insufficient: INS_ACC2" in text

@@ -1,0 +1,298 @@
+"""A replay as one self-contained page: how the calibration came about and what it is worth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from onboard.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
+from onboard.core.accelerometer import parameter_names
+from onboard.core.observability import Needs
+from onboard.core.result import SIX_NAMES, Calibration, Status
+from onboard.core.settings import EstimatorSettings
+from onboard.replay import Replay
+from onboard.report import words
+from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
+from onboard.report.page import render
+
+Array = NDArray[np.float64]
+
+TEMPLATE = "replay.html.j2"
+SIGMAS = 2.0
+BEGINNING = 0.15
+"""Share of a course whose wide bands may leave the picture."""
+ENOUGH_PERCENT = 60.0
+MOST_SPANS = 12
+KEPT_S = EstimatorSettings().buffer_s
+HEADLINES = {
+    Status.CALIBRATED: "Calibrated",
+    Status.COLLECTING: "Not enough data yet",
+    Status.INSUFFICIENT: "The flight does not show enough",
+    Status.INVALID: "No valid result",
+}
+
+
+def replay_html(result: Replay, chronicle: Chronicle) -> str:
+    """The page of one replay.
+
+    Args:
+        result: what the replay gave; numbers that are not finite are shown as not known.
+        chronicle: what stood before the calibrator in that replay.
+
+    Returns:
+        One HTML document in UTF-8 without references to anything outside itself.
+    """
+    statuses = [c.status for c in result.calibrations]
+    worst = next((s for s in reversed(Status) if s in statuses), Status.INSUFFICIENT)
+    done = sum(s is Status.CALIBRATED for s in statuses)
+    if len(statuses) > 1 and 0 < done < len(statuses):
+        headline = f"{done} of {len(statuses)} accelerometers calibrated"
+    else:
+        headline = HEADLINES[worst]
+    return render(
+        TEMPLATE,
+        files=[r.path.name for r in result.recordings],
+        autopilot=result.autopilot,
+        duration=words.fixed(result.duration_s, 0),
+        status=worst.value,
+        headline=headline,
+        damage=[f"{r.path.name}: {n}" for r in result.recordings for n in r.damage],
+        notes=[f"{r.path.name}: {n}" for r in result.recordings for n in r.notes]
+        + list(result.notes),
+        trust_chart=_trust_chart(chronicle),
+        trust=_trust(chronicle),
+        imus=[
+            _imu(c, chronicle.figures(c.imu), result.autopilot, chronicle)
+            for c in result.calibrations
+        ],
+        free=f"{FREE_S:.0f}",
+        kept=f"{KEPT_S / 60.0:.0f}" if chronicle.duration_s > KEPT_S else "",
+    )
+
+
+def _imu(c: Calibration, f: Figures, autopilot: str, chronicle: Chronicle) -> dict[str, Any]:
+    what, sure, do = _sentences(c, f, autopilot)
+    return {
+        "imu": c.imu,
+        "status": c.status.value,
+        "headline": HEADLINES[c.status],
+        "what": what,
+        "sure": sure,
+        "do": do,
+        "rows": _rows(c, autopilot),
+        "known": c.parameters_known,
+        "timing": [
+            (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
+            for name, e in c.timing.items()
+        ],
+        "six": _six_charts(f.course),
+        "residual": _residual_chart(f, chronicle),
+        "fits": _fits(c),
+        "covers": [
+            (name, share_bar(p / 100.0, f"{name} coverage", enough=p >= ENOUGH_PERCENT), p)
+            for name, p in zip(SIX_NAMES, map(float, c.coverage.per_parameter), strict=True)
+        ],
+        "weak": _weak(f),
+        "certificate": _certificate(c),
+        "certificate_chart": _certificate_chart(c, f.innovation),
+        "rejected": [(name.replace("_", " "), n) for name, n in sorted(c.rejected.items())],
+        "trusted": words.fixed(c.trusted_s, 0),
+    }
+
+
+def _sentences(c: Calibration, f: Figures, autopilot: str) -> tuple[str, str, str]:
+    """What was found, how sure, what to do: three short paragraphs."""
+    seen = sum(c.observable)
+    if c.status is Status.CALIBRATED:
+        count = "All six" if seen == len(SIX_NAMES) else f"{seen} of the six"
+        what = f"{count} numbers are known from this flight."
+        if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
+            what += (
+                f" Integrated for {FREE_S:.0f} s without GPS, velocity is off by "
+                f"{c.velocity_rms_after:.2f} m/s; with the parameters in force, by "
+                f"{c.velocity_rms_before:.2f} m/s."
+            )
+    else:
+        weak = f.seen.note if f.seen is not None else ""
+        what = c.note.replace(weak, "").strip() or f"{seen} of the six numbers are known."
+        what = what[0].upper() + what[1:]
+    sure = "Not judged on data that the fit did not see: there is too little."
+    if math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after):
+        sure = (
+            f"On parts that the fit did not see, the error is {c.held_out_after:.2f} times the "
+            f"noise (with the parameters in force {c.held_out_before:.2f}; 1 is ideal)."
+        )
+    fly = c.coverage.advice or (f.seen.weak[0].advice if f.seen is not None and f.seen.weak else "")
+    if c.status is Status.CALIBRATED and seen == len(SIX_NAMES):
+        do = "Set the parameters below." if autopilot == "ardupilot" else "Use the numbers below."
+    elif c.status is Status.CALIBRATED:
+        do = f"Set the observed parameters below. For the others: {fly}."
+    else:
+        do = f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
+    return what, sure, do
+
+
+def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:
+    """The table of parameters: before, after, how well known."""
+    names = parameter_names(c.imu).six if autopilot == "ardupilot" else SIX_NAMES
+    rows = zip(
+        SIX_NAMES,
+        names,
+        c.in_force_scale + c.in_force_offset,
+        c.scale + c.offset,
+        c.scale_sigma + c.offset_sigma,
+        c.observable,
+        strict=True,
+    )
+    return [
+        {
+            "words": label,
+            "name": name,
+            "before": words.fixed(before, 4),
+            "after": words.fixed(value, 4),
+            "change": words.signed(value - before, 4),
+            "sigma": words.fixed(sigma, 4),
+            "seen": seen,
+        }
+        for label, name, before, value, sigma, seen in rows
+    ]
+
+
+def _weak(f: Figures) -> list[tuple[str, str]]:
+    """What the flight does not show, by the manoeuvre that would; the weakest first."""
+    by_advice: dict[str, list[str]] = {}
+    for w in f.seen.weak if f.seen is not None else ():
+        by_advice.setdefault(w.advice, []).append(
+            f"{w.sentence}, sigma {words.number(w.excess, 2)} times what is needed"
+        )
+    return [(advice, "; ".join(found)) for advice, found in by_advice.items()]
+
+
+def _six_charts(course: Course) -> list[Markup]:
+    """Convergence of each of the six, with its band of two sigma and the value in force."""
+    charts = []
+    for i, name in enumerate(SIX_NAMES):
+        t, value, sigma = course.t, course.value[:, i], course.sigma[:, i]
+        low, high = value - SIGMAS * sigma, value + SIGMAS * sigma
+        force = course.in_force[:, i]
+        later = slice(int(BEGINNING * len(t)), None)
+        needs = Needs()
+        least = needs.scale if i < 3 else needs.offset
+        bounds = np.concatenate([low[later], high[later], force[later]])
+        unit = "factor" if i < 3 else "m/s²"
+        y_range = None
+        if len(bounds):
+            bottom, top = float(bounds.min()), float(bounds.max())
+            margin = 0.08 * max(top - bottom, least)
+            y_range = (bottom - margin, top + margin)
+        charts.append(
+            line_chart(
+                name,
+                unit,
+                [Line(t, force, "in-force", "in force"), Line(t, value, "estimate", "estimate")],
+                ribbons=[Ribbon(t, low, high, "estimate")],
+                y_range=y_range,
+            )
+        )
+    return charts
+
+
+def _residual_chart(f: Figures, chronicle: Chronicle) -> Markup:
+    every = np.concatenate([f.before.y, f.after.y])
+    known = every[np.isfinite(every)]
+    top = 1.1 * float(np.percentile(known, 99.5)) if len(known) else 1.0
+    return line_chart(
+        "Velocity error of free integration",
+        "m/s",
+        [
+            Line(f.before.t, f.before.y, "before", "before"),
+            Line(f.after.t, f.after.y, "after", "after"),
+        ],
+        _bands(chronicle.spans),
+        y_range=(0.0, top or 1.0),
+    )
+
+
+def _fits(c: Calibration) -> list[dict[str, Any]]:
+    rows = [
+        ("Not used in the fit", "× noise", c.held_out_before, c.held_out_after),
+        ("All data", "× noise", c.whitened_rms_before, c.whitened_rms_after),
+        (f"Velocity after {FREE_S:.0f} s", "m/s", c.velocity_rms_before, c.velocity_rms_after),
+    ]
+    if c.dead_reckoning is not None and c.dead_reckoning.windows:
+        d = c.dead_reckoning
+        rows.append((f"Velocity after {d.horizon_s:.0f} s", "m/s", d.drift_before, d.drift_after))
+    return [
+        {
+            "label": label,
+            "unit": unit,
+            "before": words.number(a),
+            "after": words.number(b),
+            "bar": pair_bar(a, b, max((v for v in (a, b) if math.isfinite(v)), default=0.0), label),
+        }
+        for label, unit, a, b in rows
+    ]
+
+
+def _trust_chart(chronicle: Chronicle) -> Markup:
+    speed = chronicle.speed
+    top = 1.1 * float(speed.y.max()) if len(speed.y) else 1.0
+    return line_chart(
+        "Speed over ground",
+        "m/s",
+        [Line(speed.t, speed.y, "speed", "speed")],
+        _bands(chronicle.spans),
+        x_range=(0.0, max(chronicle.duration_s, 1.0)),
+        y_range=(0.0, top or 1.0),
+    )
+
+
+def _bands(spans: tuple[Span, ...]) -> list[Band]:
+    return [Band(s.start, s.end, "untrusted") for s in spans if s.reason]
+
+
+def _trust(chronicle: Chronicle) -> dict[str, Any]:
+    spans = chronicle.spans
+    doubts = [s for s in spans if s.reason]
+    longest = sorted(doubts, key=lambda s: -s.seconds)[:MOST_SPANS]
+    return {
+        "trusted": words.fixed(sum(s.seconds for s in spans if not s.reason), 0),
+        "windows": sum(not s.reason for s in spans),
+        "doubts": [
+            (
+                f"{words.fixed(s.start, 0)} to {words.fixed(s.end, 0)} s",
+                words.DISTRUST.get(s.reason, s.reason.replace("_", " ")),
+            )
+            for s in sorted(longest, key=lambda s: s.start)
+        ],
+        "more": max(len(doubts) - MOST_SPANS, 0),
+    }
+
+
+def _certificate(c: Calibration) -> dict[str, str] | None:
+    if c.certificate is None:
+        return None
+    k = c.certificate
+    return {
+        "window": words.fixed(k.window_s, 0),
+        "bound": words.number(k.uniform_bound),
+        "seen": words.number(k.observed_max),
+        "l2": words.number(k.residual_l2),
+        "slope": words.number(k.acceleration_bound),
+    }
+
+
+def _certificate_chart(c: Calibration, innovation: Curve) -> Markup:
+    if c.certificate is None or not len(innovation.t):
+        return Markup("")
+    bound = c.certificate.uniform_bound
+    ends = np.array([innovation.t.min(), innovation.t.max()])
+    lines = [Line(innovation.t, innovation.y, "after", "residual")]
+    if math.isfinite(bound):
+        lines.append(Line(ends, np.array([bound, bound]), "bound", "bound"))
+    top = max([1.1 * float(innovation.y.max()), *([1.1 * bound] if math.isfinite(bound) else [])])
+    return line_chart("Velocity residual and its bound", "m/s", lines, y_range=(0.0, top or 1.0))
