@@ -25,7 +25,7 @@ from onboard.core.calibration_columns import (
     Six,
 )
 from onboard.core.columns import Family, Model
-from onboard.core.noise import NoiseLevels, distance, star, stepped
+from onboard.core.noise import NoiseLevels, distance, line, star, stepped
 from onboard.core.passes import EpochState, Linearisation, Pass, PassResult, Portion, merged
 from onboard.core.settings import EstimatorSettings
 from onboard.core.solution import Solution, solve, total
@@ -36,8 +36,10 @@ Array = NDArray[np.float64]
 
 ROUNDS = 4
 """Rounds of a refinement: latency is found to a millisecond in two or three."""
-NOISE_ROUNDS = 2
-"""Each round may change a level by four; refinements follow each other as the flight goes on."""
+NOISE_ROUNDS = 3
+"""Rounds that may begin a search for noise levels; each search takes two."""
+SETTLED = 0.15
+"""Levels closer than this (log ratio) are the same: only their order of magnitude matters."""
 MOST_STATES = 12000
 """Epochs whose state is kept for certificates: 20 minutes at 10 Hz."""
 MOST_AGED = 24
@@ -105,6 +107,21 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,
     )
+
+
+def _next_levels(
+    levels: NoiseLevels,
+    target: NoiseLevels | None,
+    members: tuple[NoiseLevels, ...] | None,
+    likelihoods: list[float],
+) -> tuple[NoiseLevels, NoiseLevels | None]:
+    """Levels from here on, and those to be tried next, from what a star or a line has shown."""
+    if members is None:
+        return levels, None
+    if target is not None:
+        return members[int(np.argmax(likelihoods))], None
+    found = stepped(levels, likelihoods)
+    return levels, None if distance(levels, found) < SETTLED else found
 
 
 class Engine:
@@ -218,23 +235,24 @@ class Engine:
         """
         if not self.chunks or self._frozen:
             return
-        levels = self.noise
+        target: NoiseLevels | None = None
         for turn in range(rounds):
-            trying = turn < noise_rounds
-            members = star(levels) if trying else (levels,)
+            members = None
+            if target is not None:
+                members = line(self.noise, target)
+            elif turn < noise_rounds:
+                members = star(self.noise)
             made = self._new_pass(members)
-            portions = self._over_buffer(made)
-            self._seed = solve(portions, self.model)
+            self._seed = solve(self._over_buffer(made), self.model)
             point = moved(self.point, self.model, self._seed.theta)
-            next_levels = stepped(levels, made.log_likelihoods()) if trying else levels
-            settled = (
-                distance(levels, next_levels) < 0.15
-                and abs(point.delay - self.point.delay) < 5e-4
+            timed = (
+                abs(point.delay - self.point.delay) < 5e-4
                 and abs(point.window**2 - self.point.window**2) < 2e-3
             )
-            self._move(point, next_levels)
-            levels = next_levels
-            if settled and (turn > 0 or not trying):
+            levels, target = _next_levels(self.noise, target, members, made.log_likelihoods())
+            settled = target is None and distance(self.noise, levels) < SETTLED
+            self._move(point, levels)
+            if timed and settled:
                 break
         self._pass = self._new_pass()
         self.refused.clear()

@@ -2,9 +2,10 @@
 
 The levels are found by maximum likelihood: one pass over the data runs the filter for a *star*
 of levels (the centre, and every level up and down by a factor) side by side, a parabola through
-each triple of log-likelihoods gives the step.  Constant factors here, not tuned numbers: only
-ratios of the order of one matter for the estimate, and honesty of the sigmas is checked again by
-the residuals (:mod:`onboard.core.solution`).
+each triple of log-likelihoods gives a step; the next pass tries shares of that step on a *line*,
+for some levels trade with each other, and the likeliest is taken.  Constant factors here, not
+tuned numbers: only ratios of the order of one matter for the estimate, and honesty of the sigmas
+is checked again by the residuals (:mod:`onboard.core.solution`).
 """
 
 from __future__ import annotations
@@ -83,16 +84,30 @@ ESTIMATED = (
 )
 
 STAR_FACTOR = 2.0
+LINE = (0.25, 0.5, 1.0)
+"""Shares of a step that are tried: levels that trade with each other make the whole too long."""
+
+
+def _triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
+    """Two more values of a level: one to each side, or both to the inner side of a limit."""
+    low, high = limits
+    lower, upper = max(level / STAR_FACTOR, low), min(level * STAR_FACTOR, high)
+    # A value clipped to (nearly) the centre itself would bend the parabola: take a half step in.
+    if level / lower < STAR_FACTOR**0.25:
+        lower = level * STAR_FACTOR**0.5
+    elif upper / level < STAR_FACTOR**0.25:
+        upper = level / STAR_FACTOR**0.5
+    return lower, upper
 
 
 def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
-    """The centre, then each estimated level down and up by :data:`STAR_FACTOR`."""
+    """The centre, then two more values of each estimated level, the others as they are."""
     return (
         centre,
         *(
-            centre.scaled(name, factor)
+            replace(centre, **{name: value})
             for name in ESTIMATED
-            for factor in (1.0 / STAR_FACTOR, STAR_FACTOR)
+            for value in _triple(getattr(centre, name), LIMITS[name])
         ),
     )
 
@@ -100,20 +115,41 @@ def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
 def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels:
     """Next centre from the log-likelihoods of :func:`star`: a parabola in each log-level.
 
-    The step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex the
-    better end is taken.
+    A step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex, it goes
+    towards the best of the three values.
     """
-    reach = np.log(STAR_FACTOR)
-    here = log_likelihood[0]
+    longest = 2.0 * float(np.log(STAR_FACTOR))
     levels = centre
     for i, name in enumerate(ESTIMATED):
-        down, up = log_likelihood[1 + 2 * i], log_likelihood[2 + 2 * i]
-        slope = (up - down) / (2.0 * reach)
-        curve = (up - 2.0 * here + down) / reach**2
-        step = -slope / curve if curve < -1e-6 else 2.0 * reach * float(np.sign(slope))
-        step = float(np.clip(step, -2.0 * reach, 2.0 * reach))
-        levels = levels.scaled(name, float(np.exp(step)))
+        here = getattr(centre, name)
+        x = np.log(np.array(_triple(here, LIMITS[name])) / here)
+        rise = np.array(log_likelihood[1 + 2 * i : 3 + 2 * i]) - log_likelihood[0]
+        # The parabola through the origin and both points: rise = slope x + curve x^2 / 2.
+        slope, curve = np.linalg.solve(np.column_stack([x, x * x / 2.0]), rise)
+        if curve < -1e-6:
+            step = -slope / curve
+        else:
+            best = int(np.argmax(rise))
+            step = longest * float(np.sign(x[best])) if rise[best] > 0.0 else 0.0
+        levels = levels.scaled(name, float(np.exp(np.clip(step, -longest, longest))))
     return levels
+
+
+def line(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
+    """The centre, then the shares :data:`LINE` of the way to ``target``, in log-levels."""
+    return (
+        centre,
+        *(
+            NoiseLevels(
+                *(
+                    getattr(centre, f.name)
+                    * (getattr(target, f.name) / getattr(centre, f.name)) ** share
+                    for f in fields(NoiseLevels)
+                )
+            )
+            for share in LINE
+        ),
+    )
 
 
 def distance(a: NoiseLevels, b: NoiseLevels) -> float:

@@ -23,10 +23,10 @@ from onboard.core.solution import Solution, fitted_rms, held_out
 Array = NDArray[np.float64]
 
 SCALE_FLOOR = 5e-4
-OFFSET_FLOOR = 3e-3
+OFFSET_FLOOR = 1e-3
 """What the model does not know (filters, interpolation, clocks) limits every flight to this."""
 FEWEST_OBSERVED = 3
-CONTRADICTION = 10.0
+CONTRADICTION = 6.0
 """Inflation of the variance past which portions of one flight ask for different parameters."""
 
 

@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 FOLDS = 8
 GRAM_DOUBT = 0.5
 """Relative uncertainty of the noise that was taken out of the columns: its spectrum is a guess."""
+FEWEST_PORTIONS = 6
+ONE_IN_A_THOUSAND = 3.09
+"""Standard normal deviate that is exceeded once in a thousand times."""
 MOST_NOISE = 0.9
 """Share of a column's information that noise may claim; past it there is nothing left to see."""
 
@@ -103,24 +106,39 @@ def _cluster_factor(
 ) -> float:
     """How much wider the scatter of the portions' scores is than the sums say.
 
-    Largest ratio of clustered to plain variance among the six: an offset that changes half-way
-    shows in that offset alone.  1 while there are fewer than six portions.
+    Ratio of clustered to expected variance of each of the six: their mean while all could be one
+    noise, else the largest, for an offset that changes half-way shows in that offset alone.  What
+    is expected of a portion is less than its information, for the fit has followed it.  1 while
+    there are fewer than :data:`FEWEST_PORTIONS`.
     """
-    if len(portions) < 6 or "six" not in model.slices:
+    if len(portions) < FEWEST_PORTIONS or "six" not in model.slices:
         return 1.0
-    inverse = np.linalg.inv(A)
-    meat = np.zeros_like(A)
-    plain = np.zeros_like(A)
-    for p in portions:
-        score = p.sums.b - (p.sums.N - np.diag(share * np.diag(p.sums.G))) @ theta
-        meat += np.outer(score, score)
-        plain += p.sums.N
-    n = len(portions)
-    meat *= n / max(n - 6.0, 1.0)
     six = model.slices["six"]
-    wide = np.diag(inverse @ meat @ inverse)[six]
-    narrow = np.diag(inverse @ plain @ inverse)[six]
-    return float(np.max(wide / np.maximum(narrow, 1e-30)))
+    back = np.linalg.inv(A)[six]
+    found, expected = np.zeros((2, len(portions), len(back)))
+    for i, p in enumerate(portions):
+        N = p.sums.N
+        score = p.sums.b - (N - np.diag(share * np.diag(p.sums.G))) @ theta
+        found[i] = (back @ score) ** 2
+        followed = N - N @ np.linalg.solve(A, N)
+        expected[i] = np.einsum("ij,jk,ik->i", back, followed, back)
+    expected = np.maximum(expected, 0.0)
+    sum_expected = np.maximum(expected.sum(axis=0), 1e-30)
+    ratio = found.sum(axis=0) / sum_expected
+    # Portions that say nothing of a number do not count for it (Satterthwaite 1946).
+    portions_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
+    beyond = ratio > _chance(portions_that_count)
+    return float(ratio[beyond].max() if beyond.any() else ratio.mean())
+
+
+def _chance(n: Array) -> Array:
+    """What a mean of ``n`` squares of unit normals exceeds once in a thousand times.
+
+    Source: Wilson and Hilferty (1931), the cube root of chi-square is nearly normal.
+    """
+    spread = 2.0 / (9.0 * n)
+    out: Array = (1.0 - spread + ONE_IN_A_THOUSAND * np.sqrt(spread)) ** 3
+    return out
 
 
 def held_out(
