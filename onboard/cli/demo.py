@@ -52,7 +52,15 @@ class Options:
     seed: int
 
 
-@click.command()
+EXAMPLES = """\
+\b
+onboard demo
+onboard demo --port 8191     # look at http://127.0.0.1:8191 while it flies
+onboard demo --seed 5 --duration 400 --json result.json
+"""
+
+
+@click.command(epilog=EXAMPLES)
 @click.option("--json", "json_file", metavar="F", help="Write the result as JSON; - is stdout.")
 @click.option(
     "--duration",
@@ -147,7 +155,7 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         await _until(lambda: bool(service.snapshot().imus), "the first samples", PUSH_LIMIT_S)
         show.stage(f"first flight: {options.duration:.0f} s of random manoeuvres")
         await _flight(station, options.duration, options.speedup)
-        show.stage("landed; the service waits until it has been disarmed for 5 s, then writes")
+        show.stage("landed; the service writes when it has been disarmed for 5 s")
         wanted = set(range(1, len(service.snapshot().imus) + 1))
         await _until(
             lambda: set(service.snapshot().push.can_roll_back) >= wanted,

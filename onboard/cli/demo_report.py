@@ -107,12 +107,13 @@ def report(outcome: Outcome) -> Iterator[RenderableType]:
         before, after = _residuals(outcome.judged.get(imu))
         if before is not None and after is not None:
             yield Text(
-                f"velocity residual with the parameters in force: {before:.3f} m/s before, "
-                f"{after:.3f} m/s after"
+                f"velocity residual: {before:.3f} m/s with the old parameters, "
+                f"{after:.3f} m/s with the new"
             )
     yield Text()
     if outcome.shortcomings:
-        yield Text("not as it should be: " + "; ".join(outcome.shortcomings), style="bold red")
+        yield Text("not as it should be:", style="bold red")
+        yield from (Text(f"  {shortcoming}", style="red") for shortcoming in outcome.shortcomings)
     else:
         yield Text("all estimates within their limits; all parameters written", style="bold green")
 

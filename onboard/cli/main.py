@@ -46,7 +46,7 @@ VERBS: dict[str, Verb] = {
     "explain": Verb(
         "onboard.cli.explain", "explain", "Find the physics that a recording has left out."
     ),
-    "fleet": Verb("onboard.cli.fleet", "fleet", "Many vehicles, many logs."),
+    "fleet": Verb("onboard.cli.fleet", "fleet", "Calibrate from every recording in folders."),
     "sim": Verb("onboard.cli.sim", "sim", "The simulated autopilot alone, for any ground station."),
 }
 
@@ -81,7 +81,13 @@ EPILOG = """\
 \b
 Try it:           onboard demo
 From a recording: onboard replay flight.BIN
-On the vehicle:   onboard run --config /etc/onboard.toml
+On the vehicle:   onboard run --config /etc/onboard/onboard.toml
+
+Examples of each command: onboard COMMAND --help
+
+\b
+Completion of commands and options in bash (zsh and fish alike):
+  eval "$(_ONBOARD_COMPLETE=bash_source onboard)"
 
 Exit status: 0 done, whatever the verdict; 2 wrong usage, configuration or input; 3 the link or
 the autopilot failed; 130 interrupted.

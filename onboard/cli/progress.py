@@ -30,3 +30,15 @@ def reading(logs: Sequence[Path], then: str = "") -> Iterator[Told | None]:
             bar.update(task, completed=done, description=said)
 
         yield told
+
+
+@contextmanager
+def numbered(path: Path, number: int, total: int) -> Iterator[Told | None]:
+    """A bar for one recording of many."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn(f"{number} of {total}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(f"reading {path.name}", total=total, completed=number - 1)
+        yield lambda done: bar.update(task, completed=number - 1 + done)

@@ -18,7 +18,15 @@ if TYPE_CHECKING:
     from onboard.daemon.configuration import Configuration
 
 
-@click.command()
+EXAMPLES = """\
+\b
+onboard run --endpoint serial:/dev/ttyAMA0:921600
+onboard run --endpoint udpin:127.0.0.1:14550 --policy never
+onboard run --config /etc/onboard/onboard.toml --check
+"""
+
+
+@click.command(epilog=EXAMPLES)
 @click.option("--config", metavar="F.toml", help="Configuration file.")
 @click.option(
     "--endpoint",

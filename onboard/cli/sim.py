@@ -18,7 +18,15 @@ from sitl.builtin.world import Vehicle
 SIX = 6
 
 
-@click.command()
+EXAMPLES = """\
+\b
+onboard sim                                        # on tcp:127.0.0.1:5760
+onboard sim --vehicle plane --out 127.0.0.1:14550  # to a service
+onboard sim --truth 1.02,0.99,1.01,0.2,-0.1,0.3 --speedup 5
+"""
+
+
+@click.command(epilog=EXAMPLES)
 @click.option(
     "--vehicle", type=click.Choice(["plane", "copter"]), default="copter", show_default=True
 )

@@ -121,7 +121,22 @@ def _where(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
-@click.command()
+EXAMPLES = """\
+\b
+onboard status
+onboard status --watch
+onboard status --json | jq '.push.proposals[].held_back'
+onboard status --url http://kite.local:8191 --token-file token
+"""
+ACTION_EXAMPLES = """\
+\b
+onboard {name}
+onboard {name} 2             # accelerometer 2 only
+onboard {name} --url http://kite.local:8191 --token-file token
+"""
+
+
+@click.command(epilog=EXAMPLES)
 @_where
 @click.option("--watch", is_flag=True, help="Go on showing it until Ctrl-C.")
 @click.option("--json", "as_json", is_flag=True, help="The snapshot as JSON.")
@@ -153,7 +168,7 @@ def status(
 
 
 def _action(name: str, text: str) -> click.Command:
-    @click.command(name, help=text)
+    @click.command(name, help=text, epilog=ACTION_EXAMPLES.format(name=name))
     @_where
     @click.argument("imus", nargs=-1, type=click.IntRange(1, 5), metavar="[IMU]...")
     def command(

@@ -1,0 +1,98 @@
+"""onboard fleet: every recording gets its line, whatever the others are like."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from dataflash_writer import modern_log
+from telemetry_writer import px4_log, telemetry
+
+from onboard.cli.main import run
+
+
+@pytest.fixture
+def fleet(tmp_path) -> Path:
+    """Two vehicles' folders with three kinds of recordings, junk among them."""
+    folder = tmp_path / "fleet"
+    (folder / "one").mkdir(parents=True)
+    (folder / "two with a rather long name of its own").mkdir()
+    (folder / "one" / "a.BIN").write_bytes(bytes(modern_log(20)))
+    (folder / "one" / "b.tlog").write_bytes(bytes(telemetry(5)))
+    (folder / "two with a rather long name of its own" / "c.ulg").write_bytes(px4_log(5))
+    (folder / "notes.txt").write_text("no recording")
+    return folder
+
+
+def spoil(fleet: Path) -> None:
+    (fleet / "one" / "bad.bin").write_bytes(b"\x00\x07" * 4000)
+
+
+def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
+    assert run(["fleet", str(fleet)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    head, *lines = out.splitlines()
+    assert head.split()[:3] == ["recording", "imu", "state"]
+    assert max(map(len, out.splitlines())) <= 80
+    assert [line.split()[0] for line in lines if line[0] != " "][:2] == ["one/a.BIN", "one/b.tlog"]
+    assert any("of its own/c.ulg" in line for line in lines)
+    assert "notes" not in out
+
+
+def test_a_bad_one_is_told_of_and_the_rest_is_done(fleet, capsys):
+    run(["fleet", str(fleet)])
+    good = capsys.readouterr().out.splitlines()
+    spoil(fleet)
+    assert run(["fleet", str(fleet)]) == 2
+    out, err = capsys.readouterr()
+    assert err == "onboard: 1 of 4 recordings could not be read\n"
+    assert set(good) <= set(out.splitlines())
+    assert "one/bad.bin" in out
+    assert "not a .tlog" in out
+
+
+def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
+    spoil(fleet)
+    assert run(["fleet", str(fleet), "--json", "-"]) == 2
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "onboard.fleet/1"
+    assert (document["read"], document["failed"]) == (3, 1)
+    for entry in document["recordings"]:
+        assert (entry["error"] is None) != (entry["replay"] is None)
+        if entry["replay"] is not None:
+            assert entry["replay"]["schema"] == "onboard.replay/1"
+            assert entry["replay"]["recording"]["files"] == [entry["file"]]
+
+
+def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
+    assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0
+    pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
+    assert pages == ["a.BIN.html", "b.tlog.html"]
+
+
+def test_a_file_may_be_named_and_comes_once(fleet, capsys):
+    file = fleet / "one" / "a.BIN"
+    assert run(["fleet", str(file), str(file.parent), "--json", "-"]) == 0
+    files = [r["file"] for r in json.loads(capsys.readouterr().out)["recordings"]]
+    assert files == [str(file), str(file.with_name("b.tlog"))]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{tmp}/absent"], "no such folder"),
+        (["{tmp}/empty"], "no recording"),
+        ([], "DIR"),
+        (["{fleet}", "--report", "{fleet}/notes.txt"], "cannot be made"),
+        (["{fleet}", "--json", "{tmp}/empty"], "cannot be written"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(fleet, tmp_path, capsys, arguments, said):
+    (tmp_path / "empty").mkdir()
+    assert run(["fleet", *(a.format(tmp=tmp_path, fleet=fleet) for a in arguments)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("onboard: ")
+    assert err.count("\n") == 1
+    assert said in err
