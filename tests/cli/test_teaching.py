@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pty
-import re
 import select
 import shlex
 import subprocess
@@ -33,8 +32,8 @@ def test_every_verb_has_examples_that_its_own_options_accept(verb, capsys):
     lines = example_lines(verb)
     assert lines
     for line in lines:
-        command = re.split(r"   +|\|", line)[0]
-        program, name, *arguments = shlex.split(command)
+        command = line.split(" | ")[0]
+        program, name, *arguments = shlex.split(command, comments=True)
         assert (program, name) == ("onboard", verb)
         # Parsing alone: nothing is read, connected or written.
         made = main.cli.get_command(click.Context(main.cli), verb)
@@ -88,11 +87,7 @@ def test_completion_offers_verbs_options_and_choices(words, index, offered):
 def test_each_shell_gets_its_script(shell):
     environment = {**os.environ, "_ONBOARD_COMPLETE": f"{shell}_source"}
     done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys; sys.argv[0] = 'onboard'\nfrom onboard.cli.main import main; main()",
-        ],
+        [sys.executable, "-m", "onboard"],
         env=environment,
         cwd=ROOT,
         capture_output=True,
@@ -105,7 +100,7 @@ def test_each_shell_gets_its_script(shell):
 def on_terminal(*arguments: str) -> tuple[str, str]:
     """Standard output and what a terminal on standard error was shown."""
     master, slave = pty.openpty()
-    process = subprocess.Popen(
+    process = subprocess.Popen(  # noqa: S603 - our own program
         [sys.executable, "-m", "onboard", *arguments],
         stdout=subprocess.PIPE,
         stderr=slave,
