@@ -1,7 +1,7 @@
-"""Outlets: everybody outside who is told what the service does, other than over HTTP.
+"""Outlets: everybody outside who is told what the service does, other than by the snapshot.
 
-The ground station's parameter view and messages, and the broker.  The service hands each of its
-ticks' snapshots over here and knows nothing more of them.
+The ground station's parameter view and messages, the broker, and the memory behind the charts.
+The service hands each of its ticks' snapshots over here and knows nothing more of them.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from onboard.daemon.announcer import Announcer
 from onboard.daemon.configuration import Configuration
+from onboard.daemon.history import History
 from onboard.daemon.notices import Notices
 from onboard.daemon.parameter_view import (
     POLICIES,
@@ -83,6 +84,7 @@ class Outlets:
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
         self._publisher: Publisher | None = None
+        self.history = History(configuration.state.path(), clock=clock)
         if configuration.parameters.messages:
             self._announcer = Announcer(clock)
             notices.listen(self._announcer.hear)
@@ -117,6 +119,7 @@ class Outlets:
     def publish(self) -> None:
         """A tick has passed."""
         snapshot = self._service.snapshot()
+        self.history.take(snapshot)
         self._tell_of_physics(snapshot)
         self._tell_of_approval(snapshot)
         if self._server is not None:
@@ -126,6 +129,7 @@ class Outlets:
 
     async def close(self) -> None:
         """Say goodbye, within a few seconds."""
+        self.history.save()
         if self._approval is not None:
             self._approval.cancel()
         if self._publisher is not None:

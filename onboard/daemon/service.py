@@ -410,7 +410,7 @@ class Service:
         token = http.token
         if http.token_file is not None:
             token = read_secret(http.token_file, key="[http] token_file")
-        pages = (status_page, *self._pages)
+        pages = (status_page, self._outlets.history.page, *self._pages)
         return Door(self, address=http.address, port=http.port, token=token, pages=pages)
 
     @contextlib.contextmanager

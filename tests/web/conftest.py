@@ -30,7 +30,7 @@ def browser(_chromium):
 
 
 @pytest.fixture
-def served():
+def served(tmp_path):
     """The page, served by the daemon's own HTTP server from a story that the test tells."""
-    with PageServer() as server:
+    with PageServer(tmp_path) as server:
         yield server

@@ -8,6 +8,7 @@ from story import story
 
 from onboard.daemon.control import ControlServer
 from onboard.daemon.door import bound
+from onboard.daemon.history import History
 from onboard.errors import RefusedError
 from onboard.web.page import status_page
 
@@ -45,8 +46,10 @@ class Told:
 class PageServer:
     """``with PageServer() as served``; it can be stopped and started again on the same port."""
 
-    def __init__(self, *, token=None):
+    def __init__(self, folder, *, token=None):
         self.told = Told()
+        self.folder = folder
+        self.history = None
         self._token = token
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="page server")
@@ -75,11 +78,15 @@ class PageServer:
         self._on_loop(self._start())
 
     async def _start(self):
-        self._server = ControlServer(self.told, token=self._token, pages=(status_page,))
+        self.history = History(self.folder, clock=self._loop.time)
+        self.history.take(self.told.now)
+        pages = (status_page, self.history.page)
+        self._server = ControlServer(self.told, token=self._token, pages=pages)
         await self._server.start(self._socket)
 
     def stop(self):
         if self._server is not None:
+            self.history.save()
             self._on_loop(self._server.stop())
             self._socket.close()
             self._server = None
@@ -91,6 +98,7 @@ class PageServer:
         self._on_loop(self._publish())
 
     async def _publish(self):
+        self.history.take(self.told.now)
         self._server.publish()
 
     def viewers(self):

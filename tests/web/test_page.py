@@ -106,8 +106,8 @@ def test_a_refusal_is_shown_with_its_reason(browser, served):
     browser.expect_complaints("409")
 
 
-def test_a_token_is_asked_for_and_then_works(browser):
-    with PageServer(token="key") as served:
+def test_a_token_is_asked_for_and_then_works(browser, tmp_path):
+    with PageServer(tmp_path, token="key") as served:
         served.tell(story(160))
         browser.open(served.url)
         browser.element('[data-imu="1"] [data-action="approve"]').click()
@@ -197,6 +197,22 @@ def test_a_day_does_not_make_the_page_grow(browser, served):
         served.tell(story(second))
     browser.until_says("#glance-trust .detail", "3 min 20 s")
     assert browser.run("return document.getElementsByTagName('*').length") == before
+
+
+def test_charts_survive_a_reload_and_a_restart_of_the_service(browser, served):
+    for second in range(0, 161, 20):
+        served.tell(story(second))
+    browser.open(served.url)
+    browser.until_says("#axes-span", "2 min 20 s of trusted flight")
+    served.stop()
+    browser.until_says("#connection", "connection lost")
+    served.start()
+    browser.until_says("#connection", "live")
+    browser.expect_complaints(*STALE)
+    browser.open(served.url)
+    browser.until_says("#axes-span", "2 min 20 s of trusted flight")
+    served.tell(story(180))
+    browser.until_says("#axes-span", "2 min 40 s")
 
 
 @pytest.mark.parametrize("size", [PHONE, LAPTOP])

@@ -58,7 +58,7 @@ export class Chart {
       padding: [6, 4, 6, 0],
       legend: { show: false },
       cursor: { show: false },
-      scales: { x: { time: true }, y: { range: span } },
+      scales: { x: { time: false }, y: { range: span } },
       axes: [
         { show: false }, // the legend says how long it is
         { ...axis, size: 44, space: 28, grid: { stroke: line, width: 1 } },

@@ -20,14 +20,14 @@ export class History {
     this.provisional = false;
   }
 
-  /** Add a row; a time that does not advance is dropped. */
+  /** Add a row; one of the same time takes the place of the last. */
   add(row) {
-    if (this.provisional) this.rows.pop(); // the newest is always shown, even if not kept
     const last = this.rows.at(-1);
     if (last && row[0] <= last[0]) {
-      this.provisional = false;
+      if (row[0] === last[0]) this.rows[this.rows.length - 1] = row;
       return;
     }
+    if (this.provisional) this.rows.pop(); // the newest is always shown, even if not kept
     this.rows.push(row);
     this.skipped += 1;
     this.provisional = this.skipped < this.every && this.rows.length > 1;
@@ -36,6 +36,11 @@ export class History {
     if (this.rows.length >= this.limit) {
       this.rows = this.rows.filter((_, index) => index % 2 === 0);
       this.every *= 2;
+      if (this.rows.at(-1) !== row) {
+        this.rows.push(row);
+        this.provisional = true;
+        this.skipped = this.every / 2;
+      }
     }
   }
 
@@ -54,7 +59,10 @@ export class History {
   }
 }
 
-/** Histories by accelerometer; each row is time, then six values, six sigmas, six in force. */
+/**
+ * Histories by accelerometer; each row is trusted seconds, then six values, six sigmas, six in force.
+ * They go by trusted time: a vehicle that stands for days adds nothing.
+ */
 export class Remembered {
   constructor() {
     this.byImu = new Map();
@@ -66,15 +74,25 @@ export class Remembered {
     return this.byImu.get(imu);
   }
 
+  /** Begin with what the service remembers (GET /api/history). */
+  load({ imus }) {
+    for (const { imu, rows } of imus) {
+      const history = this.of(imu);
+      history.clear();
+      for (const [, trusted, value, sigma, inForce] of rows) history.add([trusted, ...value, ...sigma, ...inForce]);
+    }
+  }
+
   /** Take a snapshot in; what was learned being forgotten begins the history anew. */
   take(snapshot) {
     for (const view of snapshot.imus) {
       const history = this.of(view.imu);
       if (view.trusted_s + 1 < (this.trusted.get(view.imu) ?? 0)) history.clear();
       this.trusted.set(view.imu, view.trusted_s);
+      if (view.trusted_s <= 0) continue;
       const c = view.calibration;
       history.add([
-        snapshot.time,
+        view.trusted_s,
         ...c.scale, ...c.offset,
         ...c.scale_sigma, ...c.offset_sigma,
         ...view.in_force_scale, ...view.in_force_offset,

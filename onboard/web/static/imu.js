@@ -77,7 +77,7 @@ export class Imus {
     if (view === undefined) return;
     for (const axis of this.axes) axis.show(view);
     const seconds = this.remembered.of(view.imu).seconds;
-    say(byId("axes-span"), seconds > 0 ? `the last ${duration(seconds)}` : "");
+    say(byId("axes-span"), seconds > 0 ? `over ${duration(seconds)} of trusted flight` : "");
     say(byId("imu-note"), view.calibration.note);
     this.showResidual(view);
     this.redraw();

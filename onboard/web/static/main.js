@@ -59,9 +59,22 @@ function showBanner() {
   say(byId("banner"), text);
 }
 
+/** Charts begin with what the service remembers, also after its restart. */
+async function recall() {
+  try {
+    const response = await fetch("/api/history");
+    if (!response.ok) return;
+    remembered.load(await response.json());
+    imus.redraw();
+  } catch {
+    // Without it the charts begin here.
+  }
+}
+
 function showState(next) {
   if (next === state) return;
   state = next;
+  if (next === "live") recall();
   document.body.classList.toggle("stale", next === "lost");
   const pill = byId("connection");
   say(pill, next === "lost" ? "connection lost" : next);

@@ -1,0 +1,119 @@
+"""The memory behind the charts: bounded, whole in time, gone with what was learned."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+from blank_snapshot import blank_snapshot
+from daemons import calibration
+from hypothesis import given
+from hypothesis import strategies as st
+
+from onboard.daemon.history import ROWS_MAX, SAVE_S, History, Ring, Row
+from onboard.daemon.view import imu_view
+
+SIX = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def row(trusted: float, value: float = 1.0) -> Row:
+    return Row(1.0e9 + trusted, trusted, (value, *SIX[1:]), SIX, SIX)
+
+
+@given(st.lists(st.floats(0.1, 50.0), min_size=1, max_size=600), st.integers(4, 40))
+def test_a_ring_keeps_first_and_newest_in_order_within_its_budget(steps, limit):
+    ring, now = Ring(), 0.0
+    first = steps[0]
+    for step in steps:
+        now += step
+        assert ring.add(row(now), limit)
+        assert len(ring.rows) <= limit
+        assert ring.rows[-1].trusted_s == now
+    times = [r.trusted_s for r in ring.rows]
+    assert times == sorted(times)
+    assert times[0] == first
+
+
+def test_standing_still_adds_nothing_but_shows_what_changed():
+    ring = Ring()
+    assert ring.add(row(10.0))
+    for _ in range(1000):
+        assert not ring.add(row(10.0))
+    assert ring.add(row(10.0, 1.02))
+    assert [r.value[0] for r in ring.rows] == [1.02]
+
+
+def test_what_was_forgotten_leaves_no_curve():
+    ring = Ring()
+    for t in range(1, 500):
+        ring.add(row(float(t)))
+    ring.add(row(5.0))
+    assert [r.trusted_s for r in ring.rows] == [5.0]
+    assert ring.every == 1
+
+
+def seen(trusted: float, system_id: int = 1):
+    blank = blank_snapshot()
+    link = msgspec.structs.replace(blank.link, system_id=system_id)
+    view = msgspec.structs.replace(imu_view(calibration()), trusted_s=trusted)
+    return msgspec.structs.replace(blank, link=link, imus=(view,), time=trusted)
+
+
+@pytest.fixture
+def clock():
+    class Clock:
+        now = 0.0
+
+        def __call__(self) -> float:
+            return self.now
+
+    return Clock()
+
+
+def flown(folder: Path, clock, seconds: range, system_id: int = 1) -> History:
+    history = History(folder, clock=clock)
+    for t in seconds:
+        history.take(seen(float(t), system_id))
+    return history
+
+
+def times(history: History) -> list[float]:
+    return [r.trusted_s for imu in history.document().imus for r in imu.rows]
+
+
+def test_it_goes_on_after_a_restart(tmp_path, clock):
+    before = flown(tmp_path, clock, range(1, 20))
+    before.save()
+    assert times(flown(tmp_path, clock, range(20, 25))) == [float(t) for t in range(1, 25)]
+    assert times(flown(tmp_path, clock, range(5, 6), system_id=2)) == [5.0]
+
+
+def test_it_is_on_the_disk_now_and_then_and_only_if_there_is_something_new(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 3))
+    file = tmp_path / "history-1.bin"
+    assert not file.exists()
+    clock.now = SAVE_S
+    history.take(seen(3.0))
+    assert file.exists()
+    file.unlink()
+    clock.now = 3.0 * SAVE_S
+    history.take(seen(3.0))
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"junk", msgspec.msgpack.encode({"schema": "other"})])
+def test_a_damaged_file_is_begun_anew(tmp_path, clock, content):
+    (tmp_path / "history-1.bin").write_bytes(content)
+    assert times(flown(tmp_path, clock, range(7, 9))) == [7.0, 8.0]
+
+
+def test_a_disk_that_takes_nothing_stops_nothing(tmp_path, clock):
+    history = flown(tmp_path / "absent", clock, range(1, 3))
+    history.save()
+    assert times(history) == [1.0, 2.0]
+
+
+def test_the_document_of_five_accelerometers_is_small(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 2 * ROWS_MAX))
+    assert 5 * len(msgspec.json.encode(history.document())) < 300_000
