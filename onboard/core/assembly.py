@@ -212,6 +212,7 @@ class Assembly:
             self._rotation(angles, parameters),
             parameters.R_bs,
             flat,
+            parameters.lever_arm(imu),
         )
 
     def _rotation(self, angles: Array, parameters: ParametersInForce) -> Array:

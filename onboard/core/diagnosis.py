@@ -71,7 +71,11 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
     """
     engine = calibrator.engine(imu)
     chunks = engine.chunks
-    origin = Origin(t0=calibrator.first_sample)
+    antenna = calibrator.parameters.antenna
+    origin = Origin(
+        t0=calibrator.first_sample,
+        antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
+    )
     told = calibrator.parameters.gps_delay_told
     everything = catalogue(origin)
     testable, absent = _testable(everything, chunks)

@@ -81,6 +81,19 @@ class ParametersInForce:
         )
 
     @property
+    def antenna(self) -> Array:
+        """(3,) place of the GPS antenna as it was told, body axes, m."""
+        return np.array(
+            [self.get(f"GPS1_POS_{a}", f"GPS_POS1_{a}", default=0.0) for a in "XYZ"], dtype=float
+        )
+
+    def lever_arm(self, imu: int) -> Array:
+        """(3,) from the accelerometer to the antenna as both were told, body axes, m."""
+        own = np.array([self.get(f"INS_POS{imu}_{a}", default=0.0) for a in "XYZ"])
+        out: Array = self.antenna - own
+        return out
+
+    @property
     def imu_delay(self) -> float:
         """Delay of the accelerometer by its declared low-pass, s."""
         return filter_delay(self.get("INS_ACCEL_FILTER", default=DEFAULT_FILTER_HZ))

@@ -336,9 +336,10 @@ class Pass:
     ) -> list[Epoch]:
         R_att, near = stretch.attitude_at(around.now.t)
         kappa = mean_weights(around.offset, self.point.window)
-        smooth = np.einsum("j,kja->ka", kappa, around.f_epoch)
+        known = np.einsum("j,kja->ka", kappa, around.f_epoch)
+        known += np.cross(around.now.w_b, stretch.lever_arm_b)
         a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
-        smooth_height = -a_down * self.point.window**2 / 24.0
+        known_height = -a_down * self.point.window**2 / 24.0 - R_att[:, 2] @ stretch.lever_arm_b
         return [
             Epoch(
                 float(around.now.t[e]),
@@ -346,8 +347,8 @@ class Pass:
                 float(fixes.height[e]),
                 float(fixes.latitude[e]),
                 R_att[e] if near[e] else None,
-                smooth[e],
-                float(smooth_height[e]),
+                known[e],
+                float(known_height[e]),
                 c.velocity_body[e],
                 c.velocity_ned[e],
                 c.position_body[e],

@@ -12,6 +12,11 @@ from onboard.core.interpolation import Hermite
 
 Array = NDArray[np.float64]
 
+DENSE_S = 0.15
+"""Attitude samples this close together can be interpolated: between sparser ones a vehicle turns
+in ways that they do not show."""
+NEAR_S = 0.02
+
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
@@ -43,6 +48,7 @@ class Stretch:
         R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
         R_bs: (3, 3) board orientation.
         slow: other signals by name: times (j,) and values (j,) or (j, 3).
+        lever_arm_b: (3,) from the accelerometer to the GPS antenna as it was told, m.
     """
 
     t: Array
@@ -52,6 +58,7 @@ class Stretch:
     R_attitude: Array
     R_bs: Array
     slow: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
 
     def interpolant(self) -> Hermite:
         """Interpolant of (rate, raw) stacked to (n, 6)."""
@@ -67,11 +74,11 @@ class Stretch:
         return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
 
     def attitude_at(self, at: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Recorded attitude at ``at`` (m,), and where samples within 0.3 s bracket it."""
+        """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it."""
         R = interpolate_rotation(at, self.t_attitude, self.R_attitude)
         i = np.clip(np.searchsorted(self.t_attitude, at) - 1, 0, max(len(self.t_attitude) - 2, 0))
         if len(self.t_attitude) < 2:
             return R, np.zeros(len(at), dtype=bool)
         t0, t1 = self.t_attitude[i], self.t_attitude[i + 1]
-        near = (t1 - t0 < 0.3) & (at >= t0) & (at <= t1)
-        return R, near
+        near = (t1 - t0 < DENSE_S) | (np.minimum(at - t0, t1 - at) < NEAR_S)
+        return R, near & (at >= t0) & (at <= t1)

@@ -72,15 +72,19 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What one GPS epoch measures, and the direct columns there."""
+    """What one GPS epoch measures, and the direct columns there.
+
+    ``known_body`` (m/s) and ``known_height`` (m) are what the report differs by, as far as known:
+    the receiver's averaging and the place of its antenna.
+    """
 
     t: float
     velocity: Array
     height: float
     latitude: float
     R_attitude: Array | None
-    smooth_body: Array
-    smooth_height: float
+    known_body: Array
+    known_height: float
     velocity_body: Array
     velocity_ned: Array
     position_body: Array
@@ -216,9 +220,9 @@ class WhiteningFilter:
         self.t = epoch.t
         X, P = np.zeros_like(self._X), np.zeros_like(self._P)
         velocity = np.where(np.isnan(epoch.velocity), 0.0, epoch.velocity)
-        X[:, V, 0] = velocity - R_nb @ epoch.smooth_body
+        X[:, V, 0] = velocity - R_nb @ epoch.known_body
         X[:, V, 1:] = -(R_nb @ epoch.velocity_body + epoch.velocity_ned)
-        X[:, H, 0] = epoch.height - epoch.smooth_height
+        X[:, H, 0] = epoch.height - epoch.known_height
         X[:, H, 1:] = (
             R_nb[2] @ epoch.position_body
             + epoch.position_ned[2]
@@ -423,12 +427,12 @@ class WhiteningFilter:
         at = 0
         if use_v:
             n = kinds.count("v")
-            E[:, :n, 0] += (epoch.velocity - R @ epoch.smooth_body)[:n]
+            E[:, :n, 0] += (epoch.velocity - R @ epoch.known_body)[:n]
             E[:, :n, 1:] += (R @ epoch.velocity_body + epoch.velocity_ned)[:n]
             at = n
         if use_h:
             v_down = float(X[0, 2, 0] + X[0, 2, 1:] @ theta)
-            E[:, at, 0] += epoch.height - epoch.smooth_height
+            E[:, at, 0] += epoch.height - epoch.known_height
             E[:, at, 1:] -= (
                 R[2] @ epoch.position_body + epoch.position_ned[2] + v_down * epoch.along_velocity
             )

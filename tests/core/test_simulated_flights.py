@@ -13,7 +13,7 @@ from onboard.core.tracks import untruncated
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
 from sitl import recording
-from sitl.builtin.truth import ImuTruth
+from sitl.builtin.truth import GpsTruth, ImuTruth
 from sitl.recording import FlightSpec
 
 TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
@@ -21,8 +21,8 @@ RATES = {"VFR_HUD": 0, "VIBRATION": 0, "BATTERY_STATUS": 0, "GLOBAL_POSITION_INT
 MOVED = {"scale": (0.98, 1.01, 1.03), "offset": (-0.1, 0.2, 0.4)}
 
 
-def flown(vehicle, duration, *, dull=False):
-    spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(TRUE,), rates=RATES, dull=dull)
+def flown(vehicle, duration, *, rates=RATES, **more):
+    spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(TRUE,), rates=rates, **more)
     parser, decoder = mav.MAVLink(None), Decoder(system=1, component=1)
     messages = (m for _, frame in recording.fly(spec) for m in parser.parse_buffer(frame))
     samples = [s for m in messages for s in decoder.decode(m)]
@@ -108,6 +108,43 @@ def test_the_truth_comes_out(long):
     assert abs(told.value - delay) < max(0.005, 4.0 * told.sigma)
     assert got.whitened_rms_after < got.whitened_rms_before
     assert got.held_out_after < got.held_out_before
+
+
+ANTENNA = (0.6, -0.2, -0.4)
+PLACES = {
+    "antenna": {f"GPS1_POS_{a}": x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "old name": {f"GPS_POS1_{a}": x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "accelerometer": {f"INS_POS1_{a}": -x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "untold": {},
+}
+
+
+@pytest.fixture(scope="module")
+def long_armed():
+    """A flight with its antenna far from the accelerometer, the autopilot's parameters left out."""
+    samples, _ = flown("copter", 120.0, gps=GpsTruth(antenna=ANTENNA))
+    return [s for s in samples if not (isinstance(s, ParameterValue) and "_POS" in s.name)]
+
+
+@pytest.mark.parametrize("told", PLACES)
+def test_an_antenna_whose_place_is_told_does_no_harm(long_armed, told):
+    """The receiver reports its antenna's velocity; nobody but the estimator moves it."""
+    places = [ParameterValue(name, x) for name, x in PLACES[told].items()]
+    got = calibrated([*places, *long_armed])
+    if told != "untold":
+        assert_true(got)
+        return
+    error = np.abs(np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset))
+    assert error[:3].max() > 0.01  # it matters
+
+
+def test_a_sparse_attitude_is_not_interpolated():
+    """At 4 Hz a copter tips over and back between two samples."""
+    samples, delay = flown("copter", 150.0, rates=RATES | {"ATTITUDE": 4.0}, seed=7)
+    got = calibrated(samples)
+    assert_true(got)
+    told = got.timing["gps_delay_s"]
+    assert abs(told.value - delay) < 3.0 * told.sigma
 
 
 def test_repeated_and_late_samples_change_nothing(short, of_short):

@@ -18,10 +18,11 @@ AXES = "xyz"
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Reference points of a recording: effects that grow count from here."""
+    """What effects count from: times, temperatures, and places as the autopilot was told them."""
 
     t0: float
     temperature: float = 35.0
+    antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class EffectColumns(Family):

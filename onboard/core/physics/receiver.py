@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class LeverArm(EffectColumns):
-    """Antenna away from the IMU: its velocity has the part of the rotation."""
+    """Antenna away from where it was told to be: its velocity has a part of the rotation."""
 
     name = effect = "gps_lever_arm"
     source = "rigid body: v_antenna = v + R (w x r)"
@@ -25,8 +25,8 @@ class LeverArm(EffectColumns):
     unknowns = tuple(Unknown(f"lever_{a}", "m", 0.0, 2.0) for a in AXES)
 
     def __init__(self, origin: Origin) -> None:
-        """No reference is needed."""
-        del origin
+        """Take the place that was told."""
+        self._told = origin.antenna
 
     def velocity(self, around: Around) -> Direct:
         """``R (w x e_i)``."""
@@ -39,8 +39,11 @@ class LeverArm(EffectColumns):
         return Direct(body=np.broadcast_to(np.eye(3), (len(around.now.t), 3, 3)))
 
     def parameters(self, values: dict[str, float]) -> dict[str, float]:  # type: ignore[override] # narrower on purpose
-        """Antenna position against the IMU, which is taken as the body's origin."""
-        return {f"GPS1_POS_{a.upper()}": values[a] for a in AXES}
+        """Where the antenna is: as told, and what was found on top of it."""
+        return {
+            f"GPS1_POS_{a.upper()}": told + values[a]
+            for a, told in zip(AXES, self._told, strict=True)
+        }
 
 
 class ClockSkew(EffectColumns):
