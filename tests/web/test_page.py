@@ -2,6 +2,7 @@
 
 import re
 
+import msgspec
 import pytest
 from browsing import LAPTOP, PHONE
 from page_server import PageServer
@@ -135,6 +136,44 @@ def test_a_restart_of_the_service_is_said_and_survived(browser, served):
     browser.until_says("#glance-calibration .headline", "Calibrated")
     assert browser.element("#banner").get_attribute("hidden") is not None
     browser.expect_complaints(*STALE)
+
+
+@pytest.mark.parametrize(
+    ("held_back", "headline", "detail"),
+    [
+        (
+            {"disarmed_too_short": "disarmed for 1 s", "not_calibrated": "it is collecting"},
+            "Nothing to write yet",
+            "IMU 1, IMU 2 not calibrated yet",
+        ),
+        ({"armed": "armed, and landed is needed"}, "Written after landing", "IMU 1, IMU 2; armed"),
+        (
+            {"armed": "armed", "sigma_too_large": "INS_ACCSCAL_X: sigma is above"},
+            "Held back",
+            "INS_ACCSCAL_X: sigma is above",
+        ),
+        (
+            {"armed": "armed", "physics_missing": "GPS is late (83 %)"},
+            "Held back by the diagnosis",
+            "IMU 1: GPS is late (83 %)",
+        ),
+        ({"nothing_to_change": "no value differs"}, "Nothing to write", ""),
+    ],
+)
+def test_of_many_reasons_the_telling_one_is_in_the_glance(
+    browser, served, held_back, headline, detail
+):
+    push = story(160).push
+    proposals = tuple(
+        msgspec.structs.replace(proposal, held_back=held_back) for proposal in push.proposals
+    )
+    served.tell(
+        story(160),
+        push=msgspec.structs.replace(push, approval_needed=False, proposals=proposals),
+    )
+    browser.open(served.url)
+    assert browser.text("#glance-push .headline") == headline
+    assert browser.text("#glance-push .detail").startswith(detail)
 
 
 def test_diagnosis_in_words(browser, served):

@@ -68,7 +68,7 @@ export class Chart {
         { stroke: colour("--estimate"), width: 1.8, points: { show: false } },
         edge,
         edge,
-        { stroke: colour("--in-force"), width: 1.5, dash: [5, 4], points: { show: false } },
+        { stroke: colour("--in-force"), width: 1.5, dash: [5, 4], points: { show: false }, paths: window.uPlot.paths.stepped({ align: 1 }) },
       ],
       bands: [{ series: [3, 2], fill: colour("--band") }],
     };

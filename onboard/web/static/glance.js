@@ -3,6 +3,9 @@
 import { byId, say, tone } from "./dom.js";
 import { capital, duration, reasonInWords, statusInWords } from "./words.js";
 
+/** Reasons that go away by themselves once the vehicle stands disarmed. */
+const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
+
 function tell(id, headline, detail, kind) {
   const article = byId(id);
   say(article.querySelector(".headline"), headline);
@@ -37,7 +40,7 @@ function showCalibration(imus) {
   const done = imus.filter((imu) => imu.status === "calibrated").length;
   const kind = imus.some((imu) => imu.status === "invalid") ? "bad" : done === imus.length ? "good" : "warn";
   const headline = done === imus.length ? "Calibrated" : done ? `${done} of ${imus.length} calibrated` : capital(statusInWords(imus[0].status)[0]);
-  const detail = imus.map((imu) => `IMU ${imu.imu} ${statusInWords(imu.status)[0]}, ${Math.round(imu.coverage.percent)} % covered`).join("; ");
+  const detail = imus.map((imu) => `IMU ${imu.imu}: ${imu.calibration.observable.filter(Boolean).length} of 6 numbers, ${Math.round(imu.coverage.percent)} % covered`).join("; ");
   tell("glance-calibration", headline, detail, kind);
 }
 
@@ -59,6 +62,14 @@ function showPush(push) {
   const done = push.can_roll_back.length ? `written: ${push.can_roll_back.map((imu) => `IMU ${imu}`).join(", ")}` : "";
   if (real.length === 0) return tell("glance-push", push.can_roll_back.length ? "Up to date" : "Nothing to write", done, push.can_roll_back.length ? "good" : "");
   if (real.every((p) => p.rejected)) return tell("glance-push", "Rejected", named(real), "");
-  const why = Object.values((real.find((p) => !p.rejected) ?? real[0]).held_back)[0];
-  tell("glance-push", "Held back", [why, done].filter(Boolean).join("; "), "");
+  const open = real.filter((p) => !p.rejected);
+  const has = (p, name) => name in p.held_back;
+  const sentence = (p) => Object.entries(p.held_back).find(([name]) => !SOON.includes(name))?.[1];
+  const also = (...parts) => [...parts, done].filter(Boolean).join("; ");
+  if (open.every((p) => has(p, "not_calibrated"))) return tell("glance-push", "Nothing to write yet", also(`${named(open)} not calibrated yet`), "");
+  const missing = open.find((p) => has(p, "physics_missing"));
+  if (missing) return tell("glance-push", "Held back by the diagnosis", also(`IMU ${missing.imu}: ${missing.held_back.physics_missing}`), "bad");
+  const soon = open.filter((p) => sentence(p) === undefined);
+  if (soon.length) return tell("glance-push", push.policy === "in_flight" ? "Waits for its moment" : "Written after landing", also(named(soon), Object.values(soon[0].held_back)[0]), "");
+  tell("glance-push", "Held back", also(sentence(open.find((p) => !has(p, "not_calibrated")))), "");
 }

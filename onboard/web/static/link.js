@@ -3,6 +3,7 @@
 import { byId, h, renew } from "./dom.js";
 import { clockTime, fixed, plain, vehicleInWords } from "./words.js";
 
+const ABSENT = ["unsupported", "silent"];
 const SLOW = 0.7; // of the rate that was granted
 
 export function showLink(link) {
@@ -34,13 +35,14 @@ function ratesTable(rates) {
       { class: "rates" },
       h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Message" }), h("th", { scope: "col", class: "number", text: "Hz" }), h("th", { scope: "col", class: "number", text: "asked for" }))),
       h("tbody", {}, ...rates.map(([name, rate, wanted, stream]) => {
-        const slow = wanted !== null && rate < SLOW * wanted;
+        const absent = ABSENT.includes(stream) && rate === 0; // the autopilot has no such thing
+        const slow = wanted !== null && !absent && rate < SLOW * wanted;
         return h(
           "tr",
           {},
           h("td", { class: "name", text: name }),
-          h("td", { class: `number ${slow ? "warn" : ""}`, text: fixed(rate, 1) + (slow ? " (slow)" : "") }),
-          h("td", { class: "number soft", text: wanted === null ? "" : fixed(wanted, 1) + (stream === "granted" || stream === null ? "" : ` (${plain(stream)})`) }),
+          h("td", { class: `number ${slow ? "warn" : ""}`, text: absent ? "none" : fixed(rate, 1) + (slow ? " (slow)" : "") }),
+          h("td", { class: "number soft", text: wanted === null ? "" : fixed(wanted, 1) + (stream === "granted" || stream === "flowing" || stream === null ? "" : ` (${plain(stream)})`) }),
         );
       })),
     ),
