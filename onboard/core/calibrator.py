@@ -36,7 +36,7 @@ from onboard.core.samples import (
 )
 from onboard.core.saving import SavedEngine, dump, load
 from onboard.core.settings import EstimatorSettings
-from onboard.core.trust import TrustWindow, WindowClosed, WindowOpened
+from onboard.core.trust import Reason, TrustWindow, WindowClosed, WindowOpened
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,8 @@ class Calibrator:
             if not np.isfinite(self._first):
                 self._first = sample.t
             self._assembly.imu(sample, self.parameters)
-            return events
+            # A receiver that fell silent says nothing more: only the passing of time shows it.
+            return events + self._judged(sample)
         if isinstance(sample, AttitudeSample):
             if self._ahead(sample.t):
                 self._counts["attitude_ahead"] += 1
@@ -152,7 +153,7 @@ class Calibrator:
         if isinstance(sample, EkfBias):
             self.ekf_bias[sample.core] = sample
             return ()
-        events = tuple(self._trust.feed(sample))
+        events = self._judged(sample)
         if isinstance(sample, VehicleState):
             events += self._vehicle(sample)
         return events
@@ -269,13 +270,21 @@ class Calibrator:
         """True for a stamp that the inertial stream is too far from reaching."""
         return bool(np.isfinite(self._newest)) and t - self._newest > AHEAD_OF_IMU_S
 
+    def _judged(self, sample: Sample) -> tuple[Event, ...]:
+        """What the trust window says; outages are counted, for no fix is there to be refused."""
+        events = self._trust.feed(sample)
+        for event in events:
+            if isinstance(event, WindowClosed) and event.reason is Reason.GPS_GAP:
+                self._counts[event.reason.value] += 1
+        return events
+
     def _fix(self, fix: GpsFix) -> tuple[Event, ...]:
         if abs(fix.t - self._newest) > OTHER_CLOCK_S and np.isfinite(self._newest):
             # Its clock is not the boot clock (another source, or garbage); a reboot shows in the
             # inertial samples first.
             self._counts["gps_other_clock"] += 1
             return ()
-        events = tuple(self._trust.feed(fix))
+        events = self._judged(fix)
         if self._trust.receiver not in (None, fix.receiver):
             return events
         if self._ahead(fix.t):
