@@ -94,12 +94,36 @@ class Around:
         signals: at the nodes, S = (K, 2 J + 1).
         f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
         now: signals at the epochs, S = (K,).
+        swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
+            span that it averages, body axes of the epoch, 1/s.
     """
 
     offset: Array
     signals: Signals
     f_epoch: Array
     now: Signals
+    swing: Array
+
+
+def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
+    """Mean of ``d P / dt`` over the span: ``(P(window/2) - P(-window/2)) / window``.
+
+    Args:
+        offset: (n,) of the nodes, s.
+        P: (K, n, 3, 3) attitude there against that of the epoch.
+        w_b: (K, 3) rate at the epoch.
+        window: s; below two nodes the rate at the epoch does.
+    """
+    step = float(offset[1] - offset[0])
+    if window < 2.0 * step:
+        return np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
+    at = (min(window / 2.0, float(offset[-1])) - offset[0]) / step
+    low = min(int(at), len(offset) - 2)
+    share = at - low
+    after = (1.0 - share) * P[:, low] + share * P[:, low + 1]
+    before = (1.0 - share) * P[:, -1 - low] + share * P[:, -2 - low]
+    out: Array = (after - before) / (2.0 * (offset[0] + at * step))
+    return out
 
 
 def simpson_weights(count: int) -> Array:
@@ -191,8 +215,8 @@ class NodeMaker:
         to_end = weight * (1.0 - share[::2]) * T[:, None]
         return Intervals(coarse, P, T, weight, to_end)
 
-    def around(self, epoch: Array) -> Around:
-        """Nodes around ``epoch`` (K,)."""
+    def around(self, epoch: Array, window: float = 0.0) -> Around:
+        """Nodes around ``epoch`` (K,) of a receiver that averages over ``window``, s."""
         J = AROUND_COUNT
         offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
         fine = self.signals(epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1))
@@ -216,7 +240,7 @@ class NodeMaker:
         now = Signals(
             nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._stretch
         )
-        return Around(offset, nodes, f_epoch, now)
+        return Around(offset, nodes, f_epoch, now, _swing(offset, P, now.w_b, window))
 
     def _attitude(self, t: Array) -> Array:
         flat = interpolate_rotation(t.ravel(), self._stretch.t_attitude, self._stretch.R_attitude)

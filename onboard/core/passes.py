@@ -216,7 +216,7 @@ class Pass:
         )
         start, end, measured = _subdivide(epoch_t)
         intervals = maker.intervals(start, end)
-        around = maker.around(epoch_t)
+        around = maker.around(epoch_t, self.point.window)
         columns = self.model.columns(intervals, around)
         epochs = self._epoch_list(stretch, fixes, trusted, around, columns)
         result = PassResult(Portion(float(epoch_t[0]), float(epoch_t[-1]), NormalSums.zeros(0)))
@@ -337,7 +337,7 @@ class Pass:
         R_att, near = stretch.attitude_at(around.now.t)
         kappa = mean_weights(around.offset, self.point.window)
         known = np.einsum("j,kja->ka", kappa, around.f_epoch)
-        known += np.cross(around.now.w_b, stretch.lever_arm_b)
+        known += around.swing @ stretch.lever_arm_b
         a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
         known_height = -a_down * self.point.window**2 / 24.0 - R_att[:, 2] @ stretch.lever_arm_b
         return [

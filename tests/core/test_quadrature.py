@@ -125,6 +125,19 @@ def test_around_an_epoch_forces_are_in_its_axes():
     assert np.abs(made.now.f_b - force(epoch)).max() < 2e-4
 
 
+@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_lever_arm_is_seen_as_the_receiver_averages_it(window, recorded):
+    """Against the mean of ``R (w x arm)`` over the span, by brute force."""
+    epoch, arm = np.array([0.4, 1.5, 2.6]), np.array([0.5, -0.3, 0.8])
+    made = maker(100.0, recorded=recorded).around(epoch, window)
+    for k, t in enumerate(epoch):
+        fine = t + np.linspace(-window / 2, window / 2, 2001)
+        swing = np.einsum("nij,nj->ni", attitude(fine), np.cross(rates(fine), arm))
+        mean = attitude(epoch[k : k + 1])[0].T @ swing.mean(axis=0)
+        np.testing.assert_allclose(made.swing[k] @ arm, mean, atol=4e-3)
+
+
 def test_bias_is_subtracted_and_the_six_applied():
     t = jittered(100.0)
     six = np.array([1.1, 0.9, 1.2, 0.3, -0.2, 0.1])

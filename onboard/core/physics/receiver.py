@@ -29,10 +29,8 @@ class LeverArm(EffectColumns):
         self._told = origin.antenna
 
     def velocity(self, around: Around) -> Direct:
-        """``R (w x e_i)``."""
-        w = around.now.w_b
-        body = np.stack([np.cross(w, e) for e in np.eye(3)], axis=-1)
-        return Direct(body=body)
+        """``R (w x e_i)``, averaged as the receiver does."""
+        return Direct(body=around.swing)
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
