@@ -1,8 +1,10 @@
-"""Makes the pictures of the status page that the README shows, from the demo.
+"""Makes the pictures that the README shows: the status page during the demo, and a report.
 
     python docs/screenshots.py [FOLDER]
 
-Needs a checkout with the development extras, chromium and chromedriver on PATH, and Pillow.
+The demo runs in real time, so that charts have as many points as they have in a real flight: it
+takes about ten minutes.  Needs a checkout with the development extras, chromium and chromedriver
+on PATH, and Pillow.
 """
 
 from __future__ import annotations
@@ -27,8 +29,15 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 
+from sitl.builtin.truth import ImuTruth
+from sitl.recording import FlightSpec, write_tlog
+
 Shot = tuple[str, int, int, str]
-LIMIT_S = 300.0
+LIMIT_S = 900.0
+FLIGHT_S = 300.0
+SHOWN_AFTER_S = 170.0
+"""Trusted flight after which the page in flight is taken."""
+FLOWN_AGAIN_S = 40.0
 BYTES_MAX = 150_000
 COLOURS = 96
 FLAGS = (
@@ -44,6 +53,7 @@ IN_FLIGHT: tuple[Shot, ...] = (
     ("status-phone-dark.png", 390, 844, "dark"),
 )
 WRITTEN: tuple[Shot, ...] = (("written-laptop-dark.png", 1440, 900, "dark"),)
+REPORT: Shot = ("report-laptop.png", 1180, 1000, "light")
 
 
 def main(folder: Path) -> None:
@@ -54,12 +64,27 @@ def main(folder: Path) -> None:
     with _demo(port) as demo, _browser() as browser:
         _until(demo, lambda: _snapshot(url) is not None)
         browser.get(url)
-        _until(demo, lambda: any(i["status"] == "calibrated" for i in _imus(url)))
+        _until(demo, lambda: _trusted(url) > SHOWN_AFTER_S)
         for shot in IN_FLIGHT:
             _take(browser, folder, shot)
-        _until(demo, lambda: bool((_snapshot(url) or {}).get("push", {}).get("can_roll_back")))
+        _until(demo, lambda: len(_written(url)) == len(_imus(url)) > 0)
+        landed = _trusted(url)
+        _until(demo, lambda: _trusted(url) > landed + FLOWN_AGAIN_S)
         for shot in WRITTEN:
             _take(browser, folder, shot)
+        with tempfile.TemporaryDirectory() as scratch:
+            browser.get(_report(Path(scratch)).as_uri())
+            _take(browser, folder, REPORT)
+
+
+def _report(scratch: Path) -> Path:
+    """The page of a replay of a simulated flight."""
+    log, page = scratch / "flight.tlog", scratch / "flight.html"
+    truth = ImuTruth(scale=(1.021, 0.986, 1.013), offset=(0.21, -0.15, 0.3))
+    write_tlog(FlightSpec(vehicle="plane", duration=260.0, imus=(truth,), seed=3), log)
+    command = [sys.executable, "-m", "onboard", "replay", str(log), "--report", str(page)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - ours
+    return page
 
 
 def _take(browser: webdriver.Chrome, folder: Path, shot: Shot) -> None:
@@ -96,6 +121,16 @@ def _imus(url: str) -> list[dict[str, Any]]:
     return [] if snapshot is None else list(snapshot["imus"])
 
 
+def _trusted(url: str) -> float:
+    """Least trusted flight that an accelerometer's answer rests on, s."""
+    return min((float(imu["trusted_s"]) for imu in _imus(url)), default=0.0)
+
+
+def _written(url: str) -> list[int]:
+    snapshot = _snapshot(url)
+    return [] if snapshot is None else list(snapshot["push"]["can_roll_back"])
+
+
 def _until(demo: subprocess.Popen[bytes], condition: Callable[[], bool]) -> None:
     end = time.monotonic() + LIMIT_S
     while not condition():
@@ -115,7 +150,8 @@ def _free_port() -> int:
 
 @contextmanager
 def _demo(port: int) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, "-m", "onboard", "demo", "--port", str(port)]
+    flight = ("--speedup", "1", "--duration", str(FLIGHT_S))
+    command = [sys.executable, "-m", "onboard", "demo", "--port", str(port), *flight]
     demo = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # noqa: S603 - ours
     try:
         yield demo

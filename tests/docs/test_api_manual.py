@@ -35,7 +35,7 @@ class Actions:
     def snapshot(self) -> Snapshot:
         return blank_snapshot()
 
-    async def _ask(self, imus: tuple[int, ...]) -> str:
+    async def _ask(self, imus: tuple[int, ...], **_more: bool) -> str:
         if self.failure is not None:
             raise self.failure
         return f"done for {imus}"
