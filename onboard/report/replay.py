@@ -133,6 +133,8 @@ def _sentences(c: Calibration, f: Figures, autopilot: str) -> tuple[str, str, st
         do = f"Set the observed parameters below. For the others: {fly}."
     else:
         do = f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
+        if "onboard explain" in c.note:
+            do = f"Ask onboard explain what is missing. {do}"
     return what, sure, do
 
 

@@ -88,6 +88,8 @@ def number(value: float, digits: int = 3) -> str:
     if value == 0.0:
         return "0"
     places = digits - 1 - math.floor(math.log10(abs(value)))
+    if places < 0 and abs(value) < 1e6:
+        return f"{float(f'{value:.{digits}g}'):.0f}".replace("-", "−")
     if places < 0 or abs(value) < 1e-4:
         return f"{value:.{digits}g}".replace("-", "−")
     return f"{value:.{min(places, 7)}f}".replace("-", "−")

@@ -17,6 +17,7 @@ from onboard.core.observability import SIX_NAMES
 from onboard.core.result import Estimate, Status
 from onboard.replay import replay
 from onboard.report.replay import replay_html
+from onboard.report.words import seconds
 from sitl import recording
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec
@@ -134,3 +135,16 @@ def test_what_is_not_known_is_said_in_words(told):
     assert not re.search(r"\b(nan|inf)\b", html, re.IGNORECASE)
     assert "no data to draw" in page.words
     assert "not known" in page.words
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "said"),
+    [
+        (0.4512, 0.2213, "451 ± 220 ms"),
+        (0.0811, 0.0021, "81.1 ± 2.1 ms"),
+        (-0.0176, 0.0007, "−17.60 ± 0.70 ms"),
+        (0.0567, math.inf, "56.7 ms"),
+    ],
+)
+def test_times_are_said_in_the_digits_that_their_sigma_supports(value, sigma, said):
+    assert seconds(value, sigma) == said
