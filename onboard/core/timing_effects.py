@@ -133,15 +133,16 @@ def fault_effect(
         elif run and t - run[-1] > 2.0:
             off = [refused[u] for u in run if u in refused]
             mean = np.median(np.array(off), axis=0) if off else None
-            size = np.inf if mean is None else float(np.linalg.norm(mean))
+            # A noisy receiver errs to all sides: the mean of its errors says nothing.
+            size = np.inf if mean is None else float(np.median(np.linalg.norm(off, axis=1)))
             # A filter that had to begin anew does not tell its own failure from the receiver's.
             lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
             if len(run) >= 3 and run[-1] - run[0] >= FAULT_S and size > least and not lost:
-                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean))
+                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size))
             run = []
     spells = _paired(spells)
     intervals = [(s.start, s.end) for s in spells]
-    sizes = [float(np.linalg.norm(s.off)) for s in spells if s.off is not None]
+    sizes = [s.size for s in spells if s.off is not None]
     if not intervals:
         return None
     inside = [x for x in traces if any(a <= x.t - t0 <= b for a, b in intervals)]
@@ -167,11 +168,15 @@ def fault_effect(
 
 @dataclass(frozen=True, slots=True)
 class _Spell:
-    """Refused velocities in a row; ``off`` (2,) their median innovation, None where untrusted."""
+    """Refused velocities in a row.
+
+    ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length, m/s.
+    """
 
     start: float
     end: float
     off: Array | None
+    size: float
 
 
 def _paired(spells: list[_Spell]) -> list[_Spell]:
@@ -186,7 +191,7 @@ def _paired(spells: list[_Spell]) -> list[_Spell]:
         if before is not None and spell.off is not None:
             sizes = float(np.linalg.norm(before) * np.linalg.norm(spell.off))
             if float(before @ spell.off) < -0.5 * sizes and spell.start - out[-1].end < 120.0:
-                out[-1] = _Spell(out[-1].start, spell.start, before)
+                out[-1] = _Spell(out[-1].start, spell.start, before, out[-1].size)
                 continue
         out.append(spell)
     return out

@@ -54,6 +54,14 @@ GATE_ATTITUDE = 60.0
 HEIGHT_PATIENCE_S = 3.0
 """A height that stays off is a new reference (a new satellite), not a fault."""
 ATTITUDE_PATIENCE_S = 5.0
+RECOVERY_FIXES, RECOVERY_S = 3, 1.0
+"""A velocity is believed again after so many fixes, and so long, inside the gate."""
+RECOVERY_SIGMAS, RECOVERY_DRIFT = 7.0, 0.3
+"""Between two of them the innovation changes by the receiver's noise (5 sigma of a difference) and
+by what the accelerometer is off, m/s^2."""
+ATTITUDE_DOUBT_S = 1.0
+"""An EKF that takes a receiver's fault for acceleration tilts: after that long without a velocity
+that is believed, the attitude that was recorded is not believed either."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +211,8 @@ class WhiteningFilter:
             self._row_var[i] = (*(q.velocity**2,) * 3, q.height**2, *(q.attitude**2,) * 3)
         self._height_off: float | None = None
         self._attitude_off: float | None = None
+        self._velocity_off: float | None = None
+        self._good: list[tuple[float, Array]] = []
         self.noise_gram = np.zeros(3)
         # Noise in the columns is only wanted where the sums will count, not while levels are tried.
         self._one = B == 1
@@ -249,7 +259,7 @@ class WhiteningFilter:
             P[:, i, i] += self._colour_var
             P[:, i, c] = P[:, c, i] = -self._colour_var
         self._X, self._P = X, P
-        self._height_off = self._attitude_off = None
+        self._height_off = self._attitude_off = self._velocity_off = None
         self._Xi[:] = 0.0
 
     @property
@@ -333,6 +343,8 @@ class WhiteningFilter:
         use_v = epoch.trusted and bool(np.all(np.isfinite(epoch.velocity[:2])))
         use_h = self.uses.height and epoch.trusted and bool(np.isfinite(epoch.height))
         use_a = self.uses.attitude and epoch.R_attitude is not None
+        off_since = self._velocity_off
+        use_a = use_a and (off_since is None or epoch.t - off_since < ATTITUDE_DOUBT_S)
         while True:
             rows = self._rows(epoch, theta, use_v=use_v, use_h=use_h, use_a=use_a)
             if rows is None:
@@ -341,15 +353,15 @@ class WhiteningFilter:
             L = np.linalg.cholesky(HP[:, :, index[0]] + HP[:, :, index[1]] + self._noise(kinds))
             W = np.linalg.solve(L, np.concatenate([E, HP], axis=2))
             y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
-            bad = self._gate(epoch.t, kinds, y[0], h[0], theta, covariance)
+            bad = self._gate(epoch.t, kinds, E[0], y[0], h[0], theta, covariance)
             if bad is None:
                 break
             refused.append(bad)
-            if bad == "velocity":
+            if bad in {"velocity", "recovery"}:
                 n = kinds.count("v")
                 off = E[0, :n, 0] - E[0, :n, 1:] @ theta
             use_v, use_h, use_a = (
-                use_v and bad != "velocity",
+                use_v and bad not in {"velocity", "recovery"},
                 use_h and bad != "height",
                 use_a and bad != "attitude",
             )
@@ -449,7 +461,9 @@ class WhiteningFilter:
         out: Array = self._row_var[:, columns, None] * np.eye(len(columns))
         return out
 
-    def _gate(self, t: float, kinds: str, y: Array, h: Array, theta: Array, C: Array) -> str | None:
+    def _gate(
+        self, t: float, kinds: str, E: Array, y: Array, h: Array, theta: Array, C: Array
+    ) -> str | None:
         """Name of the first group whose innovation is impossible, given all uncertainty."""
         if not self.uses.gates:
             return None
@@ -470,14 +484,39 @@ class WhiteningFilter:
                 chi2 = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
             if chi2 > limit:
                 if kind == "v":
+                    self._velocity_off = t if self._velocity_off is None else self._velocity_off
+                    self._good = []
                     return name
                 if not self._patient(kind, t):
                     return name
+            elif kind == "v":
+                if self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
+                    return "recovery"
             elif kind == "h":
                 self._height_off = None
             elif kind == "a":
                 self._attitude_off = None
         return None
+
+    def _recovers(self, t: float, innovation: Array) -> bool:
+        """True while a receiver that was off has not been right, and steady, for long enough.
+
+        After seconds of coasting the gate is wide; a receiver that is only noisy falls into it,
+        but then its errors jump, while those of the coasting filter cannot.
+        """
+        if self._velocity_off is None:
+            return False
+        if self._good:
+            before, last = self._good[-1]
+            noise = float(np.hypot(self.bank[0].velocity, self.bank[0].velocity_colour))
+            most = RECOVERY_SIGMAS * noise + RECOVERY_DRIFT * (t - before)
+            if len(last) != len(innovation) or float(np.abs(innovation - last).max()) > most:
+                self._good = []
+        self._good.append((t, innovation))
+        if len(self._good) < RECOVERY_FIXES or t - self._good[0][0] < RECOVERY_S:
+            return True
+        self._velocity_off, self._good = None, []
+        return False
 
     def _patient(self, kind: str, t: float) -> bool:
         """True when a height or attitude that stays off is taken as a new reference."""
