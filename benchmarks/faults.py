@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from onboard.core.samples import GpsFix, Sample
 
 METRES_PER_RADIAN = 6.371e6
@@ -97,6 +99,14 @@ def _height(fix: GpsFix, elapsed: float, length: float) -> GpsFix:
     return fix
 
 
+def _noise(fix: GpsFix, elapsed: float, length: float) -> GpsFix:
+    """White noise of up to 2.5 m/s on the velocity for 25 s: by chance some fixes are right."""
+    if not 0.0 <= elapsed - 0.45 * length < 25.0:
+        return fix
+    north, east = np.random.default_rng(round(1e3 * elapsed)).uniform(-2.5, 2.5, 2)
+    return replace(fix, v_n=fix.v_n + float(north), v_e=fix.v_e + float(east))
+
+
 def _gaps(fix: GpsFix, elapsed: float, length: float) -> GpsFix | None:
     """Nothing for 5, 20 and 40 s."""
     for share, seconds in ((0.2, 5.0), (0.4, 20.0), (0.65, 40.0)):
@@ -121,6 +131,7 @@ FAULTS = (
     Fault("50 m/s for 3 s, twice", _glitch, frozenset({"innovation", "gps_glitch"})),
     Fault("every seventh second 2 m/s off", _outliers, frozenset({"innovation", "gps_glitch"})),
     Fault("30 m too high for 20 s", _height, frozenset({"height_innovation", "gps_glitch"})),
+    Fault("noise of 2.5 m/s for 25 s", _noise, frozenset({"innovation", "gps_glitch"})),
     Fault("gaps of 5, 20 and 40 s", _gaps, frozenset({"gps_gap"})),
     Fault("lost for good, fix type 1", _no_fix, frozenset({"no_fix"})),
     Fault("lost for good, silent", _silent, frozenset({"gps_gap", "stale"})),

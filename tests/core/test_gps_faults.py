@@ -16,11 +16,12 @@ from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
-STEP, GLITCH, GAPS, NO_FIX, SILENT = (
+STEP, GLITCH, NOISE, GAPS, NO_FIX, SILENT = (
     BY_NAME[name]
     for name in (
         "velocity step of 1.5 m/s for 25 s",
         "50 m/s for 3 s, twice",
+        "noise of 2.5 m/s for 25 s",
         "gaps of 5, 20 and 40 s",
         "lost for good, fix type 1",
         "lost for good, silent",
@@ -58,6 +59,14 @@ def test_step_glitch_and_gaps_in_one_flight(flight):
     # A third of the flight is spoilt: what is left holds what its sigmas say, and they stay small.
     assert np.all(np.abs(o.error) < 4.0 * o.sigma), told(o)
     assert np.all(o.sigma < np.repeat([0.006, 0.045], 3)), told(o)
+
+
+def test_a_noisy_receiver_is_not_believed_when_it_is_right_by_chance(flight):
+    """After seconds of coasting the gate is as wide as the noise."""
+    (o,) = outcomes(flight, NOISE)
+    assert o.calibrated
+    assert "innovation" in o.named
+    assert o.good, told(o)
 
 
 @pytest.mark.parametrize("fault", [NO_FIX, SILENT], ids=["no fix", "silent"])
