@@ -1,27 +1,70 @@
-"""``make bench``: every benchmark in one run, side by side."""
+"""``make bench``: every benchmark in one run, side by side.
+
+``python -m benchmarks --only accuracy cost`` runs some of them; each is a module of its own too.
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
-from benchmarks import accuracy, coverage, daemon, explaining, link
+from benchmarks import (
+    accuracy,
+    cost,
+    coverage,
+    cramer_rao,
+    daemon,
+    ekf_bias,
+    error_state,
+    explaining,
+    lag,
+    link,
+    robustness,
+)
+
+
+def _paths() -> None:
+    for name, value, unit in (*link.run(), *daemon.run()):
+        print(f"{name:50} {value:10.3g} {unit}")
 
 
 def main() -> None:
     """Run what is asked for; all of it by default."""
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--flights", type=int, default=20, help="simulated flights for coverage")
+    parser.add_argument("--matched", type=int, default=50, help="matched flights of each vehicle")
     parser.add_argument("--recordings", type=int, default=40, help="concealed-effect recordings")
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="these parts alone")
     chosen = parser.parse_args()
-    print("## Accuracy on recordings with known answers")
-    accuracy.main([])
-    print("\n## Honesty of the sigmas on simulated flights")
-    coverage.main(["--count", str(chosen.flights)])
-    print("\n## Concealed effects, sealed answers")
-    explaining.main(["--count", str(chosen.recordings)])
-    print("\n## Cost")
-    for name, value, unit in (*link.run(), *daemon.run()):
-        print(f"{name:50} {value:10.3g} {unit}")
+    parts: dict[str, tuple[str, Callable[[], None]]] = {
+        "accuracy": ("Accuracy on recordings with known answers", lambda: accuracy.main([])),
+        "cramer_rao": (
+            "RMS error over the Cramer-Rao bound",
+            lambda: cramer_rao.main(["--count", str(chosen.matched)]),
+        ),
+        "coverage": (
+            "Honesty of the sigmas on simulated flights",
+            lambda: coverage.main(["--count", str(chosen.flights)]),
+        ),
+        "robustness": ("Faults of the GPS receiver", lambda: robustness.main([])),
+        "error_state": ("Against an error-state filter", lambda: error_state.main([])),
+        "ekf_bias": ("Against the autopilot's own bias", lambda: ekf_bias.main([])),
+        "lag": ("Latency, against the usual method", lambda: lag.main([])),
+        "explaining": (
+            "Concealed effects, sealed answers",
+            lambda: explaining.main(["--count", str(chosen.recordings)]),
+        ),
+        "cost": ("Cost of the estimator", lambda: cost.main([])),
+        "paths": ("Cost of link and service", _paths),
+    }
+    wanted = chosen.only or list(parts)
+    unknown = sorted(set(wanted) - set(parts))
+    if unknown:
+        parser.error(f"no part {', '.join(unknown)}; there are {', '.join(parts)}")
+    for name in wanted:
+        title, run = parts[name]
+        print(f"\n## {title}", flush=True)
+        run()
 
 
 if __name__ == "__main__":

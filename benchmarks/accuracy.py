@@ -1,69 +1,75 @@
 """Errors of the six numbers and of the latency on recordings whose answers are known.
 
 Looks for ``answers.json`` in ONBOARD_RECORDINGS/sitl or in ``../shared/recordings/sitl`` beside the
-project.
+project, and prints the table of the README.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import time
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
-from onboard.core.calibrator import Calibrator
-from onboard.replay import replay
+from benchmarks.recorded import WHERE, clean, error_of, fed, limits, recorded
 
-TIMING = {"gps_latency", "gps_smoothing"}
+HEADS = (
+    "recording",
+    "worst scale",
+    "worst x, y offset",
+    "z offset",
+    "latency, ms",
+    "sigmas",
+    "of limit",
+    "CPU s",
+)
 
 
-def folder() -> Path:
-    """Where the recordings are."""
-    beside = Path(__file__).resolve().parents[1] / ".." / "shared" / "recordings"
-    return Path(os.environ.get("ONBOARD_RECORDINGS", beside)) / "sitl"
-
-
-def lines(place: Path) -> list[str]:
-    """One line per recording and accelerometer."""
-    answers: dict[str, Any] = json.loads((place / "answers.json").read_text())["recordings"]
-    out = [
-        "recording    worst scale x, y offset  z offset latency ms worst sigma     s",
-    ]
-    for name, answer in answers.items():
-        if {e["name"] for e in answer["effects"]} - TIMING:
-            continue
-        for file in sorted(place.glob(f"{name}.*")):
-            began = time.perf_counter()
-            result = replay([file], Calibrator())
-            spent = time.perf_counter() - began
-            for c in result.calibrations:
-                truth = answer if c.imu == 1 else answer.get(f"imu{c.imu}")
-                if truth is None:
-                    continue
-                error = np.array(c.scale + c.offset) - np.array(truth["scale"] + truth["offset"])
-                z = np.abs(error) / np.array(c.scale_sigma + c.offset_sigma)
-                late = 1e3 * (c.timing["gps_delay_s"].value - answer["net_gps_delay_s"])
-                shown = f"{late:11.1f}" if file.suffix == ".tlog" else f"{'':11}"
-                out.append(
-                    f"{file.name + ('' if c.imu == 1 else f' #{c.imu}'):12}"
-                    f"{np.abs(error[:3]).max():12.4f}{np.abs(error[3:5]).max():12.3f}"
-                    f"{abs(error[5]):10.3f}{shown}{z.max():12.1f}{spent:6.1f}"
-                )
-    return out
+def lines() -> Iterator[str]:
+    """One row per recording and accelerometer, and a summary."""
+    yield f"| {' | '.join(HEADS)} |"
+    yield "|" + "---|" * len(HEADS)
+    shares: list[float] = []
+    sigmas: list[float] = []
+    latencies: list[float] = []
+    for file in clean():
+        flight = recorded(file)
+        began = time.process_time()
+        made = fed(flight.samples)
+        spent = time.process_time() - began
+        for imu in made.imus:
+            c = made.calibration(imu)
+            e = error_of(c, flight)
+            z = np.abs(e) / np.array(c.scale_sigma + c.offset_sigma)
+            share = np.abs(e) / limits(flight.vehicle)
+            late = 1e3 * (c.timing["gps_delay_s"].value - flight.delay)
+            # A log's stamps are of another kind than a stream's: its answer is not known.
+            streamed = file.suffix == ".tlog"
+            shares.extend(share)
+            sigmas.extend(z)
+            latencies.extend([abs(late)] if streamed else [])
+            name = file.name if imu == 1 else f"{file.name} #{imu}"
+            yield (
+                f"| {name} {flight.vehicle} | {np.abs(e[:3]).max():.4f} | "
+                f"{np.abs(e[3:5]).max():.3f} | {abs(e[5]):.3f} | "
+                f"{f'{late:.1f}' if streamed else ''} | {z.max():.1f} | {share.max():.2f} | "
+                f"{spent:.1f} |"
+            )
+    n = len(shares)
+    yield (
+        f"{n} numbers: {sum(x < 1.0 for x in shares)} within their limits, "
+        f"{sum(x <= 3.0 for x in sigmas)} within 3 sigma; worst latency {max(latencies):.1f} ms"
+    )
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Print the table, or why there is none."""
     del arguments
-    place = folder()
-    if not (place / "answers.json").is_file():
-        print("no recordings with answers beside the project; set ONBOARD_RECORDINGS")
+    if not clean():
+        print(WHERE)
         return
-    for line in lines(place):
-        print(line)
+    for line in lines():
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,122 @@
+"""The Cramer-Rao bound of the six numbers on a known path with known noise.
+
+A covariance recursion (Riccati) over the true motion at the inertial rate, with every unknown of
+the model as a state that does not move: its last covariance is the inverse of the Fisher
+information with the prior added (van Trees 1968, section 2.4).  It shares with the estimator the
+levels of noise and the list of unknowns, but no code: no columns, no epochs' integrals, no sums.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
+from benchmarks.recorded import Array
+from onboard.core.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
+from sitl.builtin.rotation import cross_matrix
+from sitl.builtin.smoothing import RATE, derivative
+
+V, H, PSI, BIAS = slice(0, 3), 3, slice(4, 7), slice(7, 10)
+ATT, WANDER, COLOUR = slice(10, 13), 13, slice(14, 17)
+SCALE, BETA = slice(17, 20), slice(20, 23)
+DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
+GYRO_SCALE, ROLL, PITCH, YAW, SIZE = slice(29, 32), 32, 33, 34, 35
+
+PRIOR = (
+    (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
+    (H_DELAY, 0.1), (GYRO_LATE, 0.005), (GYRO_SCALE, 0.01), (ROLL, 0.03), (PITCH, 0.03),
+    (YAW, 0.1), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
+)  # fmt: skip
+"""Standard deviations before the flight, of constants and of what moves; SI."""
+
+
+def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
+    """(6,) smallest standard deviation of scale and offset (m/s^2) of an ideal accelerometer.
+
+    For one with scale ``s`` multiply those of scale by ``s``, divide those of offset by it.
+    """
+    P = _start(levels)
+    step = 1.0 / IMU_HZ
+    stride = RATE // IMU_HZ
+    Q, keep = _walks(levels, step)
+    acceleration, jerks = jerk(path)
+    rates = derivative(path.w_b)
+    F, eye = np.zeros((SIZE, SIZE)), np.eye(SIZE)
+    epochs = path.epochs.tolist()
+    per_epoch = (RATE // GPS_HZ) // stride
+    for k, row in enumerate(epochs):
+        P = _updated(P, path, row, levels, acceleration[row], jerks[row], jerks)
+        if k + 1 == len(epochs):
+            break
+        for i in range(per_epoch):
+            # The middle of the step: second order, like the motion between two samples.
+            m = row + i * stride + stride // 2
+            R, f = path.R_nb[m], path.f_b[m]
+            F[:] = eye
+            F[range(10, 17), range(10, 17)] = keep
+            turn = _turn(R, path.w_b[m], rates[m]) * step
+            lean = -cross_matrix(R @ f) * step
+            push = np.hstack([R * f, R]) * step
+            F[PSI] += turn
+            F[V] += lean @ (eye[PSI] + 0.5 * turn)
+            F[V, SCALE], F[V, BETA] = push[:, :3], push[:, 3:]
+            F[H] -= step * 0.5 * (F[2] + eye[2])
+            P = F @ P @ F.T + Q
+        P = (P + P.T) / 2
+    return np.sqrt(np.diag(P)[17:23])
+
+
+def _start(q: NoiseLevels) -> Array:
+    sigma = np.zeros(SIZE)
+    for where, value in PRIOR:
+        sigma[where] = value
+    sigma[PSI] = (0.06, 0.06, 0.2)
+    sigma[ATT] = (q.attitude, q.attitude, q.heading)
+    sigma[COLOUR] = q.velocity_colour
+    return np.diag(sigma**2)
+
+
+def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
+    """Noise added in a step, and what is kept of states 10 to 16."""
+    keep = np.ones(7)
+    keep[:3] = np.exp(-step / ATTITUDE_TIME_S)
+    keep[4:] = np.exp(-step / COLOUR_TIME_S)
+    var = np.zeros(SIZE)
+    var[V], var[PSI] = q.force_walk**2 * step, q.tilt_walk**2 * step
+    var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
+    slow = np.array([q.attitude, q.attitude, q.heading])
+    var[ATT] = slow**2 * (1.0 - keep[0] ** 2)
+    var[COLOUR] = q.velocity_colour**2 * (1.0 - keep[4] ** 2)
+    return np.diag(var), keep
+
+
+def _turn(R: Array, w_b: Array, rate: Array) -> Array:
+    """(3, SIZE) growth of the attitude error: what the gyroscope reads too much, or too late."""
+    out = np.zeros((3, SIZE))
+    out[:, BIAS] = -R
+    out[:, GYRO_SCALE] = -R * w_b
+    out[:, GYRO_LATE] = R @ rate
+    return out
+
+
+def _updated(
+    P: Array, path: Path, row: int, q: NoiseLevels, a: Array, j: Array, jerks: Array
+) -> Array:
+    """Covariance after the epoch at ``row``: two velocities, height, attitude."""
+    R, v = path.R_nb[row], path.v_n[row]
+    near = RATE // 20
+    third = (jerks[min(row + near, len(jerks) - 1)] - jerks[max(row - near, 0)]) * RATE / (2 * near)
+    M = np.zeros((6, SIZE))
+    M[[0, 1], [0, 1]] = M[[0, 1], [14, 15]] = 1.0
+    M[:2, DELAY], M[:2, SPAN], M[:2, THIRD] = -a[:2], j[:2] / 24.0, third[:2] / 6.0
+    M[2, [H, WANDER]] = 1.0
+    M[2, [DELAY, H_DELAY]] = v[2]
+    M[2, SPAN] = -a[2] / 24.0
+    M[3:, PSI] = M[3:, ATT] = np.eye(3)
+    M[3:, ATT_DELAY] = -R @ path.w_b[row]
+    M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
+    noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude**2] * 3)
+    HP = M @ P
+    gain = np.linalg.solve(HP @ M.T + np.diag(noise), HP).T
+    out: Array = P - gain @ HP
+    return out
