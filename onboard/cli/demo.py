@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 VEHICLE: Vehicle = "copter"
 SEED = 11
 SPEEDUP = 12.0
+LANDING_S = 120.0
 FIRST_FLIGHT_S, PROOF_FLIGHT_S = 200.0, 90.0
 POLL_S = 0.25
 PUSH_LIMIT_S = 90.0
@@ -121,7 +122,11 @@ async def _demonstrate(options: Options, show: Show) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="onboard-demo-") as folder:
         show.stage("starting a simulated ArduPilot copter, two accelerometers, clearly off")
         async with autopilot_process(
-            VEHICLE, imus, speedup=options.speedup, seed=options.seed
+            VEHICLE,
+            imus,
+            speedup=options.speedup,
+            seed=options.seed,
+            longest=options.duration + LANDING_S,
         ) as sim_port:
             service = Service(
                 configuration.from_mapping(

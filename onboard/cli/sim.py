@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import click
 
 from onboard.errors import UsageError
-from sitl.builtin.autopilot import Autopilot
+from sitl.builtin.autopilot import FLIGHT_DURATION, Autopilot
 from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server
 from sitl.builtin.truth import ImuTruth, Truth, random_imus
@@ -53,7 +53,7 @@ onboard sim --truth 1.02,0.99,1.01,0.2,-0.1,0.3 --speedup 5
     default=180.0,
     show_default=True,
     type=click.FloatRange(60.0, 3600.0),
-    help="Length of a flight, s.",
+    help="Length of a flight, s; on command, 300 at least.",
 )
 @click.option(
     "--ground",
@@ -87,7 +87,13 @@ def sim(
     """  # fmt: skip
     chosen = [parse_truth(text) for text in truths]
     hardware = (*chosen, *random_imus(seed, max(imus, len(chosen)))[len(chosen) :])
-    autopilot = Autopilot(vehicle, Truth(imus=hardware, seed=seed), loop_rate=loop_rate, dull=dull)
+    autopilot = Autopilot(
+        vehicle,
+        Truth(imus=hardware, seed=seed),
+        loop_rate=loop_rate,
+        dull=dull,
+        longest=max(duration, FLIGHT_DURATION),
+    )
     mission = Mission(flights, duration, ground)
     server = Server(autopilot, speedup=speedup, driver=mission)
     for line in describe(hardware):

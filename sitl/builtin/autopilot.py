@@ -78,6 +78,7 @@ class Autopilot:
         parameters: values that differ from the defaults.
         loop_rate: SCHED_LOOP_RATE, Hz.
         dull: flights are a hover or a straight line.
+        longest: a flight on command ends by itself after so many seconds.
     """
 
     def __init__(
@@ -88,7 +89,9 @@ class Autopilot:
         parameters: Mapping[str, float] | None = None,
         loop_rate: int | None = None,
         dull: bool = False,
+        longest: float = FLIGHT_DURATION,
     ) -> None:
+        self._longest = longest
         self.vehicle: Vehicle = vehicle
         self.truth = truth
         self._dull = dull
@@ -328,12 +331,13 @@ class Autopilot:
             self.say(Notice("Disarming motors", 6))
         return True
 
-    def take_off(self, duration: float = FLIGHT_DURATION) -> bool:
+    def take_off(self, duration: float | None = None) -> bool:
         """Starts a flight of about so many seconds, ground to ground; must be armed."""
+        seconds = self._longest if duration is None else duration
         if not self.armed or self.flying:
             return False
         self._launching = True
-        self._orders.append(lambda: self._launch(duration))
+        self._orders.append(lambda: self._launch(seconds))
         self._mode = MODES[self.vehicle].flying
         return True
 

@@ -18,11 +18,11 @@ LISTENING = re.compile(r"udp:[^:]+:(\d+)")
 
 @contextlib.asynccontextmanager
 async def autopilot_process(
-    vehicle: Vehicle, imus: Sequence[ImuTruth], *, speedup: float, seed: int
+    vehicle: Vehicle, imus: Sequence[ImuTruth], *, speedup: float, seed: int, longest: float
 ) -> AsyncIterator[int]:
     """Runs ``onboard sim`` for as long as the context lasts; gives its UDP port.
 
-    It stands on the ground and flies on command.
+    It stands on the ground and flies on command, ``longest`` seconds at most.
 
     Raises:
         SitlError: it does not start.
@@ -35,6 +35,7 @@ async def autopilot_process(
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "onboard", "sim", "--vehicle", vehicle, "--port", "0"),
         *("--flights", "0", "--speedup", f"{speedup:g}", "--seed", str(seed), *truths),
+        *("--duration", f"{longest:g}"),
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,

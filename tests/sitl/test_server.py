@@ -221,3 +221,16 @@ async def test_station_flies_on_command_and_impatience_does_no_harm():
         await asyncio.gather(*(station.land() for _ in range(5)))
         await station.until_disarmed()
     assert server.autopilot.instant().landed
+
+
+async def test_a_flight_on_command_lasts_as_long_as_it_may():
+    autopilot = Autopilot("copter", Truth(imus=random_imus(1), seed=1), longest=90.0)
+    server = Server(autopilot, speedup=50.0)
+    port = await server.listen_udp()
+    async with running(server), Station.at("127.0.0.1", port) as station:
+        await station.take_off()
+        begun = station.time
+        await station.until_time(begun + 20.0)
+        assert station.armed
+        await station.until_disarmed()
+    assert 45.0 < station.time - begun < 120.0
