@@ -33,7 +33,7 @@ def fixed(node: ast.expr) -> Message:
         parts = [str(p.value) for p in node.values if isinstance(p, ast.Constant)]
     else:
         return ()
-    told = (" ".join(part.split()).strip(" :;,()'[]") for part in parts)
+    told = (" ".join(part.replace("`", "").split()).strip(" :;,()'[]") for part in parts)
     return tuple(t for t in told if len(re.findall("[A-Za-z]", t)) >= FEWEST_LETTERS)
 
 
