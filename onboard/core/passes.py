@@ -148,7 +148,7 @@ class Pass:
         self.point = point
         self.uses = uses or Uses()
         self.filter = WhiteningFilter(model.size, bank, self.uses)
-        self._keep = traces
+        self.keep_traces = traces
         self._held = theta is not None
         self._information = np.diag(1.0 / model.prior_sigma**2)
         self._prior_b = self._information @ model.prior
@@ -179,6 +179,10 @@ class Pass:
     def restart(self) -> None:
         """Forget the filter's state (a gap): the next stretch begins a new one.  Sums stay."""
         self._running = False
+
+    def hold(self, theta: Array, covariance: Array) -> None:
+        """Gates and feedback follow this estimate until :meth:`release`."""
+        self.theta, self.covariance, self._held = theta, covariance, True
 
     def release(self) -> None:
         """From now on gates and feedback follow the pass's own sums."""
@@ -290,7 +294,7 @@ class Pass:
         self.s += np.einsum("br,br->b", y, y)
         self.log_det += rows.log_det
         self.rows += y.shape[1]
-        if self._keep:
+        if self.keep_traces:
             result.traces.append(
                 EpochTrace(
                     rows.t,

@@ -10,17 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.columns import Model
+from onboard.core.columns import Family, Model, Unknown
 from onboard.core.passes import Portion
 from onboard.core.solution import FOLDS, total
 from onboard.core.sums import NormalSums
 
 Array = NDArray[np.float64]
+
+OFFSETS = (3, 4, 5)
+"""Columns of the offsets among the six."""
+JUMP_SIGMA = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +65,16 @@ class Fitter:
         """Number of rows."""
         return self.sums.rows
 
-    def fit(self, free: Sequence[int], held: Array | None = None) -> Fit:
-        """Fit the columns ``free``; the rest stays at ``held`` (default: absent)."""
+    def fit(self, free: Sequence[int], held: Array | None = None, *, held_out: bool = True) -> Fit:
+        """Fit the columns ``free``; the rest stays at ``held`` (default: absent).
+
+        Without ``held_out`` its held-out misfit is not a number: eight times cheaper.
+        """
         at = (self.absent if held is None else held).copy()
         theta, A = self._solve(self.sums, free, at)
         chi2 = self._penalised(self.sums, theta, free)
-        out = 0.0
-        if len(self._folds) > 1:
+        out = 0.0 if held_out else float("nan")
+        if held_out and len(self._folds) > 1:
             for fold in self._folds:
                 other, _ = self._solve(self.sums - fold, free, at)
                 out += fold.residual(other)
@@ -106,32 +112,70 @@ class Fitter:
         """Whitened root mean square on held-out portions."""
         return float(np.sqrt(max(fit.held_out, 0.0) / max(self.rows, 1.0)))
 
+    @property
+    def log_rows(self) -> float:
+        """What BIC charges for one unknown."""
+        return float(np.log(max(self.rows, 2.0)))
 
-def step_times(
-    fitter: Fitter, free: Sequence[int], offsets: Sequence[int]
-) -> list[tuple[float, float]]:
-    """Boundaries of portions at which a jump of the offsets would help: (time, gain).
+    def stepped(self, boundary: int) -> Fitter:
+        """The same with three more columns at the end: offsets that jump at a portion's start.
 
-    A step is the offset's own columns in the portions after it; the filter's memory blurs that
-    by some seconds, which is enough to know where to look closer.
-    """
-    index = list(free)
-    prior = np.diag(np.concatenate([fitter._prior[index], np.full(len(offsets), 0.1)]))  # noqa: SLF001 - same module
-    mean = np.concatenate([fitter.model.prior[index], np.zeros(len(offsets))])
-    base = fitter.fit(index)
-    out = []
-    after = fitter.sums
-    for p, q in pairwise(fitter.portions):
-        after = after - p.sums
-        N = np.block(
-            [
-                [fitter.sums.N[np.ix_(index, index)], after.N[np.ix_(index, offsets)]],
-                [after.N[np.ix_(offsets, index)], after.N[np.ix_(offsets, offsets)]],
-            ]
-        )
-        b = np.concatenate([fitter.sums.b[index], after.b[list(offsets)]])
-        theta = np.linalg.solve(N + prior, b + prior @ mean)
-        off = theta - mean
-        chi2 = fitter.sums.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
-        out.append((q.start, float(base.chi2 - chi2) / fitter.weaken))
-    return out
+        The jump is the offset's own columns in the portions from ``boundary`` on; the filter's
+        memory blurs that by some seconds, which is enough to know where to look closer.
+        """
+        m = self.model.size
+        unknowns = tuple(Unknown(f"jump_{a}", "m/s^2", 0.0, JUMP_SIGMA) for a in "xyz")
+        model = Model([*self.model.families, _Jump(unknowns)])
+        after = [*range(m), *OFFSETS]
+        portions = []
+        for i, p in enumerate(self.portions):
+            sums = NormalSums.zeros(m + 3)
+            sums.s, sums.rows, sums.log_det = p.sums.s, p.sums.rows, p.sums.log_det
+            sums.G[:m, :m] = p.sums.G
+            if i >= boundary:
+                sums.N[:] = p.sums.N[np.ix_(after, after)]
+                sums.b[:] = p.sums.b[after]
+            else:
+                sums.N[:m, :m], sums.b[:m] = p.sums.N, p.sums.b
+            portions.append(Portion(p.start, p.end, sums))
+        return Fitter(portions, model, self.weaken, np.concatenate([self.absent, np.zeros(3)]))
+
+    def jumps(self, free: Sequence[int]) -> list[tuple[int, float]]:
+        """Portions at whose start a jump of the offsets would help: (portion, gain)."""
+        index, offsets = list(free), list(OFFSETS)
+        information = np.concatenate([self._prior[index], np.full(3, JUMP_SIGMA**-2)])
+        prior = np.diag(information)
+        mean = np.concatenate([self.model.prior[index], np.zeros(3)])
+        at = self.absent.copy()
+        at[index] = 0.0
+        base = self.fit(index, held_out=False)
+        shifted, after = self.sums.shifted(at), None
+        out = []
+        for i in range(len(self.portions) - 1, 0, -1):
+            p = self.portions[i].sums.shifted(at)
+            after = p if after is None else after + p
+            N = np.block(
+                [
+                    [
+                        (shifted.N - shifted.G)[np.ix_(index, index)],
+                        after.N[np.ix_(index, offsets)],
+                    ],
+                    [after.N[np.ix_(offsets, index)], after.N[np.ix_(offsets, offsets)]],
+                ]
+            )
+            b = np.concatenate([shifted.b[index], after.b[offsets]])
+            theta = np.linalg.solve(N + prior, b + prior @ mean)
+            off = theta - mean
+            N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
+            chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
+            out.append((i, float(base.chi2 - chi2) / self.weaken))
+        return out
+
+
+class _Jump(Family):
+    """Names for the columns of :meth:`Fitter.stepped`; nothing is evaluated."""
+
+    name = "jump"
+
+    def __init__(self, unknowns: tuple[Unknown, ...]) -> None:
+        self.unknowns = unknowns

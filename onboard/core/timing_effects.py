@@ -16,7 +16,7 @@ from onboard.core.calibrator import Calibrator
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
 from onboard.core.noise import NoiseLevels
-from onboard.core.passes import EpochTrace
+from onboard.core.passes import EpochTrace, Linearisation
 from onboard.core.result import Estimate
 from onboard.core.samples import Vector3
 from onboard.core.solution import Solution
@@ -32,6 +32,15 @@ EKF_FLOOR = {"tilt_roll": 0.002, "tilt_pitch": 0.002, "heading": 0.005}
 FAULT_S = 1.0
 FAULT_M_S = 0.7
 RAIL_SAMPLES, RAIL_RUN = 12, 4
+
+STANDING: dict[str, tuple[str, ...]] = {
+    "gps_latency": ("gps_delay",),
+    "gps_smoothing": ("window_squared",),
+    "imu_delay": ("attitude_delay",),
+    "mount_tilt": ("tilt_roll", "tilt_pitch"),
+    "heading_error": ("heading",),
+}
+"""Unknowns that are always in the model and become an effect past a size."""
 
 Standing = dict[str, tuple[dict[str, Quantity], str, dict[str, float]]]
 
@@ -102,6 +111,21 @@ def standing_effects(
             {},
         )
     return out
+
+
+def without(
+    names: Sequence[str], index: Mapping[str, int], point: Linearisation, absent: Array, told: float
+) -> Array:
+    """(m,) values at which the unknowns ``names`` are not in the model."""
+    at = absent.copy()
+    taken = {
+        "gps_delay": told - point.delay,
+        "window_squared": -(point.window**2),
+        "attitude_delay": -point.attitude_delay,
+    }
+    for name in names:
+        at[index[name]] = taken.get(name, 0.0)
+    return at
 
 
 def fault_effect(

@@ -221,6 +221,22 @@ class RotorDrag(Effect):
     y: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nameless(Effect):
+    """Something that no catalogue has: ``f += (x, y, z) s(t)``, for seeing what is said of it.
+
+    ``term`` is the signal ``s``: ``dynamic_pressure`` (airspeed / 10 m/s)^2, ``roll_rate``
+    rad/s, ``swing`` sin of 2 pi per 40 s, ``climb_rate`` m/s upwards.
+    """
+
+    name: ClassVar[str] = "nameless"
+    term: str
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    imu: int = 0
+
+
 ALL: tuple[type[Effect], ...] = (
     GpsLatency,
     GpsSmoothing,

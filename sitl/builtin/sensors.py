@@ -247,9 +247,22 @@ def _deterministic(
                 load = -f_b[:, 2] / STANDARD_GRAVITY - 1.0
                 flex = rotation.from_vector(np.outer(load, (roll, pitch, 0.0)))
                 extra += rotation.rotate(flex, f_b) - f_b
+            case fx.Nameless(term=term, x=x, y=y, z=z):
+                extra += np.outer(_nameless(term, trajectory, elapsed), (x, y, z))
             case _:
                 pass
     return extra
+
+
+def _nameless(term: str, trajectory: Trajectory, elapsed: Array) -> Array:
+    """Signal of :class:`~sitl.builtin.effects.Nameless`, (n,)."""
+    signals = {
+        "dynamic_pressure": (trajectory.airspeed / 10.0) ** 2,
+        "roll_rate": trajectory.w_b[:, 0],
+        "swing": np.sin(2.0 * np.pi * elapsed / 40.0),
+        "climb_rate": -trajectory.v_n[:, 2],
+    }
+    return signals[term]
 
 
 def _gyro(

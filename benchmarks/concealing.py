@@ -1,0 +1,227 @@
+"""What the sealed challenge conceals: effects, sizes, pairs, controls, and things that have no name.
+
+Sizes count in *units*: what clean flights of the same kind say five sigma of that unknown are
+(rounded, four minutes of the simulated vehicles' random manoeuvres).  ``small`` is about one
+unit: it need not be found, but must not be given a wrong name.  ``medium`` and ``large`` are to be
+found.  What a flight cannot show by nature is declared here, before any recording is made:
+
+* gravity beside a z offset takes steep turns for minutes: a unit is more than any place on earth;
+* curvature of the scale and a bending mount need load factors: a copter flies near one;
+* a multicopter's drag changes how it flies, not what its sensors read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any, Literal
+
+import numpy as np
+
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import GpsTruth, random_imus
+from sitl.builtin.world import Vehicle
+from sitl.recording import FlightSpec
+
+Rng = np.random.Generator
+Level = Literal["small", "medium", "large"]
+LEVELS: dict[Level, tuple[float, float]] = {
+    "small": (0.7, 1.2),
+    "medium": (2.0, 3.0),
+    "large": (4.0, 6.0),
+}
+NET_DELAY = (0.0, 0.03)
+"""Every receiver is a little late: below the size from which it is called an effect."""
+STAMPED_EARLY = 0.02
+SHAKEN = (4.0, 4.0, 6.0)
+"""Motor tone in recordings of vibration's own effect: no vibration, nothing to rectify."""
+
+UNITS: dict[str, dict[Vehicle, dict[str, float]]] = {
+    "gps_lever_arm": {
+        "copter": {"x": 0.035, "y": 0.03, "z": 0.035},
+        "plane": {"x": 0.2, "y": 0.08, "z": 0.05},
+    },
+    "cross_axis": {
+        "copter": {"xy": 0.011, "xz": 0.013, "yx": 0.013, "yz": 0.01, "zx": 0.01, "zy": 0.012},
+        "plane": {"xy": 0.036, "xz": 0.017, "yx": 0.026, "yz": 0.014, "zx": 0.016, "zy": 0.024},
+    },
+    "mount_tilt": {"copter": {"roll": 0.02, "pitch": 0.02}, "plane": {"roll": 0.02, "pitch": 0.02}},
+    "heading_error": {"copter": {"yaw": 0.05}, "plane": {"yaw": 0.05}},
+    "heading_by_throttle": {
+        "copter": {"yaw_per_throttle": 0.1},
+        "plane": {"yaw_per_throttle": 0.06},
+    },
+    "temperature_drift": {
+        "copter": {"x": 0.009, "y": 0.009, "z": 0.003},
+        "plane": {"x": 0.015, "y": 0.015, "z": 0.006},
+    },
+    "bias_ramp": {
+        "copter": {"x": 6e-4, "y": 6e-4, "z": 2e-4},
+        "plane": {"x": 1.1e-3, "y": 1.2e-3, "z": 4e-4},
+    },
+    "bias_step": {
+        "copter": {"x": 0.07, "y": 0.07, "z": 0.04},
+        "plane": {"x": 0.12, "y": 0.12, "z": 0.06},
+    },
+    "scale_nonlinearity": {"plane": {"x": 0.02, "z": 0.01}},
+    "vibration_rectification": {
+        "copter": {"x": 0.006, "y": 0.006, "z": 0.002},
+        "plane": {"x": 0.006, "y": 0.006, "z": 0.002},
+    },
+    "throttle_coupling": {
+        "copter": {"x": 0.2, "y": 0.2, "z": 0.1},
+        "plane": {"x": 0.3, "y": 0.2, "z": 0.12},
+    },
+    "load_flex": {"plane": {"roll": 0.011, "pitch": 0.015}},
+    "clock_skew": {"copter": {"rate": 1e-4}, "plane": {"rate": 1.3e-4}},
+    "imu_delay": {"copter": {"delay": 0.03}, "plane": {"delay": 0.03}},
+    "gps_latency": {"copter": {"delay": 0.04}, "plane": {"delay": 0.04}},
+    "gps_smoothing": {"copter": {"window": 0.15}, "plane": {"window": 0.15}},
+    "gps_fault": {
+        "copter": {"north": 0.6, "east": 0.6},
+        "plane": {"north": 0.6, "east": 0.6},
+    },
+    "saturation": {"copter": {"limit": 13.0}, "plane": {"limit": 13.0}},
+}
+RAILS: dict[Level, tuple[float, float]] = {
+    "small": (13.0, 14.0),
+    "medium": (11.6, 12.0),
+    "large": (11.0, 11.5),
+}
+"""Limits of a clipping accelerometer, m/s^2; the higher, the less there is to clip."""
+POSITIVE = ("gps_latency", "gps_smoothing")
+MOST = {"gps_smoothing": 0.42, "imu_delay": 0.1, "gps_latency": 0.25, "scale_nonlinearity": 0.05}
+"""Sizes at which a part is broken, not wrong; the calibration says so."""
+MAKERS: dict[str, Callable[..., concealed.Effect]] = {
+    kind.name: kind for kind in concealed.ALL if kind.name != "rotor_drag"
+}
+ALIKE: tuple[frozenset[str], ...] = (
+    frozenset({"bias_ramp", "temperature_drift", "bias_step"}),
+    frozenset({"throttle_coupling", "vibration_rectification", "scale_nonlinearity"}),
+    frozenset({"mount_tilt", "cross_axis", "load_flex"}),
+    frozenset({"heading_error", "heading_by_throttle"}),
+)
+"""Effects of one kind: two of them at once are one effect of that kind to any single flight."""
+ALONE = frozenset({"saturation", "vibration_rectification"})
+"""Not paired: what is clipped has lost the other effect; shaken vehicles are a flight of their own."""
+NAMELESS: dict[str, tuple[float, float, float]] = {
+    "dynamic_pressure": (0.12, 0.12, 0.1),
+    "roll_rate": (0.3, 0.3, 0.3),
+    "swing": (0.3, 0.3, 0.3),
+    "climb_rate": (0.15, 0.15, 0.15),
+}
+"""Terms outside the catalogue and their sizes, per unit of the signal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Secret:
+    """One recording to be made: what is in it is drawn from the seed."""
+
+    seed: int
+    vehicle: Vehicle
+    kind: Literal["control", "single", "pair", "nameless"]
+    names: tuple[str, ...] = ()
+    level: Level = "medium"
+
+    @property
+    def testable(self) -> bool:
+        """Whether the effects are of a size that must be found."""
+        return self.kind in ("single", "pair") and self.level != "small"
+
+    def spec(self) -> FlightSpec:
+        """The flight with everything drawn."""
+        rng = np.random.default_rng([self.seed, 977])
+        duration = float(rng.uniform(150.0, 300.0))
+        delay = STAMPED_EARLY + float(rng.uniform(*NET_DELAY))
+        effects = tuple(self._effect(name, rng, duration) for name in self.names)
+        warming = {
+            "temperature_start": float(rng.uniform(5.0, 30.0)),
+            "temperature_end": float(rng.uniform(40.0, 55.0)),
+            "temperature_time": float(rng.uniform(0.15, 0.4) * duration),
+        }
+        imus = tuple(replace(imu, **warming) for imu in random_imus(self.seed))
+        if "vibration_rectification" in self.names:
+            imus = tuple(replace(imu, vibration=SHAKEN) for imu in imus)
+        return FlightSpec(
+            vehicle=self.vehicle,
+            seed=self.seed,
+            duration=duration,
+            imus=imus,
+            gps=GpsTruth(delay=delay, stamped_early=STAMPED_EARLY),
+            effects=effects,
+        )
+
+    def _effect(self, name: str, rng: Rng, duration: float) -> concealed.Effect:
+        if self.kind == "nameless":
+            signs = rng.choice([-1.0, 1.0], 3)
+            x, y, z = (float(s * v) for s, v in zip(signs, NAMELESS[name], strict=True))
+            return concealed.Nameless(term=name, x=x, y=y, z=z)
+        if name == "rotor_drag":
+            return concealed.RotorDrag(x=0.3, y=0.3)
+        units = UNITS[name][self.vehicle]
+        if name == "saturation":
+            return concealed.Saturation(limit=float(rng.uniform(*RAILS[self.level])))
+        sizes = _sizes(rng, units, self.level, name)
+        if name == "bias_step":
+            sizes["time"] = float(rng.uniform(0.3, 0.7) * duration)
+        if name == "gps_fault":
+            sizes["start"] = float(rng.uniform(0.3, 0.6) * duration)
+            sizes["end"] = sizes["start"] + float(rng.uniform(8.0, 25.0))
+        return MAKERS[name](**sizes)
+
+
+def _sizes(rng: Rng, units: Mapping[str, float], level: Level, name: str) -> dict[str, float]:
+    """Every unknown by its own unit and sign; now and then only one of several."""
+    keys = list(units)
+    if len(keys) > 1 and rng.random() < 0.3:
+        keys = [keys[int(rng.integers(len(keys)))]]
+    out = {}
+    for key in keys:
+        size = units[key] * float(rng.uniform(*LEVELS[level]))
+        sign = 1.0 if name in POSITIVE else float(rng.choice([-1.0, 1.0]))
+        out[key] = sign * min(size, MOST.get(name, np.inf))
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Challenge:
+    """How many recordings of each kind; the whole of it is past 200."""
+
+    first: int
+    controls: int = 44
+    pairs: int = 40
+    nameless: int = 16
+    levels: tuple[Level, ...] = ("small", "medium", "large")
+    vehicles: tuple[Vehicle, ...] = field(default=("copter", "plane"))
+
+    def secrets(self) -> list[Secret]:
+        """All of them, shuffled: any part of the list is a fair sample."""
+        out = []
+        for i, (kind, vehicle, names, level) in enumerate(self._kinds()):
+            out.append(Secret(self.first + i, vehicle, kind, names, level))
+        rng = np.random.default_rng([self.first, 5])
+        return [out[i] for i in rng.permutation(len(out))]
+
+    def _kinds(self) -> Iterator[tuple[Any, Vehicle, tuple[str, ...], Level]]:
+        for i in range(self.controls):
+            yield "control", self.vehicles[i % 2], ("rotor_drag",) if i % 11 == 10 else (), "medium"
+        for name, units in UNITS.items():
+            for vehicle in self.vehicles:
+                if vehicle in units:
+                    for level in self.levels:
+                        yield "single", vehicle, (name,), level
+        rng = np.random.default_rng([self.first, 6])
+        for i in range(self.pairs):
+            vehicle = self.vehicles[i % 2]
+            able = [n for n in UNITS if vehicle in UNITS[n] and n not in ALONE]
+            couples = [p for p in combinations(able, 2) if not any(set(p) <= a for a in ALIKE)]
+            yield "pair", vehicle, couples[int(rng.integers(len(couples)))], "large"
+        for i in range(self.nameless):
+            names = list(NAMELESS)
+            yield (
+                "nameless",
+                self.vehicles[(i // len(names)) % 2],
+                (names[i % len(names)],),
+                "large",
+            )

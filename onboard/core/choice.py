@@ -1,0 +1,231 @@
+"""Which effects to accept: forward selection, with second thoughts, on sums alone.
+
+An effect is taken when the fall of the misfit pays for its unknowns (BIC) by a wide margin, when it
+holds on portions of the flight that were not fitted, when its size is sure and believable, and
+when it matters.  A jump of the offsets competes like the rest, at the boundaries of portions; its
+moment is looked for afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.findings import Rival
+from onboard.core.physics.effect import EffectColumns
+from onboard.core.selection import Fit, Fitter
+
+Array = NDArray[np.float64]
+
+MARGIN = 25.0
+"""Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
+HELD_OUT_GAIN = 12.0
+SIGNIFICANT = 5.0
+MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
+MOST_EFFECTS = 5
+RIVAL_SHARE = 0.15
+"""Least share of an effect's evidence that makes another one its rival."""
+LEFT_BESIDE = 0.5
+"""A rival explains the same: beside the effect less than this share of its gain is left."""
+STEP = "bias_step"
+STEP_PLAUSIBLE = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Columns that stand for one effect; ``columns`` is None for a jump at a portion's start.
+
+    ``spent`` are unknowns that were chosen outside the fit (a jump's moment).
+    """
+
+    effect: str
+    index: tuple[int, ...]
+    plausible: tuple[float, ...]
+    columns: EffectColumns | None = None
+    spent: int = 0
+
+    def bic(self, fitter: Fitter, gain: float) -> float:
+        """Fall of BIC by a gain in chi-square."""
+        return gain - (len(self.index) + self.spent) * fitter.log_rows
+
+
+@dataclass(slots=True)
+class Choice:
+    """Effects that were taken, in order, and the sums in which they are columns.
+
+    ``jump`` is the portion at whose start the offsets jump, None without; ``close`` are other
+    candidates that nearly did as well in the place of a chosen one.
+    """
+
+    fitter: Fitter
+    base: list[int]
+    candidates: list[Candidate]
+    chosen: list[Candidate]
+    jump: int | None = None
+
+    @property
+    def free(self) -> list[int]:
+        """Columns of the model that was chosen."""
+        return self.base + [i for c in self.chosen for i in c.index]
+
+    def rivals(self, target: Candidate) -> list[Rival]:
+        """What else could stand in the place of a chosen effect, nearest first."""
+        rest = self.base + [i for c in self.chosen if c is not target for i in c.index]
+        others = [c for c in self.candidates if c not in self.chosen and c.effect != target.effect]
+        return rivals_of(self.fitter, rest, target, others)
+
+
+def rivals_of(
+    fitter: Fitter,
+    rest: Sequence[int],
+    target: Candidate,
+    others: Sequence[Candidate],
+    held: Array | None = None,
+) -> list[Rival]:
+    """Others that explain, instead of ``target``, a good part of what it explains.
+
+    Args:
+        fitter: has the columns of all.
+        rest: columns that are in the model anyway.
+        target: the effect.
+        others: what is compared with it.
+        held: values of what is not in the model.
+    """
+    before = fitter.fit(rest, held, held_out=False)
+    with_it = fitter.fit([*rest, *target.index], held, held_out=False)
+    bic = target.bic(fitter, fitter.gain(before, with_it))
+    out = []
+    for other in others:
+        gain = fitter.gain(before, fitter.fit([*rest, *other.index], held, held_out=False))
+        other_bic = other.bic(fitter, gain)
+        if other_bic < max(RIVAL_SHARE * bic, 0.0):
+            continue
+        both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
+        if fitter.gain(with_it, both) < LEFT_BESIDE * gain:
+            out.append(Rival(other.effect, float(bic - other_bic)))
+    nearest: dict[str, Rival] = {}
+    for rival in sorted(out, key=lambda r: r.delta_bic):
+        nearest.setdefault(rival.name, rival)
+    return list(nearest.values())
+
+
+def choose(fitter: Fitter, base: Sequence[int], candidates: Sequence[Candidate]) -> Choice:
+    """Forward selection, each time with a look back."""
+    choice = Choice(fitter, list(base), list(candidates), [])
+    while len(choice.chosen) < MOST_EFFECTS:
+        step, boundary = _best_jump(choice)
+        offered = [c for c in choice.candidates if c not in choice.chosen]
+        wide = choice.fitter
+        if step is not None and boundary is not None:
+            wide = choice.fitter.stepped(boundary)
+            offered.append(step)
+        before = wide.fit(choice.free)
+        scored = []
+        for c in offered:
+            after = wide.fit([*choice.free, *c.index])
+            scored.append((c.bic(wide, wide.gain(before, after)), c, after))
+        scored.sort(key=lambda s: -s[0])
+        best = next((c for bic, c, after in scored if accepted(wide, before, after, c, bic)), None)
+        if best is None:
+            break
+        if best is step:
+            choice.fitter, choice.jump = wide, boundary
+            choice.candidates.append(best)
+        choice.chosen.append(best)
+        _reconsider(choice)
+    return choice
+
+
+def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> bool:
+    """Whether something else explains what is taken for an effect that is always in the model.
+
+    Timing and constant attitude errors are estimated anyway, so they take what they can of a small
+    effect beside them, which then looks too weak.  If one of the others does better *in their
+    place*, it is taken, and they are asked again with it.
+
+    Args:
+        choice: what was chosen so far; the other is added to it.
+        standing: the columns in question.
+        held: (m,) values of what is not in the model.
+    """
+    fitter = choice.fitter
+    rest = [i for i in choice.free if i not in standing.index]
+    before = fitter.fit(rest, held)
+    own = standing.bic(
+        fitter, fitter.gain(before, fitter.fit([*rest, *standing.index], held, held_out=False))
+    )
+    better = own
+    taken: Candidate | None = None
+    for other in choice.candidates:
+        if other in choice.chosen or other.effect == standing.effect:
+            continue
+        after = fitter.fit([*rest, *other.index], held)
+        bic = other.bic(fitter, fitter.gain(before, after))
+        if bic > better and accepted(fitter, before, after, other, bic):
+            better, taken = bic, other
+    if taken is None:
+        return False
+    choice.chosen.append(taken)
+    return True
+
+
+def _best_jump(choice: Choice) -> tuple[Candidate | None, int | None]:
+    """The jump that would help most, if there is none yet."""
+    if choice.jump is not None or len(choice.fitter.portions) < 4:
+        return None, None
+    boundary = max(choice.fitter.jumps(choice.free), key=lambda x: x[1])[0]
+    m = choice.fitter.model.size
+    return Candidate(STEP, (m, m + 1, m + 2), (STEP_PLAUSIBLE,) * 3, spent=1), boundary
+
+
+def _reconsider(choice: Choice) -> None:
+    """Drop what became insignificant, exchange what another one does better."""
+    fitter = choice.fitter
+    for c in list(choice.chosen[:-1]):
+        rest = [i for i in choice.free if i not in c.index]
+        before = fitter.fit(rest, held_out=False)
+        bic = c.bic(fitter, fitter.gain(before, fitter.fit([*rest, *c.index], held_out=False)))
+        if bic < MARGIN:
+            choice.chosen.remove(c)
+            continue
+        swaps = []
+        for other in choice.candidates:
+            if other in choice.chosen:
+                continue
+            gain = fitter.gain(before, fitter.fit([*rest, *other.index], held_out=False))
+            swaps.append((other.bic(fitter, gain), other))
+        better, other = max(swaps, key=lambda s: s[0], default=(-np.inf, None))
+        if other is not None and better > bic + MARGIN:
+            whole = fitter.fit(rest), fitter.fit([*rest, *other.index])
+            if accepted(fitter, *whole, other, better):
+                choice.chosen[choice.chosen.index(c)] = other
+
+
+def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) -> bool:
+    """Whether an effect is significant, holds on other data, is believable and matters."""
+    if bic < MARGIN or fitter.held_gain(before, after) < HELD_OUT_GAIN:
+        return False
+    index = list(c.index)
+    value = after.theta[index] - fitter.absent[index]
+    sigma = np.sqrt(np.diag(after.covariance)[index])
+    if np.max(np.abs(value) / sigma) < SIGNIFICANT:
+        return False
+    if np.any(np.abs(value) - 2.0 * sigma > np.array(c.plausible)):
+        return False
+    return _matters(fitter, before, after)
+
+
+def _matters(fitter: Fitter, before: Fit, after: Fit) -> bool:
+    six0, six1 = before.theta[:6], after.theta[:6]
+    moved_scale = float(np.max(np.abs(six1[:3] - six0[:3])))
+    offset0, offset1 = -six0[3:] / six0[:3], -six1[3:] / six1[:3]
+    moved_offset = float(np.max(np.abs(offset1 - offset0)))
+    held0, held1 = fitter.held_rms(before), fitter.held_rms(after)
+    return (
+        moved_scale > MATTERS_SCALE
+        or moved_offset > MATTERS_OFFSET
+        or held1 < (1.0 - MATTERS_HELD_OUT) * held0
+    )

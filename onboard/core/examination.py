@@ -1,0 +1,157 @@
+"""A flight gone through once more with other physics in the model: the engine of a diagnosis.
+
+Every pass over a flight costs; a diagnosis makes few.  Noise levels are found on a sample of the
+flight, one pass gives sums and rows with everything that is suspected, another those of the model
+that was chosen, linearised about what the first one has found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Family
+from onboard.core.engine import Chunk, Engine, moved
+from onboard.core.passes import EpochTrace, Linearisation, Pass, PassResult, Portion
+from onboard.core.physics.effect import EffectColumns
+from onboard.core.solution import Solution, solve
+
+Array = NDArray[np.float64]
+
+SAMPLE_S = 200.0
+"""Flight on which noise levels are tried; more does not make them better known."""
+BLOCK = 4
+"""Neighbouring chunks of the sample: the filter needs ten seconds to settle in each."""
+NOISE_ROUNDS = 4
+LATE_S, SPREAD_S2 = 2e-3, 4e-3
+"""Moves of delay and squared window that are worth another linearisation."""
+
+
+class Examination(Engine):
+    """An engine over a flight that another one has kept, with more physics."""
+
+    def __init__(
+        self,
+        like: Engine,
+        families: Sequence[Family],
+        *,
+        t0: float,
+        start: Engine | None = None,
+        point: Linearisation | None = None,
+    ) -> None:
+        """Take the flight of ``like``, more families, and where to start.
+
+        Args:
+            like: has the flight and the prior.
+            families: physics to add to the calibration's own.
+            t0: when a clock that runs off was right, s.
+            start: an examination whose linearisation and noise are taken over.
+            point: another linearisation than that.
+        """
+        origin = start or like
+        point = replace(point or origin.point, skew_from=t0)
+        if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
+            point = replace(point, skew=0.0)
+        super().__init__(
+            replace(like.settings, refine=True),
+            like.prior,
+            point,
+            origin.noise,
+            more=tuple(families),
+        )
+        self.chunks = list(like.chunks)
+        self.trusted_s = like.trusted_s
+        self.traces: list[EpochTrace] = []
+        self._blocks = _blocks(self.chunks)
+
+    def with_noise(self) -> Examination:
+        """Find noise and timing, then go through the whole flight."""
+        self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        return self
+
+    def with_rows(self, theta: Array | None = None, covariance: Array | None = None) -> Examination:
+        """Go through the whole flight, keep every row; again if timing was off or gates were blind.
+
+        Args:
+            theta: (m,) estimate for the gates, of the same linearisation.
+            covariance: (m, m) of it.
+        """
+        held = None if theta is None or covariance is None else (theta, covariance)
+        blind = held is None
+        for left in (2, 1, 0):
+            self._go(held)
+            self._seed = found = solve(self.portions, self.model)
+            point = moved(self.point, self.model, found.theta)
+            late = abs(point.delay - self.point.delay)
+            spread = abs(point.window**2 - self.point.window**2)
+            settled = late < LATE_S and spread < SPREAD_S2
+            if not left or (settled and not blind):
+                break
+            self._move(point, self.noise)
+            held, blind = None, False
+        return self
+
+    def _go(self, held: tuple[Array, Array] | None = None) -> None:
+        self._pass = self._new_pass()
+        if held is not None:
+            self._pass.hold(*held)
+        self._pass.keep_traces = True
+        self.refused.clear()
+        self.states.clear()
+        self.portions, self.traces = [], []
+        for chunk in self.chunks:
+            self._run(chunk)
+
+    def through(self, made: Pass, chunk: Chunk) -> PassResult:
+        """One chunk through a pass, its rows kept."""
+        result = super().through(made, chunk)
+        self.traces.extend(result.traces)
+        return result
+
+    def _over_buffer(self, made: Pass) -> list[Portion]:
+        """The sample only: noise and timing are what is asked of these passes."""
+        out = []
+        for block in self._blocks:
+            made.restart()
+            out += [self.through(made, chunk).portion for chunk in block]
+        return out
+
+    @property
+    def absent(self) -> Array:
+        """Values of the unknowns that mean that an effect is not in the model, (m,)."""
+        at = np.zeros(self.model.size)
+        if "clock_rate" in self.model.index:
+            at[self.model.index["clock_rate"]] = -self.point.skew
+        return at
+
+    def found(self) -> Solution:
+        """The solution.
+
+        Raises:
+            KeyError: no flight was processed.
+        """
+        solution = self.solution()
+        if solution is None:
+            raise KeyError("no flight was processed")
+        return solution
+
+    def indices(self, family: Family) -> list[int]:
+        """Columns of one family."""
+        return list(range(*self.model.slices[family.name].indices(self.model.size)))
+
+    def indices_of(self, families: Sequence[EffectColumns]) -> list[int]:
+        """Columns of some families."""
+        return [i for f in families for i in self.indices(f)]
+
+
+def _blocks(chunks: Sequence[Chunk]) -> list[list[Chunk]]:
+    """The whole flight, or blocks of it spread evenly."""
+    whole = sum(c.duration for c in chunks)
+    blocks = [list(chunks[i : i + BLOCK]) for i in range(0, len(chunks), BLOCK)]
+    if whole <= 1.5 * SAMPLE_S:
+        return [list(chunks)]
+    count = max(1, round(len(blocks) * SAMPLE_S / whole))
+    return [blocks[i] for i in np.linspace(0, len(blocks) - 1, count).round().astype(int)]

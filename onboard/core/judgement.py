@@ -1,0 +1,302 @@
+"""The evidence put together: effects with their sizes, the ladder of models, the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.calibrator import Calibrator
+from onboard.core.choice import MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
+from onboard.core.examination import Examination
+from onboard.core.findings import (
+    Ambiguity,
+    Diagnosis,
+    Effect,
+    Mismatch,
+    NotTestable,
+    Quantity,
+    Rival,
+    Rung,
+    Series,
+    Verdict,
+)
+from onboard.core.passes import Linearisation
+from onboard.core.physics.effect import EffectColumns, Origin
+from onboard.core.physics.offsets import BiasStep
+from onboard.core.regimes import located, regime_residuals
+from onboard.core.report import timing_of
+from onboard.core.result import Calibration
+from onboard.core.selection import Fit, Fitter
+from onboard.core.timing_effects import (
+    STANDING,
+    fault_effect,
+    saturation_effect,
+    standing_effects,
+    without,
+)
+
+Array = NDArray[np.float64]
+
+AMBIGUOUS = 10.0
+"""Rivals within this difference of BIC cannot be told apart."""
+UNEXPLAINED = 6.0
+"""Inflation of the variance past which the residual is not noise."""
+
+
+class Judge:
+    """Puts the evidence together."""
+
+    def __init__(
+        self,
+        calibrator: Calibrator,
+        imu: int,
+        final: Examination,
+        families: Sequence[EffectColumns],
+        origin: Origin,
+        choice: Choice,
+        absent: Sequence[NotTestable],
+        full_point: Linearisation,
+    ) -> None:
+        """Take the flight, the final model and how it was chosen."""
+        self.calibrator, self.imu, self.engine = calibrator, imu, final
+        self.families, self.origin = list(families), origin
+        self.choice, self.absent = choice, list(absent)
+        self.full_point = full_point
+        self.told = calibrator.parameters.gps_delay_told
+        self.traces = final.traces
+        self.calibration: Calibration = calibrator.calibration_with(imu, final)
+        self.solution = final.found()
+        self.fitter = Fitter(final.all_portions, final.model, self.solution.inflation, final.absent)
+        self.index = final.model.index
+        self.all = list(range(final.model.size))
+
+    def diagnosis(self) -> Diagnosis:
+        timing = timing_of(self.engine, self.solution)
+        standing = standing_effects(
+            timing, self.solution, self.index, self.told, self.calibrator.parameters.trim
+        )
+        ladder, held = self._ladder()
+        before, after = held[0], held[-1]
+        effects = [self._standing(n, q, cure, p) for n, (q, cure, p) in standing.items()]
+        effects += [self._effect(f) for f in self.families]
+        rail = saturation_effect(self.engine.chunks, self.origin.t0)
+        fault = fault_effect(
+            self.traces,
+            self.engine.chunks,
+            self.calibrator,
+            self.origin.t0,
+            self.engine.noise,
+            self.engine.settings.coast_s,
+        )
+        # What a clipped accelerometer integrates to is not the receiver's fault.
+        if rail is not None:
+            effects.append(rail)
+        elif fault is not None:
+            effects.append(fault)
+        insufficient = not self.calibrator.engine(self.imu).moving
+        mismatch = self._mismatch(before, after)
+        verdict, note = self._verdict(effects, insufficient=insufficient)
+        if verdict is Verdict.INSUFFICIENT:
+            effects = []
+        effects.sort(key=lambda e: -e.share_of_mismatch)
+        return Diagnosis(
+            imu=self.imu,
+            verdict=verdict,
+            calibration=self.calibration,
+            timing=timing,
+            mismatch=mismatch,
+            effects=tuple(effects),
+            ambiguous=self._ambiguous(effects),
+            not_testable=(*self.absent, *self._too_weak(effects)),
+            ladder=ladder,
+            regimes=regime_residuals(self.traces, self.engine.chunks, before.theta, after.theta),
+            series=self._series(before.theta, after.theta),
+            note=note,
+        )
+
+    def _held(self, names: Sequence[str]) -> Array:
+        """Unknowns of ``names`` at the value that means *not in the model*."""
+        return without(names, self.index, self.engine.point, self.engine.absent, self.told)
+
+    def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
+        """Six numbers only, + timing (and constant attitude errors), + each effect."""
+        timing = ["gps_delay", "window_squared", "attitude_delay"]
+        constant = ["tilt_roll", "tilt_pitch", "heading"]
+        out = [self.index[n] for n in timing + constant]
+        mine = [i for f in self.families for i in self.all if i in self.engine.indices(f)]
+        free = [i for i in self.all if i not in out and i not in mine]
+        fits = [self.fitter.fit(free, self._held(timing))]
+        names = ["six numbers only"]
+        free = free + out
+        fits.append(self.fitter.fit(free))
+        names.append("+ timing and attitude")
+        for f in self.families:
+            free = free + [i for i in self.all if i in self.engine.indices(f)]
+            fits.append(self.fitter.fit(free))
+            names.append(f"+ {f.effect}")
+        rungs = tuple(
+            Rung(name, self.fitter.rms(fit), self.fitter.held_rms(fit))
+            for name, fit in zip(names, fits, strict=True)
+        )
+        return rungs, fits
+
+    def _without(self, index: Sequence[int], held: Array | None = None) -> tuple[Fit, Fit]:
+        rest = [i for i in self.all if i not in index]
+        return self.fitter.fit(rest, held), self.fitter.fit(self.all)
+
+    def _share(self, without: Fit, with_it: Fit) -> float:
+        left = max(without.chi2, 1e-12)
+        return float(np.clip((without.chi2 - with_it.chi2) / left, 0.0, 1.0))
+
+    def _standing(
+        self, name: str, quantities: dict[str, Quantity], cure: str, parameters: dict[str, float]
+    ) -> Effect:
+        columns = STANDING[name]
+        index = [self.index[c] for c in columns]
+        absent, with_it = self._without(index, self._held(columns))
+        made = self._record(name, quantities, index, absent, with_it, parameters, cure)
+        return replace(made, rivals=self._standing_rivals(name, columns))
+
+    def _standing_rivals(self, name: str, columns: Sequence[str]) -> tuple[Rival, ...]:
+        """What else could stand for timing or a constant attitude error, by the full sums."""
+        choice, full = self.choice, self.choice.fitter.model.index
+        target = Candidate(name, tuple(full[c] for c in columns), ())
+        rest = [i for i in choice.free if i not in target.index]
+        held = without(columns, full, self.full_point, choice.fitter.absent, self.told)
+        others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
+        return tuple(rivals_of(choice.fitter, rest, target, others, held))
+
+    def _effect(self, f: EffectColumns) -> Effect:
+        index = [i for i in self.all if i in self.engine.indices(f)]
+        without, with_it = self._without(index)
+        sigma = np.sqrt(np.diag(self.solution.covariance))
+        taken = {"clock_rate": self.engine.point.skew}
+        quantities = {
+            key: Quantity(
+                float(self.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
+            )
+            for key, i, u in zip(f.keys, index, f.unknowns, strict=True)
+        }
+        if isinstance(f, BiasStep):
+            quantities = {"time": Quantity(f.at - self.origin.t0, 0.5, "s"), **quantities}
+        values = {k: q.value for k, q in quantities.items()}
+        made = self._record(
+            f.effect, quantities, index, without, with_it, f.parameters(values), f.cure
+        )
+        return replace(made, rivals=self._rivals(f))
+
+    def _record(
+        self,
+        name: str,
+        quantities: dict[str, Quantity],
+        index: Sequence[int],
+        without: Fit,
+        with_it: Fit,
+        parameters: dict[str, float],
+        cure: str,
+    ) -> Effect:
+        bic = self.fitter.gain(without, with_it) - len(index) * np.log(max(self.fitter.rows, 2.0))
+        return Effect(
+            name=name,
+            unknowns=quantities,
+            share_of_mismatch=self._share(without, with_it),
+            delta_bic=-float(bic),
+            held_out_before=self.fitter.held_rms(without),
+            held_out_after=self.fitter.held_rms(with_it),
+            parameters=parameters,
+            cure=cure,
+            where=located(
+                self.fitter.portions,
+                self.engine.chunks,
+                without.theta,
+                with_it.theta,
+                self.origin.t0,
+            ),
+        )
+
+    def _mismatch(self, before: Fit, after: Fit) -> Mismatch:
+        n = len(self.all)
+        gain = self.fitter.gain(before, after)
+        series = self._series(before.theta, after.theta)
+        return Mismatch(
+            detected=bool(gain > n * np.log(max(self.fitter.rows, 2.0)) + MARGIN),
+            whitened_rms_before=self.fitter.rms(before),
+            whitened_rms_after=self.fitter.rms(after),
+            p_value=float(np.exp(-0.5 * min(max(gain, 0.0), 1400.0))),
+            velocity_rms_before=_rms(series.before),
+            velocity_rms_after=_rms(series.after),
+            held_out_before=self.fitter.held_rms(before),
+            held_out_after=self.fitter.held_rms(after),
+            where=located(
+                self.fitter.portions, self.engine.chunks, before.theta, after.theta, self.origin.t0
+            ),
+        )
+
+    def _series(self, before: Array, after: Array) -> Series:
+        t = np.array([x.t for x in self.traces]) - self.origin.t0
+        one, two = (np.full((len(t), 3), np.nan) for _ in range(2))
+        for k, x in enumerate(self.traces):
+            one[k, : x.velocities] = x.innovation - x.columns @ before
+            two[k, : x.velocities] = x.innovation - x.columns @ after
+        refused = np.array(["velocity" in x.refused for x in self.traces], dtype=bool)
+        return Series(t, one, two, refused)
+
+    def _verdict(self, effects: list[Effect], *, insufficient: bool) -> tuple[Verdict, str]:
+        note = self.calibration.note
+        if insufficient:
+            return Verdict.INSUFFICIENT, "too little excitation to say. " + note
+        left = self.solution.inflation > UNEXPLAINED
+        if effects:
+            if left:
+                return Verdict.PARTLY_EXPLAINED, (
+                    "what was found does not explain all of the residual. " + note
+                )
+            return Verdict.EXPLAINED, note
+        if left:
+            return Verdict.UNEXPLAINED, (
+                "the residual is not noise, and no effect of the catalogue explains it. " + note
+            )
+        return Verdict.CLEAN, note
+
+    def _ambiguous(self, effects: list[Effect]) -> tuple[Ambiguity, ...]:
+        by_name = {f.effect: f for f in self.families}
+        out = []
+        for e in effects:
+            close = [r.name for r in e.rivals if r.delta_bic < AMBIGUOUS and r.name != e.name]
+            if close and e.name in by_name:
+                out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
+        return tuple(out)
+
+    def _rivals(self, f: EffectColumns) -> tuple[Rival, ...]:
+        for c in self.choice.chosen:
+            if c.effect == f.effect:
+                return tuple(self.choice.rivals(c))
+        return ()
+
+    def _too_weak(self, effects: list[Effect]) -> list[NotTestable]:
+        """Effects that this flight could not have shown at any plausible size."""
+        named = {e.name for e in effects}
+        out: list[NotTestable] = []
+        for c in self.choice.candidates:
+            if c.columns is None or c.effect in named or any(n.name == c.effect for n in out):
+                continue
+            index = list(c.index)
+            rest = [i for i in self.choice.free if i not in index]
+            fit = self.choice.fitter.fit([*rest, *index], held_out=False)
+            sigma = np.sqrt(np.diag(fit.covariance)[index])
+            if np.all(sigma * SIGNIFICANT > np.array(c.plausible)):
+                out.append(
+                    NotTestable(
+                        c.effect,
+                        "this flight would not show it at any plausible size: " + c.columns.apart,
+                    )
+                )
+        return out
+
+
+def _rms(x: Array) -> float:
+    seen = x[np.isfinite(x)]
+    return float(np.sqrt(np.mean(seen**2))) if len(seen) else float("nan")
