@@ -1,4 +1,4 @@
-"""What the sealed challenge conceals: effects, sizes, pairs, controls, and things that have no name.
+"""What the sealed challenge conceals: effects, sizes, pairs, controls, and what has no name.
 
 Sizes count in *units*: what clean flights of the same kind say five sigma of that unknown are
 (rounded, four minutes of the simulated vehicles' random manoeuvres).  ``small`` is about one
@@ -104,7 +104,7 @@ ALIKE: tuple[frozenset[str], ...] = (
 )
 """Effects of one kind: two of them at once are one effect of that kind to any single flight."""
 ALONE = frozenset({"saturation", "vibration_rectification"})
-"""Not paired: what is clipped has lost the other effect; shaken vehicles are a flight of their own."""
+"""Not paired: what is clipped has lost the other effect; shaken vehicles fly alone."""
 NAMELESS: dict[str, tuple[float, float, float]] = {
     "dynamic_pressure": (0.12, 0.12, 0.1),
     "roll_rate": (0.3, 0.3, 0.3),

@@ -206,7 +206,7 @@ HEAD = " | ".join(
     ]
 )
 LEGEND = """\
-named: every concealed effect is said by its name; false: recordings in which something else is said;
+named: every concealed effect is said by its name; false: something else is said as well;
 unknowns: within 10 % or 3 sigma; median: relative error; onset: largest error of a time;
 held-out: median fall of the error on data that was not fitted."""
 
@@ -215,8 +215,10 @@ def table(outcomes: list[Outcome]) -> str:
     """What the challenge has shown."""
     lines = [HEAD, "-" * len(HEAD)]
     testable = [o for o in outcomes if o.secret.kind == "single" and o.secret.testable]
-    for name in sorted({o.secret.names[0] for o in testable}):
-        lines.append(_row(name, [o for o in testable if o.secret.names[0] == name]))
+    lines += [
+        _row(name, [o for o in testable if o.secret.names[0] == name])
+        for name in sorted({o.secret.names[0] for o in testable})
+    ]
     groups = {
         "all single effects": testable,
         "below what is testable": [

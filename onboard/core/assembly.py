@@ -70,6 +70,9 @@ class Assembly:
         if isinstance(sample, Vibration):
             name = "vibration" if sample.imu is None else f"vibration_{sample.imu}"
             self._slow.setdefault(name, SlowTrack()).add(sample.t, sample.level)
+            if sample.clipping:
+                counts = tuple(float(n) for n in sample.clipping)
+                self._slow.setdefault("clipping", SlowTrack()).add(sample.t, counts)
         elif isinstance(sample, Throttle):
             self._slow.setdefault("throttle", SlowTrack()).add(sample.t, (sample.throttle,))
         elif sample.airspeed is not None:
@@ -163,9 +166,10 @@ class Assembly:
             inside = np.flatnonzero((fixes.t >= begin + REACH_S - 0.1) & (fixes.t <= end - 0.3))
             known = fixes.t[inside] >= self._attitude.first + REACH_S
             good = inside[trusted[inside] & known]
-            if len(good) == 0:
+            fresh = len(inside) == 0 or self._fresh.get(imu) != float(fixes.t[inside[0]])
+            # Flight without a fix to be believed goes on inertially, if anything went before.
+            if len(inside) == 0 or (fresh and len(good) == 0):
                 continue
-            fresh = self._fresh.get(imu) != float(fixes.t[inside[0]])
             # A filter can only start where GPS is to be believed.
             first = int(good[0]) if fresh else int(inside[0])
             last = int(inside[-1])

@@ -8,7 +8,7 @@ moment is looked for afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,12 @@ RIVAL_SHARE = 0.15
 """Least share of an effect's evidence that makes another one its rival."""
 LEFT_BESIDE = 0.5
 """A rival explains the same: beside the effect less than this share of its gain is left."""
+USED = 4.0
+"""Sigmas from which an unknown of several counts as used."""
+CHANCE = 4.0
+"""What an unknown that is not used gains by chance, 19 times of 20."""
+STILL = 0.8
+"""Share of its least size that a timing error must keep whatever else is in the model."""
 STEP = "bias_step"
 STEP_PLAUSIBLE = 3.0
 
@@ -47,9 +53,18 @@ class Candidate:
     columns: EffectColumns | None = None
     spent: int = 0
 
-    def bic(self, fitter: Fitter, gain: float) -> float:
-        """Fall of BIC by a gain in chi-square."""
-        return gain - (len(self.index) + self.spent) * fitter.log_rows
+    def bic(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """Fall of BIC from ``before`` to ``after``, the fit with the effect in.
+
+        An unknown that stays at nothing (one axis of three) is not a reason for the effect, and
+        pays only for what it may gain by chance.
+        """
+        index = list(self.index)
+        sigma = np.sqrt(np.diag(after.covariance)[index])
+        used = int(np.sum(np.abs(after.theta[index] - fitter.absent[index]) > USED * sigma))
+        used = max(used, 1)
+        cost = (used + self.spent) * fitter.log_rows + CHANCE * (len(index) - used)
+        return fitter.gain(before, after) - cost
 
 
 @dataclass(slots=True)
@@ -96,11 +111,12 @@ def rivals_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    bic = target.bic(fitter, fitter.gain(before, with_it))
+    bic = target.bic(fitter, before, with_it)
     out = []
     for other in others:
-        gain = fitter.gain(before, fitter.fit([*rest, *other.index], held, held_out=False))
-        other_bic = other.bic(fitter, gain)
+        instead = fitter.fit([*rest, *other.index], held, held_out=False)
+        gain = fitter.gain(before, instead)
+        other_bic = other.bic(fitter, before, instead)
         if other_bic < max(RIVAL_SHARE * bic, 0.0):
             continue
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
@@ -126,7 +142,7 @@ def choose(fitter: Fitter, base: Sequence[int], candidates: Sequence[Candidate])
         scored = []
         for c in offered:
             after = wide.fit([*choice.free, *c.index])
-            scored.append((c.bic(wide, wide.gain(before, after)), c, after))
+            scored.append((c.bic(wide, before, after), c, after))
         scored.sort(key=lambda s: -s[0])
         best = next((c for bic, c, after in scored if accepted(wide, before, after, c, bic)), None)
         if best is None:
@@ -154,22 +170,39 @@ def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> boo
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in standing.index]
     before = fitter.fit(rest, held)
-    own = standing.bic(
-        fitter, fitter.gain(before, fitter.fit([*rest, *standing.index], held, held_out=False))
-    )
+    with_it = fitter.fit([*rest, *standing.index], held, held_out=False)
+    own = standing.bic(fitter, before, with_it)
     better = own
     taken: Candidate | None = None
     for other in choice.candidates:
         if other in choice.chosen or other.effect == standing.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
-        bic = other.bic(fitter, fitter.gain(before, after))
+        bic = other.bic(fitter, before, after)
         if bic > better and accepted(fitter, before, after, other, bic):
             better, taken = bic, other
     if taken is None:
         return False
     choice.chosen.append(taken)
     return True
+
+
+def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> list[str]:
+    """Effects beside any one of which a standing unknown would not reach the size of an effect.
+
+    Args:
+        choice: what was chosen.
+        value: the unknown of a fit.
+        least: size from which it counts.
+    """
+    out = []
+    for other in choice.candidates:
+        if other in choice.chosen:
+            continue
+        beside = choice.fitter.fit([*choice.free, *other.index], held_out=False)
+        if abs(value(beside)) < STILL * least:
+            out.append(other.effect)
+    return out
 
 
 def _best_jump(choice: Choice) -> tuple[Candidate | None, int | None]:
@@ -187,18 +220,17 @@ def _reconsider(choice: Choice) -> None:
     for c in list(choice.chosen[:-1]):
         rest = [i for i in choice.free if i not in c.index]
         before = fitter.fit(rest, held_out=False)
-        bic = c.bic(fitter, fitter.gain(before, fitter.fit([*rest, *c.index], held_out=False)))
+        bic = c.bic(fitter, before, fitter.fit([*rest, *c.index], held_out=False))
         if bic < MARGIN:
             choice.chosen.remove(c)
             continue
         swaps = []
-        for other in choice.candidates:
-            if other in choice.chosen:
-                continue
-            gain = fitter.gain(before, fitter.fit([*rest, *other.index], held_out=False))
-            swaps.append((other.bic(fitter, gain), other))
-        better, other = max(swaps, key=lambda s: s[0], default=(-np.inf, None))
-        if other is not None and better > bic + MARGIN:
+        for offered in choice.candidates:
+            if offered not in choice.chosen:
+                instead = fitter.fit([*rest, *offered.index], held_out=False)
+                swaps.append((offered.bic(fitter, before, instead), offered))
+        better, other = max(swaps, key=lambda s: s[0], default=(-np.inf, c))
+        if better > bic + MARGIN:
             whole = fitter.fit(rest), fitter.fit([*rest, *other.index])
             if accepted(fitter, *whole, other, better):
                 choice.chosen[choice.chosen.index(c)] = other

@@ -13,19 +13,35 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.calibrator import Calibrator
-from onboard.core.choice import MARGIN, STEP, Candidate, Choice, choose, reconsider_standing
-from onboard.core.engine import Chunk, Engine, moved
+from onboard.core.choice import (
+    MARGIN,
+    STEP,
+    Candidate,
+    Choice,
+    choose,
+    doubtful,
+    reconsider_standing,
+)
+from onboard.core.engine import Chunk, moved
 from onboard.core.examination import Examination
 from onboard.core.findings import Diagnosis, NotTestable
-from onboard.core.judgement import Judge
+from onboard.core.judgement import Evidence, Judge
 from onboard.core.jumps import boundary_of, candidate_of, jump_near
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import EffectColumns, Origin
+from onboard.core.physics.gains import Gain
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.report import timing_of
+from onboard.core.screening import false_fixes, unclipped
 from onboard.core.selection import Fitter
 from onboard.core.solution import Solution
-from onboard.core.timing_effects import STANDING, standing_effects, without
+from onboard.core.timing_effects import (
+    LEAST,
+    STANDING,
+    saturation_effect,
+    standing_effects,
+    without,
+)
 
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals below which what follows them is not to be seen."""
@@ -46,18 +62,32 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
     """
     engine = calibrator.engine(imu)
     origin = Origin(t0=calibrator.first_sample)
-    testable, absent = _testable(catalogue(origin), engine.chunks)
-    full = Examination(engine, testable, t0=origin.t0).with_noise()
+    rail = saturation_effect(engine.chunks, origin.t0)
+    chunks = list(engine.chunks)
+    if rail is not None:
+        chunks = unclipped(chunks, rail.intervals, origin.t0) or chunks
+    testable, absent = _testable(catalogue(origin), chunks)
+    full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
+    fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
+    if fault is not None:
+        full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     choice = _chosen(full, testable)
-    _second_thoughts(choice, full, calibrator)
+    doubts = _second_thoughts(choice, full, calibrator)
     families = _families(full, choice)
-    final = _final(engine, full, choice, families)
+    final = _final(full, choice, families)
     kept = _needed(final, families)
     if len(kept) < len(families):
         # A jump may have passed for something slower, or the other way round.
         families = kept
-        final = Examination(engine, families, t0=origin.t0, start=final).with_rows()
-    return Judge(calibrator, imu, final, families, origin, choice, absent, full.point).diagnosis()
+        final = Examination(full, families, t0=origin.t0, start=final).with_rows()
+    return Judge(
+        calibrator,
+        imu,
+        Evidence(full, choice, final, tuple(families), doubts),
+        origin,
+        absent,
+        tuple(e for e in (rail, fault) if e is not None),
+    ).diagnosis()
 
 
 def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
@@ -70,8 +100,14 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
     return choose(fitter, base, candidates)
 
 
-def _second_thoughts(choice: Choice, full: Examination, calibrator: Calibrator) -> None:
-    """Timing and attitude errors that would be reported must be better than any other cause."""
+def _second_thoughts(
+    choice: Choice, full: Examination, calibrator: Calibrator
+) -> dict[str, list[str]]:
+    """Timing and attitude errors that would be reported must be better than any other cause.
+
+    Returns:
+        Those beside which another effect could stand as well, with its names.
+    """
     told, trim = calibrator.parameters.gps_delay_told, calibrator.parameters.trim
     index = choice.fitter.model.index
     for _ in range(len(STANDING)):
@@ -86,12 +122,27 @@ def _second_thoughts(choice: Choice, full: Examination, calibrator: Calibrator) 
             held = without(STANDING[name], index, full.point, choice.fitter.absent, told)
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
-            return
+            return {n: d for n in standing if n in LEAST and (d := _doubts(choice, full, n, told))}
+    return {}
+
+
+def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
+    """Other effects beside which one of timing would be too small to mention."""
+    column = choice.fitter.model.index[STANDING[name][0]]
+    taken = {"gps_latency": full.point.delay - told, "gps_smoothing": full.point.window**2}
+    least = LEAST[name] ** 2 if name == "gps_smoothing" else LEAST[name]
+    start = taken.get(name, full.point.attitude_delay)
+    return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
 
 
 def _families(full: Examination, choice: Choice) -> list[EffectColumns]:
-    """Columns of what was chosen; a jump at its moment."""
-    families = [c.columns for c in choice.chosen if c.columns is not None]
+    """Columns of what was chosen; those of a gain about its size, a jump at its moment."""
+    theta = choice.fitter.fit(choice.free, held_out=False).theta
+    families = [
+        c.columns.about(theta[list(c.index)]) if isinstance(c.columns, Gain) else c.columns
+        for c in choice.chosen
+        if c.columns is not None
+    ]
     if choice.jump is None or all(c.effect != STEP for c in choice.chosen):
         return families
     near = boundary_of(choice.fitter, choice.jump)
@@ -99,22 +150,20 @@ def _families(full: Examination, choice: Choice) -> list[EffectColumns]:
     return families if step is None else [*families, step]
 
 
-def _final(
-    engine: Engine, full: Examination, choice: Choice, families: Sequence[EffectColumns]
-) -> Examination:
+def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns]) -> Examination:
     """The model that was chosen, about what the sums of everything say of it."""
     model = choice.fitter.model
     fit = choice.fitter.fit(choice.free, held_out=False)
     final = Examination(
-        engine,
+        full,
         families,
         t0=full.point.skew_from,
         start=full,
         point=moved(full.point, model, fit.theta),
     )
     if any(isinstance(f, BiasStep) for f in families):
-        # Before a jump has its moment, no estimate is fit to refuse what contradicts it.
-        return final.with_rows()
+        # Without the jump its mismatch was noise, and no estimate is fit to refuse anything.
+        return final.with_noise()
     theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
     mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
     theirs = [model.index[final.model.unknowns[i].name] for i in mine]
@@ -135,7 +184,7 @@ def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[Effect
         for family in kept:
             c = candidate_of(made, family)
             without = fitter.fit([i for i in free if i not in c.index], held_out=False)
-            bic = c.bic(fitter, fitter.gain(without, with_all))
+            bic = c.bic(fitter, without, with_all)
             if bic < least:
                 worst, least = family, bic
         if least >= MARGIN:

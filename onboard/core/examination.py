@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from onboard.core.columns import Family
 from onboard.core.engine import Chunk, Engine, moved
+from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace, Linearisation, Pass, PassResult, Portion
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.solution import Solution, solve
@@ -39,6 +40,7 @@ class Examination(Engine):
         families: Sequence[Family],
         *,
         t0: float,
+        chunks: Sequence[Chunk] | None = None,
         start: Engine | None = None,
         point: Linearisation | None = None,
     ) -> None:
@@ -47,6 +49,7 @@ class Examination(Engine):
         Args:
             like: has the flight and the prior.
             families: physics to add to the calibration's own.
+            chunks: another flight than that of ``like``.
             t0: when a clock that runs off was right, s.
             start: an examination whose linearisation and noise are taken over.
             point: another linearisation than that.
@@ -55,6 +58,7 @@ class Examination(Engine):
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
+        self.traces: list[EpochTrace] = []
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
@@ -62,15 +66,20 @@ class Examination(Engine):
             origin.noise,
             more=tuple(families),
         )
-        self.chunks = list(like.chunks)
+        self.chunks = list(like.chunks if chunks is None else chunks)
         self.trusted_s = like.trusted_s
-        self.traces: list[EpochTrace] = []
         self._blocks = _blocks(self.chunks)
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
         self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
         return self
+
+    def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
+        made = super()._new_pass(members)
+        made.keep_traces = members is None
+        self.traces = []
+        return made
 
     def with_rows(self, theta: Array | None = None, covariance: Array | None = None) -> Examination:
         """Go through the whole flight, keep every row; again if timing was off or gates were blind.
@@ -98,10 +107,9 @@ class Examination(Engine):
         self._pass = self._new_pass()
         if held is not None:
             self._pass.hold(*held)
-        self._pass.keep_traces = True
         self.refused.clear()
         self.states.clear()
-        self.portions, self.traces = [], []
+        self.portions = []
         for chunk in self.chunks:
             self._run(chunk)
 

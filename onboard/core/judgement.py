@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.calibrator import Calibrator
-from onboard.core.choice import MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
+from onboard.core.choice import HELD_OUT_GAIN, MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
 from onboard.core.examination import Examination
 from onboard.core.findings import (
     Ambiguity,
@@ -22,28 +22,43 @@ from onboard.core.findings import (
     Rung,
     Series,
     Verdict,
+    Where,
 )
-from onboard.core.passes import Linearisation
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.offsets import BiasStep
-from onboard.core.regimes import located, regime_residuals
+from onboard.core.regimes import Residuals, axis_of, located, main_axis, regime_residuals, spans
 from onboard.core.report import timing_of
 from onboard.core.result import Calibration
 from onboard.core.selection import Fit, Fitter
 from onboard.core.timing_effects import (
     STANDING,
-    fault_effect,
-    saturation_effect,
     standing_effects,
     without,
 )
 
 Array = NDArray[np.float64]
 
+APART = {
+    "gps_latency": "accelerate and brake hard, straight ahead",
+    "gps_smoothing": "accelerate and brake hard and often; a lever arm needs turns instead",
+    "imu_delay": "roll and pitch quickly while accelerating",
+}
+"""Manoeuvres that tell a timing error from what looks alike."""
 AMBIGUOUS = 10.0
 """Rivals within this difference of BIC cannot be told apart."""
 UNEXPLAINED = 6.0
 """Inflation of the variance past which the residual is not noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """The models: everything, what was chosen of it, the one that is reported, what is in doubt."""
+
+    full: Examination
+    choice: Choice
+    final: Examination
+    families: tuple[EffectColumns, ...]
+    doubts: Mapping[str, Sequence[str]]
 
 
 class Judge:
@@ -53,18 +68,18 @@ class Judge:
         self,
         calibrator: Calibrator,
         imu: int,
-        final: Examination,
-        families: Sequence[EffectColumns],
+        evidence: Evidence,
         origin: Origin,
-        choice: Choice,
         absent: Sequence[NotTestable],
-        full_point: Linearisation,
+        excluded: Sequence[Effect],
     ) -> None:
-        """Take the flight, the final model and how it was chosen."""
+        """Take the flight, the models, what cannot be asked, and what was left out of the fit."""
+        final = evidence.final
         self.calibrator, self.imu, self.engine = calibrator, imu, final
-        self.families, self.origin = list(families), origin
-        self.choice, self.absent = choice, list(absent)
-        self.full_point = full_point
+        self.families, self.origin = list(evidence.families), origin
+        self.choice, self.absent = evidence.choice, list(absent)
+        self.full_point, self.doubts = evidence.full.point, evidence.doubts
+        self.excluded = list(excluded)
         self.told = calibrator.parameters.gps_delay_told
         self.traces = final.traces
         self.calibration: Calibration = calibrator.calibration_with(imu, final)
@@ -72,32 +87,33 @@ class Judge:
         self.fitter = Fitter(final.all_portions, final.model, self.solution.inflation, final.absent)
         self.index = final.model.index
         self.all = list(range(final.model.size))
+        self.axes = self._axes()
+
+    def _axes(self) -> dict[int, str]:
+        """Body axis of each column that acts on one."""
+        keys = {i: name.rsplit("_", 1)[-1] for name, i in self.index.items() if i < 6}
+        keys |= {self.index["tilt_roll"]: "roll", self.index["tilt_pitch"]: "pitch"}
+        for f in self.families:
+            keys |= dict(zip(self.engine.indices(f), f.keys, strict=True))
+        return {i: axis for i, key in keys.items() if (axis := axis_of(key)) is not None}
 
     def diagnosis(self) -> Diagnosis:
+        """Everything that is said about the recording."""
         timing = timing_of(self.engine, self.solution)
         standing = standing_effects(
             timing, self.solution, self.index, self.told, self.calibrator.parameters.trim
         )
         ladder, held = self._ladder()
         before, after = held[0], held[-1]
-        effects = [self._standing(n, q, cure, p) for n, (q, cure, p) in standing.items()]
+        effects = [
+            self._standing(n, q, cure, p)
+            for n, (q, cure, p) in standing.items()
+            if n not in self.doubts and self._holds(n)
+        ]
         effects += [self._effect(f) for f in self.families]
-        rail = saturation_effect(self.engine.chunks, self.origin.t0)
-        fault = fault_effect(
-            self.traces,
-            self.engine.chunks,
-            self.calibrator,
-            self.origin.t0,
-            self.engine.noise,
-            self.engine.settings.coast_s,
-        )
-        # What a clipped accelerometer integrates to is not the receiver's fault.
-        if rail is not None:
-            effects.append(rail)
-        elif fault is not None:
-            effects.append(fault)
+        effects += self.excluded
         insufficient = not self.calibrator.engine(self.imu).moving
-        mismatch = self._mismatch(before, after)
+        mismatch = self._mismatch(before, after, effects)
         verdict, note = self._verdict(effects, insufficient=insufficient)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
@@ -160,6 +176,14 @@ class Judge:
         made = self._record(name, quantities, index, absent, with_it, parameters, cure)
         return replace(made, rivals=self._standing_rivals(name, columns))
 
+    def _holds(self, name: str) -> bool:
+        """Whether timing or a constant attitude error is needed, also on data not fitted."""
+        columns = STANDING[name]
+        target = Candidate(name, tuple(self.index[c] for c in columns), ())
+        absent, with_it = self._without(target.index, self._held(columns))
+        enough = target.bic(self.fitter, absent, with_it) >= MARGIN
+        return enough and self.fitter.held_gain(absent, with_it) >= HELD_OUT_GAIN
+
     def _standing_rivals(self, name: str, columns: Sequence[str]) -> tuple[Rival, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""
         choice, full = self.choice, self.choice.fitter.model.index
@@ -186,7 +210,12 @@ class Judge:
         made = self._record(
             f.effect, quantities, index, without, with_it, f.parameters(values), f.cure
         )
-        return replace(made, rivals=self._rivals(f))
+        made = replace(made, rivals=self._rivals(f))
+        if not isinstance(f, BiasStep):
+            return made
+        span = ((f.at - self.origin.t0, self.engine.portions[-1].end - self.origin.t0),)
+        axis = main_axis(self.solution.theta[index])
+        return replace(made, where=spans(self.engine.chunks, self.origin.t0, span, axis))
 
     def _record(
         self,
@@ -208,16 +237,30 @@ class Judge:
             held_out_after=self.fitter.held_rms(with_it),
             parameters=parameters,
             cure=cure,
-            where=located(
-                self.fitter.portions,
-                self.engine.chunks,
-                without.theta,
-                with_it.theta,
-                self.origin.t0,
-            ),
+            where=self._where(index, without.theta, with_it.theta),
         )
 
-    def _mismatch(self, before: Fit, after: Fit) -> Mismatch:
+    def _where(self, index: Sequence[int], before: Array, after: Array) -> tuple[Where, ...]:
+        """Where the residual falls when the columns ``index`` are added."""
+        series = self._series(before, after)
+        return located(
+            self.fitter.portions,
+            self.engine.chunks,
+            before,
+            after,
+            self.origin.t0,
+            {i: self.axes[i] for i in index if i in self.axes},
+            Residuals(series.t + self.origin.t0, series.before, series.after),
+        )
+
+    def _found(self, effects: Sequence[Effect]) -> list[int]:
+        """Columns of what was found; where nothing was, of the six."""
+        names = {e.name for e in effects}
+        out = [self.index[c] for name, cs in STANDING.items() if name in names for c in cs]
+        out += self.engine.indices_of([f for f in self.families if f.effect in names])
+        return out or list(range(6))
+
+    def _mismatch(self, before: Fit, after: Fit, effects: Sequence[Effect]) -> Mismatch:
         n = len(self.all)
         gain = self.fitter.gain(before, after)
         series = self._series(before.theta, after.theta)
@@ -230,9 +273,7 @@ class Judge:
             velocity_rms_after=_rms(series.after),
             held_out_before=self.fitter.held_rms(before),
             held_out_after=self.fitter.held_rms(after),
-            where=located(
-                self.fitter.portions, self.engine.chunks, before.theta, after.theta, self.origin.t0
-            ),
+            where=self._where(self._found(effects), before.theta, after.theta),
         )
 
     def _series(self, before: Array, after: Array) -> Series:
@@ -268,6 +309,10 @@ class Judge:
             close = [r.name for r in e.rivals if r.delta_bic < AMBIGUOUS and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
+        out += [
+            Ambiguity((name, *others), APART.get(name, "fly harder: turns, climbs, accelerations"))
+            for name, others in self.doubts.items()
+        ]
         return tuple(out)
 
     def _rivals(self, f: EffectColumns) -> tuple[Rival, ...]:

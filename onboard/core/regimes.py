@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,35 @@ def regime_of(chunk: Chunk) -> str:
     return "steady"
 
 
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """Velocity residuals of a flight by epoch: ``t`` (n,) s, the rest (n, 3) NED, m/s."""
+
+    t: Array
+    before: Array
+    after: Array
+
+
 def located(
-    portions: Sequence[Portion], chunks: Sequence[Chunk], before: Array, after: Array, t0: float
+    portions: Sequence[Portion],
+    chunks: Sequence[Chunk],
+    before: Array,
+    after: Array,
+    t0: float,
+    axes: Mapping[int, str],
+    residuals: Residuals,
 ) -> tuple[Where, ...]:
-    """Portions in which the misfit falls most from ``before`` to ``after``, neighbours joined."""
+    """Portions in which the misfit falls most from ``before`` to ``after``, neighbours joined.
+
+    Args:
+        portions: sums of the flight.
+        chunks: the flight, one for each portion.
+        before: (m,) unknowns without what was found.
+        after: (m,) with it.
+        t0: first sample, s.
+        axes: body axis on which each of the columns in question acts; others act on none.
+        residuals: what these two leave of the velocity.
+    """
     if len(portions) != len(chunks):
         return ()
     gain = np.array([p.sums.residual(before) - p.sums.residual(after) for p in portions])
@@ -63,7 +89,8 @@ def located(
             Where(
                 portions[g[0]].start - t0,
                 portions[g[-1]].end - t0,
-                _axis(chunks[inside], before, after),
+                _axis(portions[inside], after - before, axes)
+                or _earth_axis(portions[inside], residuals),
                 regime_of(chunks[inside]),
                 float(positive[g].sum() / whole),
             )
@@ -72,11 +99,48 @@ def located(
     return tuple(out[:MOST_PLACES])
 
 
-def _axis(chunk: Chunk, before: Array, after: Array) -> str:
-    """Body axis whose six differ most in effect, by the specific force of the chunk."""
-    f = np.sqrt(np.mean(chunk.stretch.raw_s**2, axis=0))
-    change = np.abs(after[:3] - before[:3]) * f + np.abs(after[3:6] - before[3:6])
-    return "body_" + "xyz"[int(np.argmax(change))]
+def spans(
+    chunks: Sequence[Chunk], t0: float, intervals: Sequence[tuple[float, float]], axis: str
+) -> tuple[Where, ...]:
+    """Places of something whose times are known (s since the first sample), longest first."""
+    whole = sum(b - a for a, b in intervals)
+    out = []
+    for a, b in intervals:
+        middle = t0 + 0.5 * (a + b)
+        chunk = min(chunks, key=lambda c: abs(0.5 * (c.fixes.t[0] + c.fixes.t[-1]) - middle))
+        out.append(Where(a, b, axis, regime_of(chunk), (b - a) / whole if whole else 1.0))
+    out.sort(key=lambda w: -w.share)
+    return tuple(out[:MOST_PLACES])
+
+
+def main_axis(sizes: Array) -> str:
+    """Body axis of the largest of three."""
+    return "body_" + "xyz"[int(np.argmax(np.abs(sizes)))]
+
+
+def _axis(portion: Portion, change: Array, axes: Mapping[int, str]) -> str:
+    """Body axis along which the columns in question moved most; empty if they have none."""
+    moved = dict.fromkeys(axes.values(), 0.0)
+    for i, axis in axes.items():
+        moved[axis] += float(change[i] ** 2 * portion.sums.N[i, i])
+    return max(moved, key=lambda a: moved[a]) if any(moved.values()) else ""
+
+
+def _earth_axis(portion: Portion, residuals: Residuals) -> str:
+    """Earth axis on which the velocity residual fell most."""
+    here = (residuals.t >= portion.start - 1e-6) & (residuals.t <= portion.end + 1e-6)
+    if not here.any():
+        return "earth_north"
+    fall = np.nansum(residuals.before[here] ** 2 - residuals.after[here] ** 2, axis=0)
+    return "earth_" + ("north", "east", "down")[int(np.argmax(fall))]
+
+
+def axis_of(key: str) -> str | None:
+    """Body axis on which an unknown of an effect acts; None if on none in particular."""
+    if key in ("roll", "pitch"):
+        # A tilt about x turns gravity towards y, and one about y towards x.
+        return "body_y" if key == "roll" else "body_x"
+    return f"body_{key[0]}" if key and set(key) <= set("xyz") else None
 
 
 def regime_residuals(

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.calibrator import Calibrator
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace, Linearisation
+from onboard.core.regimes import spans
 from onboard.core.result import Estimate
 from onboard.core.samples import Vector3
 from onboard.core.solution import Solution
@@ -32,6 +32,8 @@ EKF_FLOOR = {"tilt_roll": 0.002, "tilt_pitch": 0.002, "heading": 0.005}
 FAULT_S = 1.0
 FAULT_M_S = 0.7
 RAIL_SAMPLES, RAIL_RUN = 12, 4
+LEAST_RAIL = 10.3
+"""More than any accelerometer that is at rest reads, m/s^2."""
 
 STANDING: dict[str, tuple[str, ...]] = {
     "gps_latency": ("gps_delay",),
@@ -41,6 +43,9 @@ STANDING: dict[str, tuple[str, ...]] = {
     "heading_error": ("heading",),
 }
 """Unknowns that are always in the model and become an effect past a size."""
+
+LEAST = {"gps_latency": LATENCY_S, "gps_smoothing": WINDOW_S, "imu_delay": IMU_DELAY_S}
+"""Sizes from which timing is an effect, s."""
 
 Standing = dict[str, tuple[dict[str, Quantity], str, dict[str, float]]]
 
@@ -131,21 +136,13 @@ def without(
 def fault_effect(
     traces: Sequence[EpochTrace],
     chunks: Sequence[Chunk],
-    calibrator: Calibrator,
     t0: float,
     levels: NoiseLevels,
     coast_s: float,
 ) -> Effect | None:
-    """GPS velocities that cannot be true: refused by the innovation gate or by plausibility."""
-    bad = [(x.t, "velocity" in x.refused) for x in traces]
-    if calibrator.trust.rejected.get("gps_glitch", 0):
-        bad += [
-            (float(t), True)
-            for c in chunks
-            for t, ok in zip(c.fixes.t, c.trusted, strict=True)
-            if not ok
-        ]
-    bad.sort()
+    """GPS velocities that cannot be true: refused by the innovation gate for a while."""
+    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
+    bad = [(x.t, "velocity" in x.refused) for x in judged]
     # A refused fix is a fault only if it is off by what no honest receiver is off.
     least = max(FAULT_M_S, 8.0 * float(np.hypot(levels.velocity, levels.velocity_colour)))
     refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
@@ -158,7 +155,7 @@ def fault_effect(
             off = [refused[u] for u in run if u in refused]
             mean = np.median(np.array(off), axis=0) if off else None
             # A noisy receiver errs to all sides: the mean of its errors says nothing.
-            size = np.inf if mean is None else float(np.median(np.linalg.norm(off, axis=1)))
+            size = 0.0 if mean is None else float(np.median(np.linalg.norm(off, axis=1)))
             # A filter that had to begin anew does not tell its own failure from the receiver's.
             lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
             if len(run) >= 3 and run[-1] - run[0] >= FAULT_S and size > least and not lost:
@@ -186,6 +183,7 @@ def fault_effect(
         held_out_after=float("nan"),
         parameters={},
         cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
+        where=spans(chunks, t0, intervals, _earth_axis(spells)),
         intervals=tuple(intervals),
     )
 
@@ -201,6 +199,15 @@ class _Spell:
     end: float
     off: Array | None
     size: float
+
+
+def _earth_axis(spells: Sequence[_Spell]) -> str:
+    """The horizontal axis on which the velocity was off most."""
+    known = [s for s in spells if s.off is not None and len(s.off) > 1]
+    if not known:
+        return "earth_north"
+    worst = max((s.off for s in known if s.off is not None), key=lambda x: float(np.linalg.norm(x)))
+    return "earth_north" if abs(worst[0]) >= abs(worst[1]) else "earth_east"
 
 
 def _paired(spells: list[_Spell]) -> list[_Spell]:
@@ -227,7 +234,7 @@ def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
         return None
     raw = np.concatenate([c.stretch.raw_s for c in chunks])
     t = np.concatenate([c.stretch.t for c in chunks])
-    best: tuple[int, float, NDArray[np.bool_]] | None = None
+    best: tuple[int, float, NDArray[np.bool_], int] | None = None
     for j in range(3):
         for sign in (1.0, -1.0):
             x = sign * raw[:, j]
@@ -235,14 +242,16 @@ def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
             at = x >= top - 1e-9
             runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
             stuck = at.sum() >= RAIL_SAMPLES and runs.max() >= RAIL_RUN and at.mean() < 0.5
-            if stuck and top > 12.0 and (best is None or at.sum() > best[0]):
-                best = (int(at.sum()), sign * top, at)
+            if stuck and top > LEAST_RAIL and (best is None or at.sum() > best[0]):
+                best = (int(at.sum()), sign * top, at, j)
     if best is None:
         return None
     where = t[best[2]]
     cuts = np.flatnonzero(np.diff(where) > 2.0)
     starts = np.concatenate([[where[0]], where[cuts + 1]])
     ends = np.concatenate([where[cuts], [where[-1]]])
+    intervals = tuple((float(a - t0), float(b - t0)) for a, b in zip(starts, ends, strict=True))
+    axis = "body_" + "xyz"[int(np.argmax(np.abs(chunks[0].stretch.R_bs[:, best[3]])))]
     return Effect(
         name="saturation",
         unknowns={"limit": Quantity(abs(best[1]), 0.01, "m/s^2")},
@@ -252,5 +261,6 @@ def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
         held_out_after=float("nan"),
         parameters={},
         cure="damp the mount; use a sensor with a wider range",
-        intervals=tuple((float(a - t0), float(b - t0)) for a, b in zip(starts, ends, strict=True)),
+        where=spans(chunks, t0, intervals, axis),
+        intervals=intervals,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,38 @@ Array = NDArray[np.float64]
 PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 
-class CrossAxis(EffectColumns):
+class Gain(EffectColumns):
+    """An effect proportional to the force: its columns are those of the *true* force.
+
+    What was measured contains the effect itself; ``taken`` (k,), what is known of its unknowns,
+    takes it off to first order, which leaves an error of third order.
+    """
+
+    taken: Array | None = None
+
+    def __init__(self, origin: Origin) -> None:
+        """No reference is needed."""
+        del origin
+
+    def about(self, taken: Array) -> Gain:
+        """The same effect, linearised about ``taken`` (k,)."""
+        made = copy(self)
+        made.taken = taken
+        return made
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """(..., 3, k) of the force without the effect."""
+        f_b = nodes.f_b
+        if self.taken is not None:
+            f_b = f_b + self.amount(f_b) @ self.taken
+        return self.amount(f_b)
+
+    def amount(self, f_b: Array) -> Array:
+        """What one unit of each unknown takes off a force (..., 3): (..., 3, k)."""
+        raise NotImplementedError
+
+
+class CrossAxis(Gain):
     """Sensitivity of each axis to the others; ``xy`` is what x reads too much per unit of y."""
 
     name = effect = "cross_axis"
@@ -26,19 +59,15 @@ class CrossAxis(EffectColumns):
     plausible = (0.15,) * 6
     unknowns = tuple(Unknown(f"cross_{p}", "1", 0.0, 0.15) for p in PAIRS)
 
-    def __init__(self, origin: Origin) -> None:
-        """No reference is needed."""
-        del origin
-
-    def acceleration(self, nodes: Signals) -> Array:
+    def amount(self, f_b: Array) -> Array:
         """``-e_i f_j``."""
-        out = np.zeros((*nodes.t.shape, 3, 6))
+        out = np.zeros((*f_b.shape, 6))
         for k, pair in enumerate(PAIRS):
-            out[..., "xyz".index(pair[0]), k] = -nodes.f_b[..., "xyz".index(pair[1])]
+            out[..., "xyz".index(pair[0]), k] = -f_b[..., "xyz".index(pair[1])]
         return out
 
 
-class ForceTilt(EffectColumns):
+class ForceTilt(Gain):
     """Accelerometer tilted against gyroscope and body: ``measured = true + tilt x ...``."""
 
     name = "force_tilt"
@@ -53,25 +82,21 @@ class ForceTilt(EffectColumns):
         Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
     )
 
-    def __init__(self, origin: Origin) -> None:
-        """No reference is needed."""
-        del origin
-
-    def acceleration(self, nodes: Signals) -> Array:
+    def amount(self, f_b: Array) -> Array:
         """``e x f`` and so on: the recorded attitude is ``tilt`` too large.
 
         An attitude that reads ``tilt`` too large turns the force by ``tilt`` too much; the
         accelerometer's own rotation by minus ``tilt`` is the same thing.
         """
         ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        return np.stack([np.cross(nodes.f_b, ex), np.cross(nodes.f_b, ey)], axis=-1)
+        return np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
 
     def parameters(self, values: dict[str, float]) -> dict[str, float]:  # type: ignore[override] # narrower on purpose
         """The trim that takes the tilt out again."""
         return {"AHRS_TRIM_X": values["roll"], "AHRS_TRIM_Y": values["pitch"]}
 
 
-class ScaleNonlinearity(EffectColumns):
+class ScaleNonlinearity(Gain):
     """Scale that changes with the load: second-order coefficient, per g."""
 
     name = effect = "scale_nonlinearity"
@@ -84,12 +109,12 @@ class ScaleNonlinearity(EffectColumns):
         del origin
         self._three("1/g", 0.1)
 
-    def acceleration(self, nodes: Signals) -> Array:
+    def amount(self, f_b: Array) -> Array:
         """``-f_i^2 / g e_i``."""
-        return on_axes(nodes.f_b**2 / STANDARD_GRAVITY)
+        return on_axes(f_b**2 / STANDARD_GRAVITY)
 
 
-class LoadFlex(EffectColumns):
+class LoadFlex(Gain):
     """Mount that bends with the load: tilt per g of load beyond one."""
 
     name = effect = "load_flex"
@@ -103,13 +128,9 @@ class LoadFlex(EffectColumns):
         Unknown("load_flex_pitch", "rad/g", 0.0, 0.1),
     )
 
-    def __init__(self, origin: Origin) -> None:
-        """No reference is needed."""
-        del origin
-
-    def acceleration(self, nodes: Signals) -> Array:
+    def amount(self, f_b: Array) -> Array:
         """As a tilt, times ``n - 1``."""
-        extra = -nodes.f_b[..., 2] / STANDARD_GRAVITY - 1.0
+        extra = -f_b[..., 2] / STANDARD_GRAVITY - 1.0
         ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        tilt = np.stack([np.cross(nodes.f_b, ex), np.cross(nodes.f_b, ey)], axis=-1)
+        tilt = np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
         return tilt * extra[..., None, None]

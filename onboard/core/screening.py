@@ -1,0 +1,131 @@
+"""Flight that must not be fitted: clipped accelerometers, false GPS velocities.
+
+Both are found before anything else is judged, for what they leave in the sums would be taken for
+physics or for noise.  Clipped flight is cut out, the filter begins anew after it; false fixes are
+marked as not to be believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.calibrator import Calibrator
+from onboard.core.engine import Chunk, Engine
+from onboard.core.examination import Examination
+from onboard.core.findings import Effect
+from onboard.core.noise import NoiseLevels
+from onboard.core.passes import EpochTrace, Pass
+from onboard.core.timing_effects import fault_effect
+
+Array = NDArray[np.float64]
+
+MARGIN_S = 0.4
+"""Around clipped samples: the accelerometer's low-pass and the receiver's delay."""
+SHORTEST_S = 4.0
+"""Pieces of flight between two clipped ones that are worth an alignment."""
+FEWEST_REFUSED = 3
+
+
+def unclipped(
+    chunks: Sequence[Chunk], intervals: Sequence[tuple[float, float]], t0: float
+) -> list[Chunk]:
+    """The flight without the clipped parts; the filter begins anew after each.
+
+    Args:
+        chunks: the flight.
+        intervals: clipped, s since ``t0``.
+        t0: s on the boot clock.
+    """
+    out: list[Chunk] = []
+    torn = False
+    for chunk in chunks:
+        t = chunk.fixes.t - t0
+        bad = np.zeros(len(t), dtype=bool)
+        for a, b in intervals:
+            bad |= (t >= a - MARGIN_S) & (t <= b + MARGIN_S)
+            # An interval between two fixes spoils what is integrated from one to the other.
+            inside = np.flatnonzero((t[:-1] < b) & (t[1:] > a))
+            bad[inside + 1] = True
+        cuts = np.flatnonzero(np.diff(bad.astype(int))) + 1
+        for piece in np.split(np.arange(len(t)), cuts):
+            if bad[piece[0]]:
+                torn = True
+                continue
+            first, last = int(piece[0]), int(piece[-1]) + 1
+            if last - first < 2 or t[last - 1] - t[first] < min(SHORTEST_S, t[-1] - t[0]):
+                torn = True
+                continue
+            out.append(
+                Chunk(
+                    chunk.stretch,
+                    chunk.fixes.between(first, last),
+                    chunk.trusted[first:last],
+                    chunk.fresh or torn or first > 0,
+                )
+            )
+            torn = last < len(t)
+    return out
+
+
+def false_fixes(
+    calibrator: Calibrator, like: Engine, full: Examination, t0: float
+) -> tuple[Effect | None, list[Chunk]]:
+    """GPS velocities that cannot be true, and the flight with those not to be believed.
+
+    Noise levels that were found with the false ones among the rest would let them pass: the
+    filter that judges uses what most fixes say of the noise.
+    """
+    glitches = calibrator.trust.rejected.get("gps_glitch", 0)
+    if max(full.refused["velocity"], like.refused["velocity"], glitches) < FEWEST_REFUSED:
+        return None, list(full.chunks)
+    solution = full.found()
+    levels = _robust(full, solution.theta)
+    made = Pass(
+        full.model,
+        full.point,
+        (levels,),
+        uses=full.uses,
+        traces=True,
+        theta=solution.theta,
+        covariance=solution.covariance,
+    )
+    traces: list[EpochTrace] = []
+    for chunk in full.chunks:
+        asked = chunk
+        if glitches:
+            # What the receiver's own contradictions have closed is asked again, of the inertia.
+            heard = np.all(np.isfinite(chunk.fixes.v_n[:, :2]), axis=1)
+            asked = replace(chunk, trusted=heard)
+        traces.extend(Engine.through(full, made, asked).traces)
+    fault = fault_effect(traces, full.chunks, t0, levels, full.settings.coast_s)
+    if fault is None:
+        return None, list(full.chunks)
+    out = []
+    for chunk in full.chunks:
+        t = chunk.fixes.t - t0
+        bad = np.zeros(len(t), dtype=bool)
+        for a, b in fault.intervals:
+            bad |= (t >= a - 1e-3) & (t <= b + 1e-3)
+        out.append(replace(chunk, trusted=chunk.trusted & ~bad))
+    return fault, out
+
+
+def _robust(full: Examination, theta: Array) -> NoiseLevels:
+    """Levels of most fixes: false ones are few."""
+    steps = [
+        x.innovation - x.columns @ theta for x in full.traces if x.velocities and len(x.innovation)
+    ]
+    if not steps:
+        return full.noise
+    usual = 1.4826 * float(np.median(np.abs(np.concatenate([s[:2] for s in steps]))))
+    least = NoiseLevels()
+    noise = full.noise
+    return replace(
+        noise,
+        velocity=min(noise.velocity, max(least.velocity, 2.0 * usual)),
+        velocity_colour=min(noise.velocity_colour, max(least.velocity_colour, 2.0 * usual)),
+    )
