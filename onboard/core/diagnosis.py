@@ -61,7 +61,11 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
         KeyError: that accelerometer has not been seen.
     """
     engine = calibrator.engine(imu)
-    origin = Origin(t0=calibrator.first_sample)
+    antenna = calibrator.parameters.antenna
+    origin = Origin(
+        t0=calibrator.first_sample,
+        antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
+    )
     rail = saturation_effect(engine.chunks, origin.t0)
     chunks = list(engine.chunks)
     if rail is not None:
