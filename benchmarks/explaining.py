@@ -262,8 +262,8 @@ def main(arguments: list[str] | None = None) -> None:
             outcomes.append(o)
             if o.false or (o.secret.testable and not o.identified):
                 print(describe(o), flush=True)
-    if chosen.save:
-        chosen.save.write_bytes(pickle.dumps(outcomes))
+            if chosen.save:
+                chosen.save.write_bytes(pickle.dumps(outcomes))
     print(table(outcomes))
     print(LEGEND)
     made, took = np.array([o.seconds for o in outcomes]).T

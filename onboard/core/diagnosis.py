@@ -31,6 +31,7 @@ from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.gains import Gain
 from onboard.core.physics.offsets import BiasStep
+from onboard.core.physics.receiver import LeverArm
 from onboard.core.report import timing_of
 from onboard.core.screening import false_fixes, unclipped
 from onboard.core.selection import Fitter
@@ -38,11 +39,14 @@ from onboard.core.solution import Solution
 from onboard.core.timing_effects import (
     LEAST,
     STANDING,
+    Standing,
     saturation_effect,
     standing_effects,
     without,
 )
 
+ENOUGH = 0.3
+"""Share of a flight that has to be left without what is clipped."""
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals below which what follows them is not to be seen."""
 BY_NATURE = (
@@ -66,18 +70,23 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
         t0=calibrator.first_sample,
         antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
     )
-    rail = saturation_effect(engine.chunks, origin.t0)
+    rail = saturation_effect(engine.chunks, origin.t0, imu)
     chunks = list(engine.chunks)
     if rail is not None:
-        chunks = unclipped(chunks, rail.intervals, origin.t0) or chunks
+        chunks = unclipped(chunks, rail.intervals, origin.t0)
+        if sum(c.trusted_s for c in chunks) < ENOUGH * engine.trusted_s:
+            # Clipped all the time: what is left would say less than what is spoiled.
+            chunks = list(engine.chunks)
     testable, absent = _testable(catalogue(origin), chunks)
     full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     choice = _chosen(full, testable)
-    doubts = _second_thoughts(choice, full, calibrator)
+    standing, doubts = _second_thoughts(choice, full, calibrator)
     families = _families(full, choice)
+    if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
+        families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
     final = _final(full, choice, families)
     kept = _needed(final, families)
     if len(kept) < len(families):
@@ -106,14 +115,15 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
 
 def _second_thoughts(
     choice: Choice, full: Examination, calibrator: Calibrator
-) -> dict[str, list[str]]:
+) -> tuple[set[str], dict[str, list[str]]]:
     """Timing and attitude errors that would be reported must be better than any other cause.
 
     Returns:
-        Those beside which another effect could stand as well, with its names.
+        Those that are large enough; of them, those beside which another effect could stand.
     """
     told, trim = calibrator.parameters.gps_delay_told, calibrator.parameters.trim
     index = choice.fitter.model.index
+    standing: Standing = {}
     for _ in range(len(STANDING)):
         fit = choice.fitter.fit(choice.free, held_out=False)
         solution = Solution(
@@ -126,8 +136,9 @@ def _second_thoughts(
             held = without(STANDING[name], index, full.point, choice.fitter.absent, told)
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
-            return {n: d for n in standing if n in LEAST and (d := _doubts(choice, full, n, told))}
-    return {}
+            break
+    timing = [name for name in standing if name in LEAST]
+    return set(standing), {n: d for n in timing if (d := _doubts(choice, full, n, told))}
 
 
 def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:

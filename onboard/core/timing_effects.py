@@ -32,6 +32,8 @@ EKF_FLOOR = {"tilt_roll": 0.002, "tilt_pitch": 0.002, "heading": 0.005}
 FAULT_S = 1.0
 FAULT_M_S = 0.7
 RAIL_SAMPLES, RAIL_RUN = 12, 4
+FEWEST_CLIPPED = 5
+"""Clipped samples between two reports that are more than a knock."""
 LEAST_RAIL = 10.3
 """More than any accelerometer that is at rest reads, m/s^2."""
 
@@ -228,10 +230,55 @@ def _paired(spells: list[_Spell]) -> list[_Spell]:
     return out
 
 
-def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
-    """Accelerometer samples that stay at one extreme value: the rail of its range."""
+def saturation_effect(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+    """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
+
+    Args:
+        chunks: the flight.
+        t0: first sample, s.
+        imu: which accelerometer, from 1.
+    """
     if not chunks:
         return None
+    return _stuck(chunks, t0) or _counted(chunks, t0, imu)
+
+
+def _counted(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+    """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
+    names = [c.stretch.slow["clipping"] for c in chunks if "clipping" in c.stretch.slow]
+    if not names:
+        return None
+    t = np.concatenate([x[0] for x in names])
+    counts = np.concatenate([np.atleast_2d(x[1].T).T for x in names])
+    if imu > counts.shape[1]:
+        return None
+    t, first = np.unique(t, return_index=True)
+    rise = np.diff(counts[first, imu - 1])
+    hit = np.flatnonzero(rise >= FEWEST_CLIPPED)
+    if len(hit) < 2:
+        return None
+    spans_of = [(float(t[i]), float(t[i + 1])) for i in hit]
+    joined: list[tuple[float, float]] = []
+    for begin, end in spans_of:
+        if joined and begin - joined[-1][1] < 1e-3:
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((begin, end))
+    raw = np.concatenate([c.stretch.raw_s for c in chunks])
+    times = np.concatenate([c.stretch.t for c in chunks])
+    inside = np.zeros(len(times), dtype=bool)
+    for begin, end in joined:
+        inside |= (times >= begin) & (times <= end)
+    if not inside.any():
+        return None
+    tops = np.percentile(np.abs(raw[inside]), 99.9, axis=0)
+    worst = int(np.argmax(tops))
+    top = float(tops[worst])
+    return _saturation(chunks, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
+
+
+def _stuck(chunks: Sequence[Chunk], t0: float) -> Effect | None:
+    """Accelerometer samples that stay at one extreme value: the rail of its range."""
     raw = np.concatenate([c.stretch.raw_s for c in chunks])
     t = np.concatenate([c.stretch.t for c in chunks])
     best: tuple[int, float, NDArray[np.bool_], int] | None = None
@@ -250,12 +297,26 @@ def saturation_effect(chunks: Sequence[Chunk], t0: float) -> Effect | None:
     cuts = np.flatnonzero(np.diff(where) > 2.0)
     starts = np.concatenate([[where[0]], where[cuts + 1]])
     ends = np.concatenate([where[cuts], [where[-1]]])
-    intervals = tuple((float(a - t0), float(b - t0)) for a, b in zip(starts, ends, strict=True))
-    axis = "body_" + "xyz"[int(np.argmax(np.abs(chunks[0].stretch.R_bs[:, best[3]])))]
+    found = [(float(a), float(b)) for a, b in zip(starts, ends, strict=True)]
+    return _saturation(chunks, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
+
+
+def _saturation(
+    chunks: Sequence[Chunk],
+    t0: float,
+    limit: float,
+    sigma: float,
+    sensor_axis: int,
+    clipped: Sequence[tuple[float, float]],
+    share: float,
+) -> Effect:
+    """The record of a clipping accelerometer; ``clipped`` s on the boot clock."""
+    intervals = tuple((a - t0, b - t0) for a, b in clipped)
+    axis = "body_" + "xyz"[int(np.argmax(np.abs(chunks[0].stretch.R_bs[:, sensor_axis])))]
     return Effect(
         name="saturation",
-        unknowns={"limit": Quantity(abs(best[1]), 0.01, "m/s^2")},
-        share_of_mismatch=best[0] / len(t),
+        unknowns={"limit": Quantity(limit, sigma, "m/s^2")},
+        share_of_mismatch=share,
         delta_bic=0.0,
         held_out_before=float("nan"),
         held_out_after=float("nan"),

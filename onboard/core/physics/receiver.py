@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +29,22 @@ class LeverArm(EffectColumns):
     def __init__(self, origin: Origin) -> None:
         """Take the place that was told."""
         self._told = origin.antenna
+        self._mean = False
+
+    def averaged(self) -> LeverArm:
+        """The same, seen through the receiver's average: for a span that is known for sure.
+
+        About a span that is not, the average takes itself for more span and runs away.
+        """
+        made = copy(self)
+        made._mean = True  # noqa: SLF001 - its own copy
+        return made
 
     def velocity(self, around: Around) -> Direct:
-        """``R (w x e_i)``, averaged as the receiver does."""
-        return Direct(body=around.swing)
+        """``R (w x e_i)``."""
+        if self._mean:
+            return Direct(body=around.swing)
+        return Direct(body=np.cross(around.now.w_b[:, None, :], np.eye(3)).swapaxes(-1, -2))
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
