@@ -11,14 +11,15 @@ import re
 import struct
 from array import array
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from onboard.core.samples import Sample
+from onboard.core.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
@@ -30,6 +31,9 @@ Source = tuple[int, int]
 
 STAMP_LENGTH = 8
 LONGEST_SILENCE_US = 86_400_000_000
+LATE_S = 60.0
+"""A parameter that is first reported so long after the inertial samples began was read late, as
+by a ground station that connected in flight; one that never changed was in force all along."""
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 SIGNED = 0x01
 SIGNATURE_LENGTH = 13
@@ -58,6 +62,8 @@ class _Vehicle:
     offsets: array[int] = field(default_factory=lambda: array("q"))
     lengths: array[int] = field(default_factory=lambda: array("H"))
     imu_times: dict[int, array[float]] = field(default_factory=dict)
+    parameters: list[tuple[int, int, bool]] = field(default_factory=list)
+    """Place and length of each report, and whether it came late."""
 
     @property
     def imu_messages(self) -> int:
@@ -210,6 +216,9 @@ def _note(index: TlogIndex, data: Bytes, at: int, length: int, kind: int) -> Non
         size = struct.calcsize(form)
         stamp = data[payload : payload + min(size, data[at + 1])].ljust(size, b"\0")
         vehicle.imu_times.setdefault(kind, array("d")).append(struct.unpack(form, stamp)[0] / ticks)
+    elif kind == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+        late = any(t[-1] - t[0] > LATE_S for t in vehicle.imu_times.values())
+        vehicle.parameters.append((at, length, late))
     elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
         body = data[payload : payload + data[at + 1]].ljust(9, b"\0")
         if body[4] != mavlink.MAV_TYPE_GCS and body[5] != mavlink.MAV_AUTOPILOT_INVALID:
@@ -253,13 +262,35 @@ def _damage(index: TlogIndex) -> tuple[str, ...]:
 
 
 def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]:
+    yield from _told_late(data, source, vehicle)
     # As on a live link, nothing is taken before the autopilot's first heartbeat, if there is one.
     system, component = source
     decoder = Decoder(system, component if vehicle.autopilot is None else None)
     unpack = mavlink.MAVLink(None).decode
     for at, length in zip(vehicle.offsets, vehicle.lengths, strict=True):
-        try:
-            message = unpack(bytearray(data[at : at + length]))
-        except mavlink.MAVError:
-            continue  # a right checksum over a payload that cannot be unpacked
-        yield from decoder.decode(message)
+        yield from _decoded(unpack, data[at : at + length], decoder)
+
+
+def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
+    """Parameters that are reported late, and always with the same value."""
+    decoder = Decoder(*source)
+    unpack = mavlink.MAVLink(None).decode
+    values: dict[str, set[float]] = {}
+    late: dict[str, bool] = {}
+    for at, length, is_late in vehicle.parameters:
+        for sample in _decoded(unpack, data[at : at + length], decoder):
+            if isinstance(sample, ParameterValue):
+                values.setdefault(sample.name, set()).add(sample.value)
+                late.setdefault(sample.name, is_late)
+    for name, seen in values.items():
+        if late[name] and len(seen) == 1:
+            yield ParameterValue(name, seen.pop())
+
+
+def _decoded(
+    unpack: Callable[[bytearray], Any], packet: bytes, decoder: Decoder
+) -> tuple[Sample, ...]:
+    try:
+        return decoder.decode(unpack(bytearray(packet)))
+    except mavlink.MAVError:
+        return ()  # a right checksum over a payload that cannot be unpacked

@@ -48,6 +48,30 @@ def test_each_reading_starts_anew(tmp_path):
     assert list(recording.samples()) == list(recording.samples())
 
 
+def parameter(log, name, value):
+    log.add(mavlink.MAVLink_param_value_message(name, value, 9, 1, 0))
+
+
+def test_a_list_read_late_counts_from_the_beginning_unless_it_was_changed(tmp_path):
+    """A ground station that connects in flight reads what was in force all along."""
+    log = telemetry(seconds=70)
+    parameter(log, b"INS_ACCOFFS_X", 0.25)
+    parameter(log, b"INS_ACCOFFS_Y", 0.1)
+    parameter(log, b"INS_ACCOFFS_Y", 0.2)
+    parameter(log, b"INS_ACCSCAL_X", 1.02)  # told in time with another value
+    samples = list(open_recording(saved(tmp_path, log)).samples())
+    first = samples.index(next(s for s in samples if isinstance(s, ImuSample)))
+    told = {s.name: s.value for s in samples[:first] if isinstance(s, ParameterValue)}
+    assert told == {"INS_ACCOFFS_X": 0.25}
+    late = [(s.name, s.value) for s in samples[first:] if isinstance(s, ParameterValue)]
+    assert late[1:] == [
+        ("INS_ACCOFFS_X", 0.25),
+        ("INS_ACCOFFS_Y", pytest.approx(0.1)),
+        ("INS_ACCOFFS_Y", pytest.approx(0.2)),
+        ("INS_ACCSCAL_X", pytest.approx(1.02)),
+    ]
+
+
 def test_a_damaged_packet_costs_itself_only(tmp_path):
     log = telemetry()
     data = bytearray(bytes(log))
