@@ -27,6 +27,8 @@ WINDOW_S = 0.2
 """Averaging span of the receiver: about that of common ones."""
 START_S = 1.0
 """The first fix; inertial samples come before it."""
+LAUNCH_S, LANDING_S = 12.0, 10.0
+"""Left out at either end: a launch is a step of the force, which no sampling follows."""
 METRES_PER_RADIAN = 6.371e6
 
 LEVELS = NoiseLevels(
@@ -78,19 +80,20 @@ class Path:
         return np.arange(round(START_S * RATE), len(self.t) - RATE, step)
 
 
-def path(vehicle: Vehicle, *, seed: int = 5, duration: float = 240.0) -> Path:
+def path(vehicle: Vehicle, *, seed: int = 5, duration: float = 262.0) -> Path:
     """Fly the simulated vehicle once."""
     pieces = run(FlightSpec(vehicle=vehicle, seed=seed, duration=duration)).pieces
     whole = [p.trajectory for p in pieces]
-    n = min(round(duration * RATE), sum(w.n for w in whole))
+    n = sum(w.n for w in whole)
     latitude = float(np.radians(whole[0].environment.latitude_deg))
-    v_n, p_n = _joined(whole, "v_n", n), _joined(whole, "p_n", n)
+    aloft = slice(round(LAUNCH_S * RATE), min(round(duration * RATE), n) - round(LANDING_S * RATE))
+    v_n, p_n = _joined(whole, "v_n", aloft), _joined(whole, "p_n", aloft)
     return Path(
         vehicle,
-        np.arange(n) / RATE,
-        _joined(whole, "R_nb", n),
-        _joined(whole, "w_b", n),
-        _joined(whole, "f_b", n),
+        np.arange(len(v_n)) / RATE,
+        _joined(whole, "R_nb", aloft),
+        _joined(whole, "w_b", aloft),
+        _joined(whole, "f_b", aloft),
         v_n,
         p_n,
         _mean(v_n, WINDOW_S),
@@ -99,8 +102,8 @@ def path(vehicle: Vehicle, *, seed: int = 5, duration: float = 240.0) -> Path:
     )
 
 
-def _joined(pieces: list[Trajectory], name: str, n: int) -> Array:
-    out: Array = np.concatenate([getattr(p, name) for p in pieces])[:n]
+def _joined(pieces: list[Trajectory], name: str, rows: slice) -> Array:
+    out: Array = np.concatenate([getattr(p, name) for p in pieces])[rows]
     return out
 
 

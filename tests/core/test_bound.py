@@ -1,0 +1,32 @@
+"""On a flight that is as the model says, claimed sigmas are those of the Cramer-Rao bound."""
+
+import numpy as np
+import pytest
+
+from benchmarks.bound import bound
+from benchmarks.matched import LEVELS, draw, path
+from benchmarks.recorded import error_of, fed
+
+
+@pytest.fixture(scope="module", params=["copter", "plane"])
+def flown(request):
+    return path(request.param, duration=160.0)
+
+
+def test_claims_are_what_physics_allows(flown):
+    flight = draw(flown, 3)
+    scale = flight.truth[1][:3]
+    limit = bound(flown) * np.concatenate([scale, 1.0 / scale])
+    c = fed(flight.samples).calibration(1)
+    claimed = np.array(c.scale_sigma + c.offset_sigma) / limit
+    # Levels of noise are found from one flight only, and colour may be claimed for chance.
+    assert np.all(claimed > 0.8), claimed
+    assert np.all(claimed < 1.8), claimed
+    assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
+
+
+def test_more_noise_or_less_flight_never_sharpens_the_bound(flown):
+    whole = bound(flown)
+    assert np.all(bound(flown, LEVELS.scaled("velocity", 2.0)) > whole)
+    assert np.all(bound(flown, LEVELS.scaled("force_walk", 2.0)) > whole)
+    assert np.all(bound(path(flown.vehicle, duration=100.0)) > whole)
