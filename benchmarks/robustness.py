@@ -6,7 +6,9 @@ be named: counted among what was refused, or given as the reason for a closed wi
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,9 +105,9 @@ def outcomes(flight: Flight, fault: Fault) -> list[Outcome]:
     return out
 
 
-def flights() -> list[Flight]:
+def flights(names: Sequence[str]) -> list[Flight]:
     """Shared recordings where there are, and two simulated flights."""
-    found = [recorded(folder() / f"{name}.tlog") for name in RECORDINGS if name in answered()]
+    found = [recorded(folder() / f"{name}.tlog") for name in names if name in answered()]
     for seed, vehicle in enumerate(VEHICLES, 3):
         imus = random_imus(seed)
         found.append(simulated(FlightSpec(vehicle=vehicle, seed=seed, duration=400.0, imus=imus)))
@@ -114,13 +116,15 @@ def flights() -> list[Flight]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Print one line per flight and fault."""
-    del arguments
+    parser = argparse.ArgumentParser(description="Faults of the GPS receiver.")
+    parser.add_argument("--recordings", nargs="*", default=RECORDINGS, help="names of recordings")
+    chosen = parser.parse_args(arguments)
     print(
         f"{'flight':18}{'fault':36}{'scale':>8}{'xy offs.':>9}{'z offs.':>9}"
         f"{'of limit':>9}{'sigmas':>8}{'kept':>6}  named"
     )
     good = total = 0
-    for flight in flights():
+    for flight in flights(chosen.recordings):
         for fault in FAULTS:
             for o in outcomes(flight, fault):
                 e = np.abs(o.error)
