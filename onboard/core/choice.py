@@ -245,7 +245,7 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) 
     sigma = np.sqrt(np.diag(after.covariance)[index])
     if np.max(np.abs(value) / sigma) < SIGNIFICANT:
         return False
-    if np.any(np.abs(value) - 2.0 * sigma > np.array(c.plausible)):
+    if np.any(np.abs(value) - sigma > np.array(c.plausible)):
         return False
     return _matters(fitter, before, after)
 

@@ -34,6 +34,7 @@ from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
 from onboard.core.report import timing_of
 from onboard.core.screening import false_fixes, unclipped
+from onboard.core.search import searched
 from onboard.core.selection import Fitter
 from onboard.core.solution import Solution
 from onboard.core.timing_effects import (
@@ -93,6 +94,14 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
         # A jump may have passed for something slower, or the other way round.
         families = kept
         final = Examination(full, families, t0=origin.t0, start=final).with_rows()
+    found = searched(final, families, choice.fitter.weaken)
+    if found != families:
+        families = found
+        final = Examination(full, families, t0=origin.t0, start=final).with_noise()
+        kept = _needed(final, families)
+        if len(kept) < len(families):
+            families = kept
+            final = Examination(full, families, t0=origin.t0, start=final).with_rows()
     return Judge(
         calibrator,
         imu,

@@ -91,7 +91,7 @@ class Examination(Engine):
         held = None if theta is None or covariance is None else (theta, covariance)
         blind = held is None
         for left in (2, 1, 0):
-            self._go(held)
+            self.once(held)
             self._seed = found = solve(self.portions, self.model)
             point = moved(self.point, self.model, found.theta)
             late = abs(point.delay - self.point.delay)
@@ -103,7 +103,8 @@ class Examination(Engine):
             held, blind = None, False
         return self
 
-    def _go(self, held: tuple[Array, Array] | None = None) -> None:
+    def once(self, held: tuple[Array, Array] | None = None) -> None:
+        """Go through the whole flight as it is linearised; ``held`` are what gates know."""
         self._pass = self._new_pass()
         if held is not None:
             self._pass.hold(*held)

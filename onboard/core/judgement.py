@@ -25,6 +25,7 @@ from onboard.core.findings import (
     Where,
 )
 from onboard.core.physics.effect import EffectColumns, Origin
+from onboard.core.physics.empirical import Product
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.regimes import Residuals, axis_of, located, main_axis, regime_residuals, spans
 from onboard.core.report import timing_of
@@ -211,6 +212,8 @@ class Judge:
             f.effect, quantities, index, without, with_it, f.parameters(values), f.cure
         )
         made = replace(made, rivals=self._rivals(f))
+        if isinstance(f, Product):
+            made = replace(made, formula=f.written([q.value for q in quantities.values()]))
         if not isinstance(f, BiasStep):
             return made
         span = ((f.at - self.origin.t0, self.engine.portions[-1].end - self.origin.t0),)
@@ -290,6 +293,12 @@ class Judge:
         if insufficient:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
         left = self.solution.inflation > UNEXPLAINED
+        if any(e.name == "empirical" for e in effects):
+            named = [e for e in effects if e.name != "empirical"]
+            return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (
+                "a formula of measured signals describes what no effect of the catalogue explains. "
+                + note
+            )
         if effects:
             if left:
                 return Verdict.PARTLY_EXPLAINED, (

@@ -1,0 +1,104 @@
+"""Products of measured signals that an unknown effect may follow; no physical name is claimed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Unknown
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.engine import Chunk
+from onboard.core.nodes import Signals
+from onboard.core.physics.effect import AXES, EffectColumns, on_axes
+
+Array = NDArray[np.float64]
+
+LARGEST = 3.0
+"""Prior sigma of a term's size, m/s^2 at a signal of one; signals are scaled to be about one."""
+
+
+class Product(EffectColumns):
+    """An offset in proportion to a scalar signal, with a size for each axis."""
+
+    effect = "empirical"
+    source = "search among products of measured signals"
+    cure = "look for what the formula stands for; nothing in the catalogue does"
+    apart = "fly the manoeuvre in which the signal changes and nothing else does"
+
+    def __init__(self, name: str, formula: str, signal: Callable[[Signals], Array]) -> None:
+        """Take a name, the signal as people write it, and how it is evaluated at nodes."""
+        self.name = f"empirical_{name}"
+        self.formula = formula
+        self._signal = signal
+        self.keys = tuple(AXES)
+        self.plausible = (np.inf,) * 3
+        self.unknowns = tuple(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXES)
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``-s e_i``."""
+        return on_axes(np.repeat(self._signal(nodes)[..., None], 3, axis=-1))
+
+    def written(self, sizes: Sequence[float]) -> str:
+        """The formula with its sizes: what each axis reads too much, m/s^2."""
+        terms = ", ".join(f"{a} {x:+.3g}" for a, x in zip(AXES, sizes, strict=True))
+        return f"({terms}) m/s^2 * {self.formula}"
+
+
+def _rate(axis: int) -> Callable[[Signals], Array]:
+    return lambda nodes: nodes.w_b[..., axis]
+
+
+def _rates(one: int, two: int) -> Callable[[Signals], Array]:
+    return lambda nodes: nodes.w_b[..., one] * nodes.w_b[..., two]
+
+
+def _forces(one: int, two: int) -> Callable[[Signals], Array]:
+    return lambda nodes: nodes.f_b[..., one] * nodes.f_b[..., two] / STANDARD_GRAVITY**2
+
+
+def _slow(name: str, power: int, scale: float) -> Callable[[Signals], Array]:
+    def signal(nodes: Signals) -> Array:
+        x = nodes.slow(name)
+        if x is None:
+            return np.zeros(nodes.t.shape)
+        size = np.linalg.norm(x, axis=-1) if x.ndim > nodes.t.ndim else x
+        out: Array = (size / scale) ** power
+        return out
+
+    return signal
+
+
+def _over_time(t: Array, x: Array) -> Callable[[Signals], Array]:
+    return lambda nodes: np.interp(nodes.t, t, x)
+
+
+def products(chunks: Sequence[Chunk]) -> list[Product]:
+    """Every product that this recording has the signals for."""
+    out = [Product(f"w{a}", f"w_{a} / (rad/s)", _rate(i)) for i, a in enumerate(AXES)]
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 2), (1, 2)):
+        pair = f"{AXES[i]}{AXES[j]}"
+        out.append(Product(f"w{pair}", f"w_{AXES[i]} w_{AXES[j]} / (rad/s)^2", _rates(i, j)))
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        pair = f"{AXES[i]}{AXES[j]}"
+        out.append(Product(f"f{pair}", f"f_{AXES[i]} f_{AXES[j]} / g^2", _forces(i, j)))
+    t = np.concatenate([c.fixes.t for c in chunks])
+    t, first = np.unique(t, return_index=True)
+    v = np.concatenate([c.fixes.v_n for c in chunks])[first]
+    height = np.concatenate([c.fixes.height for c in chunks])[first]
+    heard = np.all(np.isfinite(v[:, :2]), axis=1)
+    if heard.sum() > 2:
+        speed2 = np.sum(v[heard, :2] ** 2, axis=1) / 100.0
+        out.append(Product("v2", "(ground speed / 10 m/s)^2", _over_time(t[heard], speed2)))
+    if len(t) > 20:
+        rate = np.convolve(np.gradient(height, t), np.ones(9) / 9.0, mode="same")
+        out.append(Product("climb", "climb rate / (m/s)", _over_time(t, rate)))
+    names = set.intersection(*(set(c.stretch.slow) for c in chunks))
+    if "airspeed" in names:
+        out.append(Product("air2", "(airspeed / 10 m/s)^2", _slow("airspeed", 2, 10.0)))
+    if "throttle" in names:
+        out.append(Product("throttle2", "throttle^2", _slow("throttle", 2, 1.0)))
+    if "vibration" in names:
+        out.append(Product("vibe", "|vibration| / (10 m/s^2)", _slow("vibration", 1, 10.0)))
+    return out
