@@ -36,7 +36,7 @@ from onboard.core.report import timing_of
 from onboard.core.screening import false_fixes, unclipped
 from onboard.core.search import searched
 from onboard.core.selection import Fitter
-from onboard.core.solution import Solution
+from onboard.core.solution import Solution, solve
 from onboard.core.timing_effects import (
     LEAST,
     STANDING,
@@ -116,6 +116,11 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
     """Selection on the sums of the whole catalogue."""
     solution = full.found()
     fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
+    jumps = fitter.jumps(list(range(full.model.size))) if len(fitter.portions) > 3 else []
+    if jumps:
+        # Portions that contradict each other because of a jump are no reason to doubt the jump.
+        wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
+        fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
     candidates = [Candidate(c.effect, tuple(full.indices(c)), c.plausible, c) for c in testable]

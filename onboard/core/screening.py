@@ -19,7 +19,7 @@ from onboard.core.examination import Examination
 from onboard.core.findings import Effect
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace, Pass
-from onboard.core.timing_effects import fault_effect
+from onboard.core.timing_effects import FAULT_M_S, fault_effect
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,8 @@ MARGIN_S = 0.4
 SHORTEST_S = 4.0
 """Pieces of flight between two clipped ones that are worth an alignment."""
 FEWEST_REFUSED = 3
+FAR_OFF = 12.0
+"""Times the usual innovation: no fix of a receiver that is well."""
 
 
 def unclipped(
@@ -80,10 +82,11 @@ def false_fixes(
     filter that judges uses what most fixes say of the noise.
     """
     glitches = calibrator.trust.rejected.get("gps_glitch", 0)
-    if max(full.refused["velocity"], like.refused["velocity"], glitches) < FEWEST_REFUSED:
-        return None, list(full.chunks)
     solution = full.found()
-    levels = _robust(full, solution.theta)
+    levels, jumped = _robust(full, solution.theta)
+    refused = max(full.refused["velocity"], like.refused["velocity"], glitches)
+    if refused < FEWEST_REFUSED and not jumped:
+        return None, list(full.chunks)
     made = Pass(
         full.model,
         full.point,
@@ -114,18 +117,21 @@ def false_fixes(
     return fault, out
 
 
-def _robust(full: Examination, theta: Array) -> NoiseLevels:
-    """Levels of most fixes: false ones are few."""
+def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, bool]:
+    """Levels of most fixes, for false ones are few; and whether any is far off them."""
     steps = [
-        x.innovation - x.columns @ theta for x in full.traces if x.velocities and len(x.innovation)
+        (x.innovation - x.columns @ theta)[:2]
+        for x in full.traces
+        if x.velocities and len(x.innovation)
     ]
     if not steps:
-        return full.noise
-    usual = 1.4826 * float(np.median(np.abs(np.concatenate([s[:2] for s in steps]))))
-    least = NoiseLevels()
-    noise = full.noise
-    return replace(
+        return full.noise, False
+    off = np.abs(np.concatenate(steps))
+    usual = 1.4826 * float(np.median(off))
+    noise, least = full.noise, NoiseLevels()
+    levels = replace(
         noise,
         velocity=min(noise.velocity, max(least.velocity, 2.0 * usual)),
         velocity_colour=min(noise.velocity_colour, max(least.velocity_colour, 2.0 * usual)),
     )
+    return levels, float(off.max()) > max(FAULT_M_S, FAR_OFF * usual)

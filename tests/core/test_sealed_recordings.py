@@ -1,0 +1,79 @@
+"""Effects concealed in simulated flights of one and a half minutes and more, and their absence."""
+
+import numpy as np
+import pytest
+
+from onboard.core.calibrator import Calibrator
+from onboard.core.diagnosis import diagnose
+from onboard.core.findings import Verdict
+from onboard.core.settings import EstimatorSettings
+from onboard.mavlink.decode import Decoder
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import GpsTruth, random_imus
+from sitl.recording import FlightSpec, fly_messages
+
+PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
+
+
+def diagnosed(vehicle, seed, *effects, duration=150.0):
+    spec = FlightSpec(
+        vehicle=vehicle,
+        seed=seed,
+        duration=duration,
+        imus=random_imus(seed),
+        gps=PROMPT,
+        effects=effects,
+    )
+    calibrator, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    for _, message in fly_messages(spec):
+        for sample in decoder.decode(message):
+            calibrator.feed(sample)
+    calibrator.finish()
+    before = calibrator.to_bytes()
+    said = diagnose(calibrator, 1)
+    assert calibrator.to_bytes() == before, "a diagnosis leaves the calibrator as it is"
+    return said, calibrator.first_sample
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    said, _ = diagnosed("copter", 41)
+    assert said.verdict is Verdict.CLEAN
+    assert said.effects == ()
+
+
+def test_a_false_velocity_is_found_from_beginning_to_end():
+    fault = concealed.GpsFault(start=70.0, end=84.0, north=0.0, east=2.5)
+    said, first = diagnosed("plane", 42, fault)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    begin, end = effect.intervals[0][0] + first, effect.intervals[-1][1] + first
+    assert abs(begin - fault.start) < 2.0
+    assert abs(end - fault.end) < 2.0
+    assert effect.unknowns["offset"].value == pytest.approx(2.5, abs=0.4)
+    assert effect.where[0].axis == "earth_east"
+
+
+def test_a_jump_of_one_axis_is_said_to_be_on_that_axis():
+    step = concealed.BiasStep(time=80.0, x=0.5)
+    said, first = diagnosed("copter", 43, step)
+    effect = next(e for e in said.effects if e.name == "bias_step")
+    assert abs(effect.unknowns["time"].value + first - step.time) < 2.0
+    assert effect.where[0].axis == "body_x"
+    assert {e.name for e in said.effects} == {"bias_step"}
+
+
+def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
+    said, _ = diagnosed("copter", 44, concealed.Saturation(limit=11.4))
+    effect = next(e for e in said.effects if e.name == "saturation")
+    assert effect.unknowns["limit"].value == pytest.approx(11.4, rel=0.1)
+    assert effect.intervals
+    assert np.all(np.diff(np.array(effect.intervals)) >= 0.0)
+
+
+def test_what_has_no_name_gets_none_but_its_formula():
+    hidden = concealed.Nameless(term="dynamic_pressure", x=-0.2, y=-0.2, z=-0.2)
+    said, _ = diagnosed("copter", 45, hidden, duration=200.0)
+    assert said.verdict is Verdict.UNEXPLAINED
+    (effect,) = said.effects
+    assert effect.name == "empirical"
+    assert "speed" in effect.formula
