@@ -28,6 +28,8 @@ MARGIN_S = 0.4
 SHORTEST_S = 4.0
 """Pieces of flight between two clipped ones that are worth an alignment."""
 FEWEST_REFUSED = 3
+CONTRADICTED = ("gps_glitch", "ekf_gps_glitch", "ekf_unhealthy")
+"""Reasons of distrust that are opinions of others about a receiver that says it is well."""
 FAR_OFF = 12.0
 """Times the usual innovation: no fix of a receiver that is well."""
 
@@ -81,7 +83,7 @@ def false_fixes(
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
     """
-    glitches = calibrator.trust.rejected.get("gps_glitch", 0)
+    glitches = sum(calibrator.trust.rejected.get(name, 0) for name in CONTRADICTED)
     solution = full.found()
     levels, jumped = _robust(full, solution.theta)
     refused = max(full.refused["velocity"], like.refused["velocity"], glitches)
