@@ -50,7 +50,7 @@ class Client:
                 f"{self._url}: not the onboard service of this version: {error}"
             ) from None
 
-    def act(self, action: str, imus: tuple[int, ...]) -> str:
+    def act(self, action: str, imus: tuple[int, ...], **more: bool) -> str:
         """Ask for a change; the daemon's sentence about what it did.
 
         Raises:
@@ -59,7 +59,9 @@ class Client:
         """
         import msgspec
 
-        answer = self._request("POST", f"/api/{action}", msgspec.json.encode({"imus": imus}))
+        answer = self._request(
+            "POST", f"/api/{action}", msgspec.json.encode({"imus": imus, **more})
+        )
         return str(msgspec.json.decode(answer)["done"])
 
     def _request(self, method: str, path: str, body: bytes) -> bytes:
@@ -179,7 +181,27 @@ def _action(name: str, text: str) -> click.Command:
     return command
 
 
-approve = _action("approve", "Allow the proposed parameters to be written (default: of every IMU).")
+@click.command()
+@_where
+@click.option(
+    "--despite-diagnosis",
+    is_flag=True,
+    help="Write them although the diagnosis holds them back; IMUs must be named.",
+)
+@click.argument("imus", nargs=-1, type=click.IntRange(1, 5), metavar="[IMU]...")
+def approve(
+    url: str | None,
+    config: str | None,
+    token_file: str | None,
+    imus: tuple[int, ...],
+    *,
+    despite_diagnosis: bool,
+) -> None:
+    """Allow the proposed parameters to be written (default: of every IMU that waits)."""
+    more = {"despite_diagnosis": True} if despite_diagnosis else {}
+    click.echo(_client(url, config, token_file).act("approve", imus, **more))
+
+
 reject = _action("reject", "Refuse the proposed parameters.")
 rollback = _action("rollback", "Write back the values that were in force before the last push.")
 reset = _action("reset", "Forget what was learned; the autopilot is left as it is.")

@@ -166,6 +166,13 @@ class Calibrator:
         self._assembly.clear()
         return (*events, *self._trust.restart(ended), Restarted(ended, reason))
 
+    def begin_anew(self, imu: int) -> None:
+        """Forget what was learned of one accelerometer: it is known to be wrong."""
+        self._assembly.forget(imu)
+        self._waiting.pop(imu, None)
+        if self._engines.pop(imu, None) is not None:
+            self._counts["begun_anew"] += 1
+
     def finish(self) -> tuple[Event, ...]:
         """End of the recording or of the window: process what is pending, refine."""
         events = self._advance(everything=True)

@@ -55,29 +55,33 @@ BY_NATURE = (
 )
 
 
-def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
+def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
     """Diagnose one accelerometer's recording; the calibrator is left as it is.
 
     Args:
         calibrator: finished; its settings' buffer must hold the flight of interest.
         imu: which accelerometer.
+        latest: look only at what is kept since the boot clock last began; times are then since
+            the first sample that is kept.
 
     Raises:
         KeyError: that accelerometer has not been seen.
     """
     engine = calibrator.engine(imu)
+    flight = since_reboot(engine.chunks) if latest else list(engine.chunks)
+    first = float(flight[0].stretch.t[0]) if latest and flight else calibrator.first_sample
     antenna = calibrator.parameters.antenna
     origin = Origin(
-        t0=calibrator.first_sample,
+        t0=first,
         antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
     )
-    rail = saturation_effect(engine.chunks, origin.t0, imu)
-    chunks = list(engine.chunks)
+    rail = saturation_effect(flight, origin.t0, imu)
+    chunks = flight
     if rail is not None:
         chunks = unclipped(chunks, rail.intervals, origin.t0)
-        if sum(c.trusted_s for c in chunks) < ENOUGH * engine.trusted_s:
+        if sum(c.trusted_s for c in chunks) < ENOUGH * sum(c.trusted_s for c in flight):
             # Clipped all the time: what is left would say less than what is spoiled.
-            chunks = list(engine.chunks)
+            chunks = flight
     testable, absent = _testable(catalogue(origin), chunks)
     full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
@@ -110,6 +114,15 @@ def diagnose(calibrator: Calibrator, imu: int) -> Diagnosis:
         absent,
         tuple(e for e in (rail, fault) if e is not None),
     ).diagnosis()
+
+
+def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """The chunks at the end whose clock is one and the same."""
+    first = 0
+    for i in range(1, len(chunks)):
+        if chunks[i].fixes.t[0] < chunks[i - 1].fixes.t[0]:
+            first = i
+    return list(chunks[first:])
 
 
 def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:

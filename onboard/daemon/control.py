@@ -5,8 +5,10 @@ method    path                does
 ========  ==================  ================================================================
 GET       /api/snapshot       the snapshot (onboard.daemon.snapshot)
 GET       /api/live           WebSocket: a snapshot at once, then one per tick
-POST      /api/approve        ``{"imus": [1, 2]}``; no list: every accelerometer that waits
-POST      /api/reject         the same
+POST      /api/approve        ``{"imus": [1, 2]}``; no list: every accelerometer that waits.
+                              ``"despite_diagnosis": true`` those, too, that are named and that
+                              the diagnosis holds back
+POST      /api/reject         ``{"imus": [1, 2]}``; no list: all
 POST      /api/rollback       the same
 POST      /api/reset          the same: forgets the sums
 ========  ==================  ================================================================
@@ -52,7 +54,7 @@ class Actions(Protocol):
     def snapshot(self) -> Snapshot:
         """Everything, now."""
 
-    async def approve(self, imus: tuple[int, ...]) -> str:
+    async def approve(self, imus: tuple[int, ...], *, despite_diagnosis: bool = False) -> str:
         """Allow the proposed push of these accelerometers (none named: all that wait)."""
 
     async def reject(self, imus: tuple[int, ...]) -> str:
@@ -69,6 +71,12 @@ class Request(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Body of every POST."""
 
     imus: tuple[Annotated[int, Meta(ge=1, le=5)], ...] = ()
+
+
+class Approval(Request, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Body of an approval; ``despite_diagnosis``: although physics is missing."""
+
+    despite_diagnosis: bool = False
 
 
 class Live:
@@ -113,8 +121,8 @@ class ControlServer:
         )
         self.application.router.add_get("/api/snapshot", self._snapshot)
         self.application.router.add_get("/api/live", self._live)
+        self.application.router.add_post("/api/approve", _approving(actions))
         for name, action in (
-            ("approve", actions.approve),
             ("reject", actions.reject),
             ("rollback", actions.rollback),
             ("reset", actions.reset),
@@ -205,6 +213,18 @@ def _acting(action: Callable[[tuple[int, ...]], Awaitable[str]]) -> Handler:
         body = await request.read()
         wanted = msgspec.json.decode(body or b"{}", type=Request)
         return _json(200, {"done": await action(wanted.imus)})
+
+    return handle
+
+
+def _approving(actions: Actions) -> Handler:
+    """The POST handler of approvals."""
+
+    async def handle(request: web.Request) -> web.Response:
+        body = await request.read()
+        wanted = msgspec.json.decode(body or b"{}", type=Approval)
+        done = await actions.approve(wanted.imus, despite_diagnosis=wanted.despite_diagnosis)
+        return _json(200, {"done": done})
 
     return handle
 

@@ -4,6 +4,10 @@ It lives on the worker's thread and is only called there; what it gives back is 
 knows no link.  While a push waits for the flight that judges it, a second, fresh estimator
 learns from what is flown between arming and disarming, and from nothing else: standing on
 the ground after a push is no flight.
+
+What a flight has taught is diagnosed after the landing (:mod:`onboard.daemon.examiner`).  Where
+physics was missing that moves the numbers, they are forgotten when the next flight begins:
+sums that are known to be wrong must not be added to those of a flight that is right.
 """
 
 from __future__ import annotations
@@ -13,15 +17,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from onboard import __version__
-from onboard.core.calibrator import Calibrator
+from onboard.core.calibrator import Calibrator, FlightEnded, Restarted
 from onboard.core.result import Calibration, Status
 from onboard.core.samples import ParameterValue, Sample, VehicleState
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
+from onboard.daemon.examiner import Examiner
 from onboard.daemon.snapshot import TrustView
 from onboard.daemon.store import Store
 from onboard.daemon.view import trust_view
 from onboard.errors import StateError
+from onboard.push.physics import Diagnosed
 
 SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
@@ -42,7 +48,9 @@ class News:
 class Learned:
     """Where the learner stands after a batch.
 
-    ``flown`` is the answer of the flight that has just ended, if a push waits for it.
+    ``flown`` is the answer of the flight that has just ended, if a push waits for it;
+    ``diagnosed`` what the diagnosis of the last flight said, ``diagnosing`` those that wait for
+    theirs.
     """
 
     calibrations: dict[int, Calibration]
@@ -50,6 +58,8 @@ class Learned:
     counters: dict[str, int]
     news: tuple[News, ...] = ()
     flown: dict[int, Calibration] = field(default_factory=dict)
+    diagnosed: dict[int, Diagnosed] = field(default_factory=dict)
+    diagnosing: tuple[int, ...] = ()
 
 
 class Learner:
@@ -66,6 +76,8 @@ class Learner:
         self._flight: Calibrator | None = None
         self._flown: dict[int, Calibration] = {}
         self._armed = False
+        self._in_flight: bool | None = None
+        self._examiner = Examiner(clock)
         self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
         self._answers: dict[int, Calibration] = {}
@@ -75,9 +87,10 @@ class Learner:
         self._counters: Counter[str] = Counter()
         self._news: list[News] = []
 
-    def adopt(self, system_id: int) -> None:
+    def adopt(self, system_id: int, autopilot: str = "ardupilot") -> None:
         """An autopilot was found: go on from what was saved for this vehicle."""
         self._system_id = system_id
+        self._examiner.autopilot = autopilot
         try:
             saved = self._store.load(system_id)
             if saved is None:
@@ -90,17 +103,36 @@ class Learner:
         self._counters["state_resumed"] += 1
         self._tell("state_resumed", f"resumed what was learned of system {system_id} before")
 
-    def learn(self, samples: Iterable[Sample], *, judging: bool) -> Learned:
-        """Take a batch; ``judging``: a push waits for the verdict of a flight."""
+    def learn(
+        self, samples: Iterable[Sample], *, judging: bool, in_flight: bool = False
+    ) -> Learned:
+        """Take a batch.
+
+        Args:
+            samples: in the order in which they came.
+            judging: a push waits for the verdict of a flight.
+            in_flight: values may be written in flight, so diagnose there, too.
+        """
         for sample in samples:
             if type(sample) is ParameterValue:
                 self._parameter(sample)
+            elif type(sample) is VehicleState and sample.armed is not None:
+                self._arming(armed=sample.armed)
             for event in self._calibrator.feed(sample):
                 self._note(event)
             if judging:
                 self._fly(sample)
         if not judging:
             self._flight = None
+        learned = self._learned()
+        if in_flight and self._in_flight:
+            ready = (i for i, c in self._answers.items() if c.status is Status.CALIBRATED)
+            self._examiner.flying(self._calibrator, ready)
+        return learned
+
+    def examine(self) -> Learned:
+        """Diagnose one accelerometer of those that wait for it; takes seconds."""
+        self._examiner.examine_next(self._calibrator)
         return self._learned()
 
     def reset(self) -> Learned:
@@ -112,6 +144,7 @@ class Learner:
         self._answers = {}
         self._windows = 0
         self._flight = None
+        self._examiner.took_off()
         self._stale = self._urgent = True
         if self._system_id is not None:
             self._store.path(self._system_id).unlink(missing_ok=True)
@@ -140,9 +173,11 @@ class Learner:
         return Learned(
             calibrations=self._answers,
             trust=trust_view(self._calibrator.trust, windows=self._windows),
-            counters=dict(self._counters),
+            counters={**self._counters, **self._examiner.counters},
             news=news,
             flown=flown,
+            diagnosed=dict(self._examiner.diagnosed),
+            diagnosing=self._examiner.waiting,
         )
 
     def _solve(self) -> None:
@@ -160,6 +195,19 @@ class Learner:
             elif answer.status is Status.INVALID and imu in self._calibrated:
                 self._calibrated.discard(imu)
                 self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
+
+    def _arming(self, *, armed: bool) -> None:
+        """A flight begins: nothing of it is diagnosed, and what was wrong is not carried on."""
+        if armed and not self._in_flight:
+            for imu, found in self._examiner.diagnosed.items():
+                if found.missing and imu in self._calibrator.imus:
+                    self._calibrator.begin_anew(imu)
+                    self._calibrated.discard(imu)
+                    self._stale = self._urgent = True
+                    text = f"IMU {imu}: learning anew, physics was missing in the flight before"
+                    self._tell("begun_anew", text)
+            self._examiner.took_off()
+        self._in_flight = armed
 
     def _fly(self, sample: Sample) -> None:
         """Let the judging estimator have what is flown; its answer when the flight ends."""
@@ -187,7 +235,13 @@ class Learner:
                 self._tell("window_closed", f"GPS is not trusted: {why}")
             case _:
                 name = type(event).__name__
-                self._urgent |= name == "FlightEnded"
+                self._urgent |= isinstance(event, FlightEnded)
+                # A flight that ends with the power of the autopilot has ended, too.
+                if isinstance(event, FlightEnded) or (
+                    isinstance(event, Restarted) and self._in_flight
+                ):
+                    self._examiner.landed(self._calibrator.imus)
+                    self._in_flight = False
                 self._counters[f"event_{name}"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:

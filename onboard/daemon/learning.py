@@ -24,7 +24,7 @@ BATCH_S = 0.25
 WAITING_LIMIT = 200_000
 """Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
 STEP_LIMIT_S = 120.0
-"""A refinement takes seconds, on a slow companion a minute; longer than this is a hang."""
+"""A refinement or a diagnosis takes seconds, on a slow companion a minute; longer is a hang."""
 
 
 class Learning:
@@ -34,6 +34,7 @@ class Learning:
         learner: whom to hand the batches.
         notices: where its news go.
         judging: whether a push waits for the flight that judges it.
+        in_flight: whether values may be written in flight.
         clock: monotonic time, s.
         wall_clock: Unix time, s.
         save_every_s: how often sums go to disk.
@@ -45,6 +46,7 @@ class Learning:
         notices: Notices,
         *,
         judging: Callable[[], bool],
+        in_flight: Callable[[], bool] = lambda: False,
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
         save_every_s: float,
@@ -55,6 +57,7 @@ class Learning:
         self._learner = learner
         self._notices = notices
         self._judging = judging
+        self._in_flight = in_flight
         self._clock = clock
         self._wall_clock = wall_clock
         self._save_every_s = save_every_s
@@ -62,6 +65,7 @@ class Learning:
         self._samples: list[Sample] = []
         self._worker: Worker | None = None
         self._busy_since: float | None = None
+        self._closing = False
         self._listeners: list[Callable[[Learned], None]] = []
 
     def listen(self, listener: Callable[[Learned], None]) -> None:
@@ -78,19 +82,25 @@ class Learning:
             del self._samples[:half]
         return samples
 
-    async def run(self, system_id: int) -> None:
+    async def run(self, system_id: int, autopilot: str) -> None:
         """Learn from this vehicle until cancelled."""
         self._worker = Worker("learner")
-        await self._call(self._learner.adopt, system_id)
+        await self._call(self._learner.adopt, system_id, autopilot)
         while True:
             await self.step()
             await asyncio.sleep(BATCH_S)
 
     async def step(self) -> None:
-        """One batch, and the sums to disk when that is due."""
+        """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
         samples, self._samples = self._samples, []
         now = self._busy_since = self._clock()
-        self._accept(await self._call(self._learner.learn, samples, judging=self._judging()))
+        learned = await self._call(
+            self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+        )
+        self._accept(learned)
+        if learned.diagnosing and not self._closing:
+            self._busy_since = self._clock()
+            self._accept(await self._call(self._learner.examine))
         if now >= self._next_save:
             self._next_save = now + self._save_every_s
             await self.save()
@@ -114,6 +124,7 @@ class Learning:
 
     async def close(self, limit_s: float) -> None:
         """Learn what has come, save, and let the thread go; if it is busy, the last save counts."""
+        self._closing = True
         try:
             async with asyncio.timeout(limit_s):
                 await self.step()

@@ -22,6 +22,7 @@ from onboard.daemon.parameter_view import (
     parameter_values,
     top_effect,
 )
+from onboard.daemon.proposals import DIAGNOSIS, PEOPLE
 from onboard.daemon.snapshot import Snapshot
 from onboard.errors import OnboardError, RefusedError
 from onboard.mavlink.autopilot import Participant
@@ -41,7 +42,7 @@ class Operated(Protocol):
     def snapshot(self) -> Snapshot:
         """Everything, now."""
 
-    async def approve(self, imus: tuple[int, ...]) -> str:
+    async def approve(self, imus: tuple[int, ...], *, despite_diagnosis: bool = False) -> str:
         """Allow the proposed push."""
 
     async def reject(self, imus: tuple[int, ...]) -> str:
@@ -162,7 +163,7 @@ class Outlets:
         if self._approving:
             raise RefusedError("an approval is under way")
         if not any(
-            {"approval", "refused"} & proposal.held_back.keys()
+            (PEOPLE | DIAGNOSIS) & proposal.held_back.keys()
             for proposal in self._service.snapshot().push.proposals
         ):
             raise RefusedError("nothing waits for approval")

@@ -1,19 +1,26 @@
 """Proposals: what would be written for each accelerometer, and every reason why it is not yet.
 
-The policy's reasons come from :mod:`onboard.push.policy`; added here are those of people
-(approval, refusal), of past failures, and of what kind of autopilot it is.
+The policy's reasons come from :mod:`onboard.push.policy`; added here are those of the diagnosis
+(:mod:`onboard.push.physics`), of people (approval, refusal), of past failures, and of what kind
+of autopilot it is.
+
+What is proposed is what was diagnosed: the calibration of that moment, not what standing on the
+ground has made of it since.  Where physics was missing, or nobody could look for it, a person
+may have it written all the same, but has to say so: naming the accelerometer and with
+``despite_diagnosis``.  That holds for this diagnosis only.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.core.accelerometer import SixParameters
 from onboard.core.result import Calibration, Status
 from onboard.daemon.snapshot import ChangeView, ProposalView
 from onboard.errors import PushError, RefusedError
+from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, PolicySettings, VehicleCondition, judge
 
@@ -23,13 +30,23 @@ MOVED_SIGMAS = 2.0
 """An approval is of the values shown: it lapses when an estimate moves by more than this."""
 PEOPLE = frozenset({"approval", "refused"})
 """Reasons that a person lifts."""
+DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
+"""Reasons that a person lifts by saying so explicitly."""
+
+
+NOT_DIAGNOSED = object()
+"""Stands for the diagnosis that there is not."""
 
 
 @dataclass(slots=True)
 class Standing:
-    """Where one accelerometer stands with people and with past failures."""
+    """Where one accelerometer stands with people and with past failures.
+
+    ``despite`` is the diagnosis in spite of which it was approved.
+    """
 
     approved: PushPlan | None = None
+    despite: object = None
     refused: str = ""
     failures: int = 0
     not_before: float = 0.0
@@ -56,6 +73,7 @@ class Proposals:
         self.counters: Counter[str] = Counter()
         self._imus = imus
         self._standing: dict[int, Standing] = {}
+        self._diagnosed: Mapping[int, Diagnosed] = {}
 
     def update(
         self,
@@ -65,8 +83,15 @@ class Proposals:
         calibrations: Mapping[int, Calibration],
         parameters: Mapping[str, float],
         condition: VehicleCondition,
+        diagnosed: Mapping[int, Diagnosed],
+        diagnosing: Sequence[int] = (),
     ) -> None:
         """Make them anew from the estimates and the autopilot's values of this moment."""
+        self._diagnosed = diagnosed
+        calibrations = {
+            imu: _as_now(diagnosed[imu].calibration, live) if imu in diagnosed else live
+            for imu, live in calibrations.items()
+        }
         plans: dict[int, PushPlan] = {}
         for imu, calibration in calibrations.items():
             try:
@@ -99,6 +124,7 @@ class Proposals:
                 plan, calibrations[imu], condition, self.settings, values=parameters, others=others
             )
             held_back = self._beyond_policy(imu, plan, now)
+            held_back |= self._physics(imu, diagnosing=imu in diagnosing)
             for refusal in refusals:  # several of one name (six sigmas): the first says enough
                 held_back.setdefault(refusal.objection.value, refusal.sentence)
             self.current[imu] = Proposal(plan, held_back)
@@ -107,21 +133,38 @@ class Proposals:
         """The first plan that nothing holds back."""
         return next((p.plan for p in self.current.values() if not p.held_back), None)
 
-    def approve(self, imus: Sequence[int]) -> str:
+    def approve(self, imus: Sequence[int], *, despite_diagnosis: bool = False) -> str:
         """A person allows what is proposed now (no number: all that wait for one).
 
+        Args:
+            imus: which accelerometers.
+            despite_diagnosis: those, too, that the diagnosis holds back; they must be named.
+
         Raises:
-            RefusedError: nothing waits for a person.
+            RefusedError: nothing waits for a person, or only the diagnosis is against it and
+                that was not said.
         """
+        chosen = {i: self.current[i].held_back for i in imus or self.current if i in self.current}
+        against = {i: held.keys() & DIAGNOSIS for i, held in chosen.items()}
+        if despite_diagnosis and not imus:
+            raise RefusedError("despite a diagnosis, accelerometers are approved by their number")
         waiting = [
             imu
-            for imu in imus or self.current
-            if imu in self.current and PEOPLE & self.current[imu].held_back.keys()
+            for imu, held in chosen.items()
+            if (despite_diagnosis if against[imu] else held.keys() & PEOPLE)
         ]
         if not waiting:
+            for imu, names in against.items():
+                if names:
+                    why = chosen[imu][min(names)]
+                    raise RefusedError(
+                        f"IMU {imu}: {why}; `onboard approve {imu} --despite-diagnosis` "
+                        "writes it all the same"
+                    )
             raise RefusedError("nothing waits for approval")
         for imu in waiting:
-            self._standing[imu] = Standing(approved=self.current[imu].plan)
+            despite = self._diagnosed.get(imu, NOT_DIAGNOSED) if against[imu] else None
+            self._standing[imu] = Standing(approved=self.current[imu].plan, despite=despite)
         self.counters["approvals"] += len(waiting)
         return f"{named(waiting)} approved: written as soon as policy and flight state allow"
 
@@ -185,6 +228,21 @@ class Proposals:
             for imu, proposal in self.current.items()
         )
 
+    def _physics(self, imu: int, *, diagnosing: bool) -> dict[str, str]:
+        """What the diagnosis says against it, unless a person has approved in spite of it."""
+        found = self._diagnosed.get(imu)
+        if found is None and diagnosing:
+            return {"diagnosing": "the flight is being diagnosed"}
+        standing = self.standing(imu)
+        if standing.approved is not None and standing.despite is (found or NOT_DIAGNOSED):
+            return {}
+        if found is None:
+            return {"not_diagnosed": "no flight was diagnosed since the start: fly again"}
+        if not found.missing:
+            return {}
+        offered = "; these values have it modelled" if found.modelled else ""
+        return {"physics_missing": f"physics missing: {found.missing}{offered}"}
+
     def _beyond_policy(self, imu: int, plan: PushPlan, now: float) -> dict[str, str]:
         standing = self.standing(imu)
         found: dict[str, str] = {}
@@ -198,7 +256,7 @@ class Proposals:
             wait = standing.not_before - now
             found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
         if standing.approved is not None and _moved(standing.approved, plan):
-            standing.approved = None
+            standing.approved = standing.despite = None
             self.counters["approvals_lapsed"] += 1
         if self.approval and standing.approved is None:
             found["approval"] = "a person has to approve"
@@ -208,6 +266,24 @@ class Proposals:
 def named(imus: Sequence[int]) -> str:
     """IMU 1, IMU 2."""
     return ", ".join(f"IMU {imu}" for imu in imus)
+
+
+def _as_now(diagnosed: Calibration, live: Calibration) -> Calibration:
+    """The calibration that was diagnosed, compared with the parameters in force now."""
+    if (diagnosed.in_force_scale, diagnosed.in_force_offset) == (
+        live.in_force_scale,
+        live.in_force_offset,
+    ):
+        return diagnosed
+    return replace(
+        diagnosed,
+        in_force_scale=live.in_force_scale,
+        in_force_offset=live.in_force_offset,
+        parameters_known=live.parameters_known,
+        whitened_rms_before=live.whitened_rms_before,
+        held_out_before=live.held_out_before,
+        velocity_rms_before=live.velocity_rms_before,
+    )
 
 
 def _moved(approved: PushPlan, plan: PushPlan) -> bool:

@@ -26,6 +26,7 @@ from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import SendAction, parameter_event, parameter_message
 from onboard.push.entries import Entry, Planned, Purpose, Recovery, Result, Verdict, Watched
 from onboard.push.journal import Journal
+from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan
 from onboard.push.policy import Mode, VehicleCondition, ekf_healthy, moment
 from onboard.push.signals import (
@@ -141,6 +142,8 @@ class Pusher:
         calibrations: Mapping[int, Calibration],
         parameters: Mapping[str, float],
         condition: VehicleCondition,
+        diagnosed: Mapping[int, Diagnosed],
+        diagnosing: Sequence[int] = (),
     ) -> None:
         """Propose anew; start what nothing holds back: unfinished business first."""
         self._condition = condition
@@ -160,6 +163,8 @@ class Pusher:
             calibrations=calibrations,
             parameters=parameters,
             condition=condition,
+            diagnosed=diagnosed,
+            diagnosing=diagnosing,
         )
         if self._transaction is not None or self._closing or proposals.forbidden:
             return
@@ -178,7 +183,7 @@ class Pusher:
     def judge(self, verdicts: Sequence[Watched]) -> None:
         """What the flight after a push says; one that made it worse is taken back."""
         for verdict in verdicts:
-            self._append(verdict)
+            self.append(verdict)
             self.counters[f"verdict_{verdict.verdict.value}"] += 1
             self._notices.post(
                 f"push_{verdict.verdict.value}",
@@ -309,7 +314,7 @@ class Pusher:
         for output in outputs:
             match output:
                 case Record(entry):
-                    self._tell(self._append(entry), now)
+                    self._tell(self.append(entry), now)
                 case Finished(outcome):
                     self._finished(outcome, now)
                 case _ if isinstance(output, SendAction):
@@ -318,7 +323,8 @@ class Pusher:
                         parameter_message(output, self._codec, system=system, component=component)
                     )
 
-    def _append(self, entry: Entry) -> JournalWritten | JournalFailed:
+    def append(self, entry: Entry) -> JournalWritten | JournalFailed:
+        """Write to the journal; a disk that does not take it is counted and logged."""
         try:
             self._journal.append(entry, self._wall_clock())
         except StateError as error:
@@ -345,7 +351,7 @@ class Pusher:
         condemned = self._condemned.get(imu)
         if condemned is not None and outcome.reason is Reason.CHANGED_BY_OTHER:
             sentence = "not taken back: somebody has changed the parameters since"
-            self._append(Watched(condemned.transaction, Verdict.SUPERSEDED, sentence))
+            self.append(Watched(condemned.transaction, Verdict.SUPERSEDED, sentence))
         self._read_journal()
 
     def _take_outbox(self) -> Sequence[Message]:

@@ -22,6 +22,7 @@ from onboard import __version__
 from onboard.daemon import settings
 from onboard.daemon.condition import Observed
 from onboard.daemon.configuration import Configuration, read_secret
+from onboard.daemon.diagnoses import Diagnoses
 from onboard.daemon.door import Door
 from onboard.daemon.learner import Learned, Learner
 from onboard.daemon.learning import Learning
@@ -121,6 +122,7 @@ class Service:
             ),
             self.notices,
             judging=lambda: self._witness.waiting,
+            in_flight=lambda: self._proposals.settings.mode is Mode.IN_FLIGHT,
             clock=clock,
             wall_clock=wall_clock,
             save_every_s=configuration.estimator.save_every_s,
@@ -133,6 +135,7 @@ class Service:
         self._pusher = Pusher(
             self._journal, self._proposals, self._witness, self.notices, wall_clock=wall_clock
         )
+        self._diagnoses = Diagnoses(self._pusher.append, self.notices)
         self._parameters = ParameterWatch()
         self._streams = Streams(settings.stream_requests(link.rates))
         self._timesync = TimeSync()
@@ -215,6 +218,8 @@ class Service:
                 calibrations=learned.calibrations,
                 parameters=self._parameters.values,
                 condition=condition,
+                diagnosed=learned.diagnosed,
+                diagnosing=learned.diagnosing,
             )
         if self.server is not None:
             self.server.publish()
@@ -225,6 +230,7 @@ class Service:
     def _on_learned(self, learned: Learned) -> None:
         if learned.flown:
             self._pusher.judge(self._witness.landed(learned.flown))
+        self._diagnoses.take(learned.diagnosed)
 
     async def _shutdown(self) -> None:
         """Stage by stage, each bounded: people, the push, the link, the sums."""
@@ -258,7 +264,7 @@ class Service:
 
     async def _learn(self) -> None:
         autopilot = await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
-        await self.learning.run(autopilot.system)
+        await self.learning.run(autopilot.system, autopilot.firmware_name)
 
     # What comes in
 
@@ -306,9 +312,9 @@ class Service:
 
     # What people ask for (onboard.daemon.control.Actions)
 
-    async def approve(self, imus: tuple[int, ...]) -> str:
+    async def approve(self, imus: tuple[int, ...], *, despite_diagnosis: bool = False) -> str:
         """Allow the proposed push."""
-        return self._proposals.approve(imus)
+        return self._proposals.approve(imus, despite_diagnosis=despite_diagnosis)
 
     async def reject(self, imus: tuple[int, ...]) -> str:
         """Refuse the proposed push."""
@@ -323,6 +329,7 @@ class Service:
         del imus
         await self.learning.reset()
         self._proposals.forget()
+        self._diagnoses.forget()
         self.counters["resets"] += 1
         return "what was learned is forgotten; the autopilot's parameters are as they were"
 
@@ -354,6 +361,7 @@ class Service:
             journal=journal_view(self._journal.entries[-JOURNAL_SHOWN:]),
             notices=self.notices.kept,
             counters=self._all_counters(),
+            diagnosis=self._diagnoses.document,
         )
 
     # How

@@ -21,7 +21,16 @@ from onboard.daemon.snapshot import (
     TrustView,
 )
 from onboard.mavlink.link import Link
-from onboard.push.entries import Closed, Entry, Planned, Purpose, Undoing, Watched, Writing
+from onboard.push.entries import (
+    Closed,
+    Entry,
+    Found,
+    Planned,
+    Purpose,
+    Undoing,
+    Watched,
+    Writing,
+)
 from onboard.push.policy import VehicleCondition
 
 
@@ -106,6 +115,11 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
                 text = f"{result.value.replace('_', ' ')}: {sentence}"
             case Watched(verdict=verdict, sentence=sentence):
                 text = f"flight after the push: {verdict.value}: {sentence}"
+            case Found(imu=imu, verdict=verdict, effects=effects, missing=missing):
+                imus[entry.transaction] = imu
+                text = f"flight diagnosed: {diagnosis_in_words(verdict, effects)}"
+                if missing:
+                    text += f"; not to be written by itself: {missing}"
             case _:
                 continue
         shown.append(
@@ -118,6 +132,12 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
             )
         )
     return tuple(shown)
+
+
+def diagnosis_in_words(verdict: str, effects: Sequence[str]) -> str:
+    """One line about a diagnosis."""
+    names = ", ".join(name.replace("_", " ") for name in effects)
+    return f"{verdict.replace('_', ' ')}{f': {names}' if names else ''}"
 
 
 NO_TRUST = TrustView(

@@ -100,7 +100,20 @@ class Watched(Struct, frozen=True, tag="watched"):
     sentence: str
 
 
-Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched
+class Found(Struct, frozen=True, tag="found"):
+    """A flight was diagnosed; ``missing``: why nothing may be written by itself, or empty.
+
+    ``transaction`` names the diagnosis; it belongs to no push.
+    """
+
+    transaction: str
+    imu: int
+    verdict: str
+    effects: tuple[str, ...]
+    missing: str
+
+
+Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched | Found
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ from onboard.errors import PushError, StateError
 from onboard.push.entries import (
     Closed,
     Entry,
+    Found,
     Planned,
     Purpose,
     ReadBack,
@@ -66,8 +67,8 @@ class Journal:
         Args:
             path: the file; its directory is made.
             limit_bytes: size from which on old transactions are dropped.
-            keep: closed transactions kept then.  Open ones, and the last completed push of
-                each accelerometer (what a roll-back goes to), are always kept.
+            keep: closed transactions and diagnoses kept then.  Open ones, and the last completed
+                push of each accelerometer (what a roll-back goes to), are always kept.
         """
         self._path = path
         self._limit = limit_bytes
@@ -128,7 +129,7 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
-        if self._size > self._limit and isinstance(entry, Closed | Watched):
+        if self._size > self._limit and isinstance(entry, Closed | Watched | Found):
             self._compact()
 
     def recover(self) -> tuple[Recovery, ...]:
@@ -177,7 +178,7 @@ class Journal:
         for _, entry in self._lines:
             if isinstance(entry, Closed):
                 order.pop(entry.transaction, None)
-            elif not isinstance(entry, Watched):
+            elif not isinstance(entry, Watched | Found):
                 order.setdefault(entry.transaction)
         return list(order)
 
@@ -241,7 +242,7 @@ class Journal:
             last = self.last_completed(imu)
             if last is not None:
                 keep.add(last.transaction)
-        closed = [e.transaction for _, e in self._lines if isinstance(e, Closed)]
+        closed = [e.transaction for _, e in self._lines if isinstance(e, Closed | Found)]
         keep.update(closed[max(0, len(closed) - self._keep) :])
         lines = [(at, e) for at, e in self._lines if e.transaction in keep]
         if len(lines) == len(self._lines) and not self.damaged:

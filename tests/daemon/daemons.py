@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from onboard.core.result import Calibration, Coverage, Status
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
+from onboard.push.physics import Diagnosed
 
 
 @asynccontextmanager
@@ -61,8 +62,27 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
     return Calibration(**(fields | changes))
 
 
-def convinced(service, *calibrations):
-    """Have the daemon believe that it has learned these."""
+def convinced(service, *calibrations, missing="", modelled=False, effects=()):
+    """Have the daemon believe that it has learned these, and what the diagnosis said of them."""
     learner = service.learning._learner
     learner._solve = lambda: None
     learner._answers = {c.imu: c for c in calibrations}
+    examiner = learner._examiner
+    examiner.took_off = lambda: None
+    examiner.landed = lambda imus: None
+    examiner.diagnosed = {
+        c.imu: Diagnosed(
+            imu=c.imu,
+            verdict="explained" if effects else "clean",
+            effects=tuple(effects),
+            calibration=c,
+            missing=missing,
+            modelled=modelled,
+            document={
+                "schema": "onboard.explain/1",
+                "verdict": "explained" if effects else "clean",
+                "effects": [{"name": name} for name in effects],
+            },
+        )
+        for c in calibrations
+    }

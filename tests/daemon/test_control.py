@@ -34,8 +34,9 @@ class Recorded:
         self.asked.append((what, imus))
         return f"{what} done"
 
-    async def approve(self, imus):
-        return await self._ask("approve", imus)
+    async def approve(self, imus, *, despite_diagnosis=False):
+        what = "approve despite the diagnosis" if despite_diagnosis else "approve"
+        return await self._ask(what, imus)
 
     async def reject(self, imus):
         return await self._ask("reject", imus)
@@ -119,6 +120,17 @@ async def test_a_failure_of_ours_is_500_json_and_keeps_its_details_to_the_log(ca
             assert response.status == 500
             assert "secret" not in await response.text()
         assert "secret" in caplog.text
+
+
+async def test_an_approval_despite_the_diagnosis_has_to_say_so():
+    async with serving() as (_, actions, client):
+        body = {"imus": [2], "despite_diagnosis": True}
+        async with client.post("/api/approve", json=body) as response:
+            assert response.status == 200
+        assert actions.asked == [("approve despite the diagnosis", (2,))]
+        async with client.post("/api/reject", json=body) as response:
+            assert response.status == 400
+            assert (await error_of(response))["field"] == "despite_diagnosis"
 
 
 @pytest.mark.parametrize("action", CHANGES)

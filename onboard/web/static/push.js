@@ -6,14 +6,16 @@ import { brief, capital, fixed, plain, policyInWords } from "./words.js";
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
 const PEOPLE = ["approval", "refused"]; // reasons that a person lifts
+const DIAGNOSIS = ["physics_missing", "not_diagnosed"]; // ... by saying so explicitly
 
 const QUESTIONS = {
   approve: (imus) => [`Write the new values for ${imus}?`, "They are written as soon as policy and flight state allow, read back, and watched in the next flight."],
+  override: (imus, why) => [`Write the new values for ${imus} although the diagnosis is against it?`, `${capital(why)}.`],
   reject: (imus) => [`Reject the new values for ${imus}?`, "Nothing is written until it is approved or what was learned is forgotten."],
   rollback: (imus) => [`Roll back ${imus}?`, "The values from before the last push are written again."],
   reset: () => ["Forget what was learned?", "Of all accelerometers: learning begins anew. The autopilot's parameters stay as they are."],
 };
-const LABELS = { approve: "Approve", reject: "Reject", rollback: "Roll back", reset: "Forget what was learned" };
+const LABELS = { approve: "Approve", override: "Approve all the same", reject: "Reject", rollback: "Roll back", reset: "Forget what was learned" };
 
 export class Push {
   constructor() {
@@ -69,7 +71,7 @@ export class Push {
       h(
         "div",
         { class: "row actions" },
-        this.button("approve", imus, { class: waits ? "primary" : "", disabled: !waits }),
+        against(proposal) ? this.button("override", imus) : this.button("approve", imus, { class: waits ? "primary" : "", disabled: !waits }),
         this.button("reject", imus, { disabled: proposal.rejected }),
       ),
     );
@@ -89,13 +91,13 @@ export class Push {
 
   ask(action, imus) {
     const named = imus.map((imu) => `IMU ${imu}`).join(", ");
-    const [title, text] = QUESTIONS[action](named);
     const proposal = this.push.proposals.find((p) => imus.includes(p.imu));
+    const [title, text] = QUESTIONS[action](named, against(proposal));
     this.asked = { action, imus };
     say(byId("confirm-title"), title);
     say(byId("confirm-text"), text);
     say(byId("confirm-yes"), LABELS[action]);
-    byId("confirm-changes").replaceChildren(...(action === "approve" && proposal ? [changesTable(proposal.changes)] : []));
+    byId("confirm-changes").replaceChildren(...(["approve", "override"].includes(action) && proposal ? [changesTable(proposal.changes)] : []));
     byId("confirm").showModal();
     byId("confirm-no").focus(); // Enter by mistake changes nothing
   }
@@ -105,10 +107,11 @@ export class Push {
     if (this.token.value) headers.Authorization = `Bearer ${this.token.value}`;
     this.answer("", "");
     try {
-      const response = await fetch(`/api/${action}`, {
+      const override = action === "override" ? { despite_diagnosis: true } : {};
+      const response = await fetch(`/api/${action === "override" ? "approve" : action}`, {
         method: "POST",
         headers,
-        body: JSON.stringify(imus.length ? { imus } : {}),
+        body: JSON.stringify({ ...(imus.length ? { imus } : {}), ...override }),
         signal: AbortSignal.timeout(WAIT_MS),
       });
       const answer = await response.json();
@@ -128,6 +131,12 @@ export class Push {
     result.classList.toggle("bad", kind === "bad");
     say(result, text && capital(text));
   }
+}
+
+// What the diagnosis has against writing a proposal, empty if nothing.
+function against(proposal) {
+  const name = DIAGNOSIS.find((reason) => reason in (proposal?.held_back ?? {}));
+  return name ? proposal.held_back[name] : "";
 }
 
 function changesTable(changes) {
