@@ -71,7 +71,11 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         assert before[3] == 0.5
         await until(lambda: not autopilot.flying)
         assert np.array_equal(six(autopilot), before), "nothing may be written in flight"
+        # On the ground there is nothing to hurry for, and much to learn from what was flown.
+        autopilot.parameters.load({"SIM_SPEEDUP": 1.0})
         await until(lambda: service.snapshot().push.can_roll_back == (1,), limit=400.0)
+        assert service.snapshot().diagnosis["verdict"] in {"clean", "explained"}
+        await until(lambda: service.learning._busy_since is None, limit=400.0)
 
         imu = service.learning.learned.calibrations[1]
         estimate = np.array(imu.scale + imu.offset)

@@ -112,6 +112,63 @@ async def test_what_is_not_good_enough_is_shown_but_never_written(
         assert vehicle.sets == []
 
 
+async def test_missing_physics_is_said_written_down_and_not_written(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        why = "the antenna is 0.6 m away and that is not told"
+        convinced(service, WANTED, missing=why, effects=("gps_lever_arm",))
+        await until(lambda: why in held_back(service).get("physics_missing", ""))
+        snapshot = service.snapshot()
+        assert snapshot.diagnosis["effects"][0]["name"] == "gps_lever_arm"
+        assert [why in line.text for line in snapshot.journal if line.kind == "found"] == [True]
+        await until(lambda: vehicle.heard.count("STATUSTEXT") > 0)
+        told = [n.text for n in service.snapshot().notices if n.kind == "physics_missing"]
+        assert told == ["physics missing: gps lever arm"]
+        assert vehicle.sets == []
+
+
+async def test_in_spite_of_a_diagnosis_a_person_approves_explicitly_or_not_at_all(
+    document, daemon, port
+):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED, missing="the antenna is elsewhere", effects=("gps_lever_arm",))
+        await until(lambda: "physics_missing" in held_back(service))
+        for imus in ((), (1,)):
+            with pytest.raises(RefusedError, match="--despite-diagnosis"):
+                await service.approve(imus)
+        with pytest.raises(RefusedError, match="by their number"):
+            await service.approve((), despite_diagnosis=True)
+        assert not service.snapshot().push.approval_needed
+        assert vehicle.sets == []
+        await service.approve((1,), despite_diagnosis=True)
+        await until(lambda: pushed(vehicle))
+
+
+async def test_an_approval_in_spite_of_one_diagnosis_is_none_in_spite_of_the_next(
+    document, daemon, port
+):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.armed = True
+        convinced(service, WANTED, missing="the antenna is elsewhere")
+        await until(lambda: {"armed", "physics_missing"} <= held_back(service).keys())
+        await service.approve((1,), despite_diagnosis=True)
+        await until(lambda: held_back(service).keys() == {"armed"})
+        convinced(service, WANTED, missing="the axes are not square")
+        await until(lambda: "physics_missing" in held_back(service))
+        assert vehicle.sets == []
+
+
+async def test_what_nobody_has_diagnosed_is_not_written(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        service.learning._learner._examiner.diagnosed = {}
+        vehicle.armed = True
+        await until(lambda: "not_diagnosed" in held_back(service))
+        vehicle.armed = False
+        await until(lambda: held_back(service).keys() == {"not_diagnosed"})
+        assert vehicle.sets == []
+
+
 async def test_policy_never_only_advises(document, daemon, port):
     document["push"]["policy"] = "never"
     async with daemon(document) as service, Vehicle(port) as vehicle:
