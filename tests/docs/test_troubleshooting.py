@@ -28,11 +28,6 @@ def entries(section: str) -> list[str]:
     return re.findall(r"^\| `([^`]+)` \|", SECTIONS[section], flags=re.MULTILINE)
 
 
-DIAGNOSIS = {"diagnosing", "not_diagnosed", "physics_missing"}
-OVERRIDE = {
-    "despite a diagnosis, accelerometers are approved by their number",
-    "IMU N: REASON; onboard approve N --despite-diagnosis writes it all the same",
-}
 ERRORS = {m: where for m, where in raised().items() if not where.startswith(INTERNAL)}
 
 
@@ -51,9 +46,7 @@ def test_every_one_line_error_has_an_entry(message):
 
 def test_no_entry_is_of_an_error_that_does_not_exist():
     # Those come from the operating system's own words.
-    foreign = {"ENDPOINT: port in use"} | {
-        e for e in OVERRIDE if not any(told(m, e) for m in ERRORS)
-    }
+    foreign = {"ENDPOINT: port in use"}
     for entry in entries("One line and an exit status"):
         assert entry in foreign or any(told(m, entry) for m in ERRORS), entry
 
@@ -62,10 +55,7 @@ def test_every_reason_to_hold_back_has_an_entry_and_no_other():
     source = (ROOT / "onboard" / "daemon" / "proposals.py").read_text(encoding="utf-8")
     beyond = set(re.findall(r'(?:found\[|return \{)"(\w+)"', source))
     assert {"approval", "refused"} <= beyond
-    assert (
-        set(entries("Nothing is written")) - DIAGNOSIS
-        == ({o.value for o in Objection} | beyond) - DIAGNOSIS
-    )
+    assert set(entries("Nothing is written")) == {o.value for o in Objection} | beyond
 
 
 def test_every_reason_of_distrust_has_its_number():
