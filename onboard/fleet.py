@@ -10,6 +10,7 @@ from typing import Protocol
 
 import msgspec
 
+from onboard.caution import with_caution
 from onboard.chronicle import Chronicle
 from onboard.core.calibrator import Calibrator
 from onboard.document import ReplayDocument
@@ -124,6 +125,7 @@ def fly(
         try:
             with watching(path, number, len(files)) as progress:
                 result = replay([path], estimator, imu=imu, progress=progress)
+                result = with_caution(result, chronicle.calibrator)
         except OnboardError as error:
             yield Flown(path, name, None, None, str(error))
         else:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from onboard.caution import with_caution
 from onboard.chronicle import Chronicle
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
@@ -61,6 +62,7 @@ def replay(
     estimator: Estimator = chronicle.calibrator if report_file is None else chronicle
     with reading(logs) as progress:
         result = replay_recordings(logs, estimator, imu=imu, progress=progress)
+        result = with_caution(result, chronicle.calibrator)
     if report_file is not None:
         # jinja2 only when it is wanted.
         from onboard.report.replay import replay_html
