@@ -181,7 +181,12 @@ def _action(name: str, text: str) -> click.Command:
     return command
 
 
-@click.command()
+APPROVE_EXAMPLES = (
+    ACTION_EXAMPLES.format(name="approve") + "onboard approve 1 --despite-diagnosis\n"
+)
+
+
+@click.command(epilog=APPROVE_EXAMPLES)
 @_where
 @click.option(
     "--despite-diagnosis",
