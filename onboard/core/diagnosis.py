@@ -160,7 +160,7 @@ def _second_thoughts(
         taken = False
         for name in standing:
             target = Candidate(name, tuple(index[c] for c in STANDING[name]), ())
-            held = without(STANDING[name], index, full.point, choice.fitter.absent, told)
+            held = without(STANDING[name], index, full.point, choice.fitter.absent, told, trim)
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
             break

@@ -33,6 +33,7 @@ from onboard.core.result import Calibration
 from onboard.core.selection import Fit, Fitter
 from onboard.core.timing_effects import (
     STANDING,
+    TRIM_RAD,
     standing_effects,
     without,
 )
@@ -136,7 +137,8 @@ class Judge:
 
     def _held(self, names: Sequence[str]) -> Array:
         """Unknowns of ``names`` at the value that means *not in the model*."""
-        return without(names, self.index, self.engine.point, self.engine.absent, self.told)
+        trim = self.calibrator.parameters.trim
+        return without(names, self.index, self.engine.point, self.engine.absent, self.told, trim)
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
         """Six numbers only, + timing (and constant attitude errors), + each effect."""
@@ -182,7 +184,10 @@ class Judge:
         columns = STANDING[name]
         target = Candidate(name, tuple(self.index[c] for c in columns), ())
         absent, with_it = self._without(target.index, self._held(columns))
-        enough = target.bic(self.fitter, absent, with_it) >= MARGIN
+        trim = self.calibrator.parameters.trim
+        # Whoever levelled the autopilot has seen the tilt, too: it needs no margin beyond BIC's.
+        levelled = name == "mount_tilt" and float(np.hypot(*trim[:2])) > TRIM_RAD
+        enough = target.bic(self.fitter, absent, with_it) >= (0.0 if levelled else MARGIN)
         return enough and self.fitter.held_gain(absent, with_it) >= HELD_OUT_GAIN
 
     def _standing_rivals(self, name: str, columns: Sequence[str]) -> tuple[Rival, ...]:
@@ -190,7 +195,8 @@ class Judge:
         choice, full = self.choice, self.choice.fitter.model.index
         target = Candidate(name, tuple(full[c] for c in columns), ())
         rest = [i for i in choice.free if i not in target.index]
-        held = without(columns, full, self.full_point, choice.fitter.absent, self.told)
+        trim = self.calibrator.parameters.trim
+        held = without(columns, full, self.full_point, choice.fitter.absent, self.told, trim)
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(rivals_of(choice.fitter, rest, target, others, held))
 

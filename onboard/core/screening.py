@@ -20,6 +20,7 @@ from onboard.core.findings import Effect
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace, Pass
 from onboard.core.timing_effects import FAULT_M_S, fault_effect
+from onboard.core.trust import Reason
 
 Array = NDArray[np.float64]
 
@@ -30,8 +31,10 @@ SHORTEST_S = 4.0
 FEWEST_REFUSED = 3
 CONTRADICTED = ("gps_glitch", "ekf_gps_glitch", "ekf_unhealthy")
 """Reasons of distrust that are opinions of others about a receiver that says it is well."""
+OFF = 8.0
+"""Times the receiver's noise, or the usual innovation: no fix of a receiver that is well."""
 FAR_OFF = 12.0
-"""Times the usual innovation: no fix of a receiver that is well."""
+"""Times the usual innovation: worth a closer look, even if no gate has refused it."""
 
 
 def unclipped(
@@ -85,7 +88,7 @@ def false_fixes(
     """
     glitches = sum(calibrator.trust.rejected.get(name, 0) for name in CONTRADICTED)
     solution = full.found()
-    levels, jumped = _robust(full, solution.theta)
+    levels, least, jumped = _robust(full, solution.theta)
     refused = max(full.refused["velocity"], like.refused["velocity"], glitches)
     if refused < FEWEST_REFUSED and not jumped:
         return None, list(full.chunks)
@@ -106,7 +109,9 @@ def false_fixes(
             heard = np.all(np.isfinite(chunk.fixes.v_n[:, :2]), axis=1)
             asked = replace(chunk, trusted=heard)
         traces.extend(Engine.through(full, made, asked).traces)
-    fault = fault_effect(traces, full.chunks, t0, levels, full.settings.coast_s)
+    fault = fault_effect(
+        traces, full.chunks, t0, least, full.settings.coast_s, _distrusted(calibrator, full, t0)
+    )
     if fault is None:
         return None, list(full.chunks)
     out = []
@@ -119,21 +124,43 @@ def false_fixes(
     return fault, out
 
 
-def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, bool]:
-    """Levels of most fixes, for false ones are few; and whether any is far off them."""
+def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:
+    """When the receiver contradicted itself, if it did so for long; s since ``t0``.
+
+    One contradiction closes the window for the recovery time: a hard landing makes one.
+    """
+    t = np.concatenate([c.fixes.t for c in full.chunks])
+    bad = np.concatenate([~c.trusted for c in full.chunks])
+    step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    closed = step * calibrator.trust.rejected.get("gps_glitch", 0)
+    if closed <= 2.0 * calibrator.settings.trust.recovery[Reason.GPS_GLITCH]:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(int)))
+    spans = zip(t[edges[::2]], t[edges[1::2] - 1], strict=True)
+    return [(float(a) - t0, float(b) - t0) for a, b in spans if b - a > 1.0]
+
+
+def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
+    """What most fixes say of the receiver, for false ones are few.
+
+    Returns:
+        Noise levels; the error (m/s) that no honest fix has; whether any is far off.
+    """
     steps = [
         (x.innovation - x.columns @ theta)[:2]
         for x in full.traces
         if x.velocities and len(x.innovation)
     ]
     if not steps:
-        return full.noise, False
+        return full.noise, FAULT_M_S, False
     off = np.abs(np.concatenate(steps))
     usual = 1.4826 * float(np.median(off))
-    noise, least = full.noise, NoiseLevels()
+    noise, floor = full.noise, NoiseLevels()
     levels = replace(
         noise,
-        velocity=min(noise.velocity, max(least.velocity, 2.0 * usual)),
-        velocity_colour=min(noise.velocity_colour, max(least.velocity_colour, 2.0 * usual)),
+        velocity=min(noise.velocity, max(floor.velocity, 2.0 * usual)),
+        velocity_colour=min(noise.velocity_colour, max(floor.velocity_colour, 2.0 * usual)),
     )
-    return levels, float(off.max()) > max(FAULT_M_S, FAR_OFF * usual)
+    spread = max(float(np.hypot(levels.velocity, levels.velocity_colour)), usual)
+    least = max(FAULT_M_S, OFF * spread)
+    return levels, least, float(off.max()) > max(FAULT_M_S, FAR_OFF * usual)

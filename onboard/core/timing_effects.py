@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
-from onboard.core.noise import NoiseLevels
 from onboard.core.passes import EpochTrace, Linearisation
 from onboard.core.regimes import spans
 from onboard.core.result import Estimate
@@ -121,14 +120,24 @@ def standing_effects(
 
 
 def without(
-    names: Sequence[str], index: Mapping[str, int], point: Linearisation, absent: Array, told: float
+    names: Sequence[str],
+    index: Mapping[str, int],
+    point: Linearisation,
+    absent: Array,
+    told: float,
+    trim: Vector3,
 ) -> Array:
-    """(m,) values at which the unknowns ``names`` are not in the model."""
+    """(m,) values at which the unknowns ``names`` are not in the model.
+
+    A tilt is that of the attitude as recorded: without it the trim would not have been taken out.
+    """
     at = absent.copy()
     taken = {
         "gps_delay": told - point.delay,
         "window_squared": -(point.window**2),
         "attitude_delay": -point.attitude_delay,
+        "tilt_roll": trim[0],
+        "tilt_pitch": trim[1],
     }
     for name in names:
         at[index[name]] = taken.get(name, 0.0)
@@ -139,14 +148,23 @@ def fault_effect(
     traces: Sequence[EpochTrace],
     chunks: Sequence[Chunk],
     t0: float,
-    levels: NoiseLevels,
+    least: float,
     coast_s: float,
+    distrusted: Sequence[tuple[float, float]] = (),
 ) -> Effect | None:
-    """GPS velocities that cannot be true: refused by the innovation gate for a while."""
+    """GPS velocities that cannot be true: refused by the innovation gate for a while.
+
+    Args:
+        traces: of every epoch.
+        chunks: the flight.
+        t0: s on the boot clock.
+        least: m/s by which no honest receiver is off.
+        coast_s: how long the filter goes on without a velocity, s.
+        distrusted: s since ``t0`` in which the receiver contradicted itself; they stand for a
+            fault where the inertia, lost itself, cannot tell.
+    """
     judged = [x for x in traces if x.velocities or "velocity" in x.refused]
     bad = [(x.t, "velocity" in x.refused) for x in judged]
-    # A refused fix is a fault only if it is off by what no honest receiver is off.
-    least = max(FAULT_M_S, 8.0 * float(np.hypot(levels.velocity, levels.velocity_colour)))
     refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
     spells: list[_Spell] = []
     run: list[float] = []
@@ -157,13 +175,17 @@ def fault_effect(
             off = [refused[u] for u in run if u in refused]
             mean = np.median(np.array(off), axis=0) if off else None
             # A noisy receiver errs to all sides: the mean of its errors says nothing.
-            size = 0.0 if mean is None else float(np.median(np.linalg.norm(off, axis=1)))
+            sizes_m_s = np.linalg.norm(off, axis=1) if off else np.zeros(1)
+            size = float(np.median(sizes_m_s))
+            # A receiver fails at once; what grows from the gate on is a filter that drifts.
+            at_once = float(np.median(sizes_m_s[:ONSET_FIXES])) > least
             # A filter that had to begin anew does not tell its own failure from the receiver's.
             lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
-            if len(run) >= 3 and run[-1] - run[0] >= FAULT_S and size > least and not lost:
+            long = len(run) >= 3 and run[-1] - run[0] >= FAULT_S
+            if long and size > least and at_once and not lost:
                 spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size))
             run = []
-    spells = _paired(spells)
+    spells = _paired(spells) or [_Spell(a, b, None, 0.0) for a, b in distrusted]
     intervals = [(s.start, s.end) for s in spells]
     sizes = [s.size for s in spells if s.off is not None]
     if not intervals:
@@ -325,3 +347,6 @@ def _saturation(
         where=spans(chunks, t0, intervals, axis),
         intervals=intervals,
     )
+
+
+ONSET_FIXES = 3

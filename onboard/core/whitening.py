@@ -59,9 +59,6 @@ RECOVERY_FIXES, RECOVERY_S = 3, 1.0
 RECOVERY_SIGMAS, RECOVERY_DRIFT = 7.0, 0.3
 """Between two of them the innovation changes by the receiver's noise (5 sigma of a difference) and
 by what the accelerometer is off, m/s^2."""
-ATTITUDE_DOUBT_S = 1.0
-"""An EKF that takes a receiver's fault for acceleration tilts: after that long without a velocity
-that is believed, the attitude that was recorded is not believed either."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,8 +340,6 @@ class WhiteningFilter:
         use_v = epoch.trusted and bool(np.all(np.isfinite(epoch.velocity[:2])))
         use_h = self.uses.height and epoch.trusted and bool(np.isfinite(epoch.height))
         use_a = self.uses.attitude and epoch.R_attitude is not None
-        off_since = self._velocity_off
-        use_a = use_a and (off_since is None or epoch.t - off_since < ATTITUDE_DOUBT_S)
         while True:
             rows = self._rows(epoch, theta, use_v=use_v, use_h=use_h, use_a=use_a)
             if rows is None:
