@@ -19,7 +19,7 @@ from onboard.core.assembly import Assembly
 from onboard.core.engine import Chunk, Engine
 from onboard.core.impossible import impossible
 from onboard.core.parameters import ParametersInForce
-from onboard.core.passes import merged
+from onboard.core.portions import merged
 from onboard.core.report import calibration_of
 from onboard.core.result import Calibration
 from onboard.core.samples import (

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from onboard.core.earth import STANDARD_GRAVITY
 from onboard.core.frames import rotation_from_vector
+from onboard.core.linearisation import Linearisation
 from onboard.core.nodes import NodeMaker
-from onboard.core.passes import EpochState, Linearisation
 from onboard.core.stretch import Fixes, Stretch
+from onboard.core.traces import EpochState
 
 Array = NDArray[np.float64]
 

@@ -112,6 +112,25 @@ def coriolis_n(latitude: ArrayLike, height: ArrayLike, v_n: ArrayLike) -> Array:
     return np.asarray(-np.cross(rate, np.asarray(v_n, dtype=np.float64)))
 
 
+def carried_and_turning(latitude: float, v_n: Array) -> tuple[Array, Array]:
+    """:func:`coriolis_n` and the turning of NED for one vector, at a tenth of the cost.
+
+    Args:
+        latitude: rad.
+        v_n: (3,) m/s.
+
+    Returns:
+        (3,) m/s^2 and (3,) rad/s, both in NED.
+    """
+    north, east, down = (float(x) for x in v_n)
+    c, s = np.cos(latitude), np.sin(latitude)
+    # A sphere's radius does: half a per cent of 1e-6 rad/s.
+    w = (east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS, -east * s / c / SEMI_MAJOR_AXIS)
+    x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
+    carried = np.array([z * east - y * down, x * down - z * north, y * north - x * east])
+    return carried, np.array([EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2]])
+
+
 def displacement_n(
     latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike, origin: tuple[float, float, float]
 ) -> Array:

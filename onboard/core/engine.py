@@ -25,11 +25,14 @@ from onboard.core.calibration_columns import (
     Six,
 )
 from onboard.core.columns import Family, Model
+from onboard.core.linearisation import Linearisation
 from onboard.core.noise import NoiseLevels, distance, line, star, stepped
-from onboard.core.passes import EpochState, Linearisation, Pass, PassResult, Portion, merged
+from onboard.core.passes import Pass, PassResult
+from onboard.core.portions import Portion, merged
 from onboard.core.settings import EstimatorSettings
 from onboard.core.solution import Solution, solve, total
 from onboard.core.stretch import Fixes, Stretch
+from onboard.core.traces import EpochState
 from onboard.core.whitening import Uses
 
 Array = NDArray[np.float64]

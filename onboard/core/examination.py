@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from onboard.core.columns import Family
 from onboard.core.engine import Chunk, Engine, moved
+from onboard.core.linearisation import Linearisation
 from onboard.core.noise import NoiseLevels
-from onboard.core.passes import EpochTrace, Linearisation, Pass, PassResult, Portion
+from onboard.core.passes import Pass, PassResult
 from onboard.core.physics.effect import EffectColumns
+from onboard.core.portions import Portion
 from onboard.core.solution import Solution, solve
+from onboard.core.traces import EpochTrace
 
 Array = NDArray[np.float64]
 

@@ -7,14 +7,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.column_noise import sample_noise_density
 from onboard.core.columns import Model, StretchColumns
 from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.linearisation import Linearisation
 from onboard.core.nodes import Around, Intervals, NodeMaker
 from onboard.core.noise import NoiseLevels
+from onboard.core.portions import Portion
+from onboard.core.rows import Epoch, Rows, Step
 from onboard.core.smoothing import mean_weights
 from onboard.core.stretch import Fixes, Stretch
 from onboard.core.sums import NormalSums
-from onboard.core.whitening import Epoch, Rows, Step, Uses, WhiteningFilter
+from onboard.core.traces import EpochState, EpochTrace
+from onboard.core.whitening import Uses, WhiteningFilter
 
 Array = NDArray[np.float64]
 
@@ -22,89 +27,6 @@ LONGEST_STEP_S = 0.26
 """Longer intervals (GPS at 1 Hz) are predicted in steps: attitude errors must stay first order."""
 TILT_START = 0.06
 HEADING_START = 0.2
-
-
-@dataclass(frozen=True, slots=True)
-class Linearisation:
-    """The point about which the non-linear unknowns are expanded.
-
-    Attributes:
-        scale: (3,) of the accelerometer.
-        beta: (3,) ``-scale * offset``, m/s^2.
-        delay: GPS latency, s.
-        window: averaging span of the receiver, s.
-        attitude_delay: lateness of the recorded attitude, s.
-        skew: growth of the latency, s/s, from ``skew_from`` (s on the boot clock) on.
-        skew_from: see ``skew``.
-    """
-
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    beta: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    delay: float = 0.1
-    window: float = 0.0
-    attitude_delay: float = 0.0
-    skew: float = 0.0
-    skew_from: float = 0.0
-
-    def true_time(self, stamp: Array) -> Array:
-        """When what a fix with these stamps says was true, s."""
-        out: Array = stamp - self.delay - self.skew * (stamp - self.skew_from)
-        return out
-
-    @property
-    def six(self) -> Array:
-        """(6,) scale, beta."""
-        return np.array(self.scale + self.beta)
-
-
-@dataclass(frozen=True, slots=True)
-class EpochState:
-    """Filter's state after an epoch: where dead reckoning may start.  ``innovation`` as below."""
-
-    t: float
-    innovation: Array
-    R_nb: Array
-    v_n: Array
-    bias_b: Array
-
-
-@dataclass(frozen=True, slots=True)
-class EpochTrace:
-    """What one epoch left, for plots, gates and localisation.
-
-    The velocity residual, NED, m/s, at ``theta`` is ``innovation - columns @ theta``; ``y`` and
-    ``h`` are the whitened rows.
-    """
-
-    t: float
-    innovation: Array
-    columns: Array
-    y: Array
-    h: Array
-    velocities: int
-    height: bool
-    refused: tuple[str, ...]
-    refused_by: Array
-
-
-@dataclass(slots=True)
-class Portion:
-    """Sums of one portion of flight."""
-
-    start: float
-    end: float
-    sums: NormalSums
-
-
-def merged(portions: list[Portion], most: int) -> list[Portion]:
-    """At most ``most`` portions, neighbours added up."""
-    while len(portions) > most:
-        pairs = [
-            Portion(a.start, b.end, a.sums + b.sums)
-            for a, b in zip(portions[::2], portions[1::2], strict=False)
-        ]
-        portions = pairs + ([portions[-1]] if len(portions) % 2 else [])
-    return portions
 
 
 @dataclass(slots=True)
@@ -225,7 +147,8 @@ class Pass:
         epochs = self._epoch_list(stretch, fixes, trusted, around, columns)
         result = PassResult(Portion(float(epoch_t[0]), float(epoch_t[-1]), NormalSums.zeros(0)))
         before = (self.N[0].copy(), self.b[0].copy(), self.s[0], self.log_det[0], self.rows)
-        gram = self.filter.noise_gram.copy()
+        noise = self.filter.column_noise
+        gram = None if noise is None else noise.gram.copy()
         if not self._running:
             first = epochs[0]
             R0 = stretch.attitude_at(epoch_t[:1])[0][0]
@@ -267,7 +190,8 @@ class Pass:
         sums.s = float(self.s[0] - before[2])
         sums.log_det = float(self.log_det[0] - before[3])
         sums.rows = float(self.rows - before[4])
-        self._noise_in_columns(sums, stretch, self.filter.noise_gram - gram)
+        if noise is not None and gram is not None:
+            self._noise_in_columns(sums, stretch, noise.gram - gram)
         result.portion.sums = sums
         return result
 
@@ -391,29 +315,3 @@ def _force_integrals(intervals: Intervals) -> tuple[Array, Array, Array]:
     f1, f2 = intervals.integrals(intervals.signals.f_b[..., None])
     A = np.einsum("ki,kiab->kab", intervals.weight, intervals.P)
     return f1[..., 0], f2[..., 0], A
-
-
-def sample_noise_density(t: Array, raw: Array) -> Array:
-    """Density (m/s^2)^2 s of what looks like white noise in each axis' samples.
-
-    Samples are averaged to blocks of 50 ms (vehicles do not manoeuvre faster), third differences
-    of the blocks take the manoeuvre out (white noise: 20 times its variance), and the median
-    absolute deviation ignores the few jerks that are left.
-
-    Args:
-        t: (n,) s.
-        raw: (n, 3).
-
-    Returns:
-        (3,).
-    """
-    step = (t[-1] - t[0]) / max(len(t) - 1, 1)
-    size = max(1, round(0.05 / step))
-    count = len(t) // size
-    if count < 8:
-        return np.zeros(3)
-    blocks = raw[: count * size].reshape(count, size, 3).mean(axis=1)
-    third = np.diff(blocks, n=3, axis=0)
-    sigma = np.median(np.abs(third - np.median(third, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
-    out: Array = sigma**2 * size * step
-    return out

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from onboard.core.earth import STANDARD_GRAVITY
 from onboard.core.engine import Chunk
 from onboard.core.findings import RegimeResidual, Where
-from onboard.core.passes import EpochTrace, Portion
+from onboard.core.portions import Portion
+from onboard.core.traces import EpochTrace
 
 Array = NDArray[np.float64]
 

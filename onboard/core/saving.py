@@ -13,8 +13,9 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from onboard.core.linearisation import Linearisation
 from onboard.core.noise import NoiseLevels
-from onboard.core.passes import Linearisation, Portion
+from onboard.core.portions import Portion
 from onboard.core.samples import Vector3
 from onboard.core.sums import NormalSums
 from onboard.errors import StateError

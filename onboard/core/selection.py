@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.columns import Family, Model, Unknown
-from onboard.core.passes import Portion
+from onboard.core.portions import Portion
 from onboard.core.solution import FOLDS, total
 from onboard.core.sums import NormalSums
 

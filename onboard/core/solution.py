@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.columns import Model
-from onboard.core.passes import Portion
+from onboard.core.portions import Portion
 from onboard.core.sums import NormalSums
 
 Array = NDArray[np.float64]

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
-from onboard.core.passes import EpochTrace, Linearisation
+from onboard.core.linearisation import Linearisation
 from onboard.core.regimes import spans
 from onboard.core.result import Estimate
 from onboard.core.samples import Vector3
 from onboard.core.solution import Solution
+from onboard.core.traces import EpochTrace
 
 Array = NDArray[np.float64]
 

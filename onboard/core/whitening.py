@@ -1,19 +1,8 @@
 """The whitening filter: from integrals and GPS epochs to independent rows of unit variance.
 
-State, an error of what the inertial samples alone would give (Friedland 1969: the filter runs
-over the measurement *and over every column* at once, so that its mean is ``x0 + Xc theta``):
-
-=======  =======================================  =============================
-slice    what                                     model
-=======  =======================================  =============================
-V        velocity, NED, m/s                       random walk (accelerometer)
-H        height, m                                integral of -v_down
-PSI      attitude error, NED rotation vector      random walk (gyroscope)
-BIAS     gyroscope bias, body, rad/s              random walk
-ATT      slow error of the recorded attitude      Gauss-Markov
-CH       wander of GPS height, m                  random walk
-CV       coloured GPS velocity error, m/s         Gauss-Markov
-=======  =======================================  =============================
+The state (:mod:`onboard.core.filter_state`) is an error of what the inertial samples alone would
+give; the filter runs over the measurement *and over every column* at once, so that its mean is
+``x0 + Xc theta`` (Friedland 1969).
 
 Attitude is carried by the *gyroscope* and corrected by the filter's own estimate after each
 epoch (the recorded attitude, an EKF's, errs with the manoeuvre and with the very accelerometer
@@ -33,139 +22,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.earth import EARTH_RATE, SEMI_MAJOR_AXIS, STANDARD_GRAVITY
+from onboard.core.column_noise import ColumnNoise
+from onboard.core.earth import STANDARD_GRAVITY, carried_and_turning
+from onboard.core.filter_state import ATT, BIAS, CH, CV, PSI, STATES, H, V
+from onboard.core.gates import InnovationGates
 from onboard.core.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
+from onboard.core.rows import Epoch, Rows, Step
+from onboard.core.small_turns import angle_of, skew_of, turn_by
 
 Array = NDArray[np.float64]
-
-V = slice(0, 3)
-H = 3
-PSI = slice(4, 7)
-BIAS = slice(7, 10)
-ATT = slice(10, 13)
-CH = 13
-CV = slice(14, 17)
-STATES = 17
-
-GATE_VELOCITY = 30.0
-"""Chi-square of the velocity innovation past which a fix is refused (3 dof: p of 1e-6)."""
-GATE_HEIGHT = 30.0
-GATE_ATTITUDE = 60.0
-HEIGHT_PATIENCE_S = 3.0
-"""A height that stays off is a new reference (a new satellite), not a fault."""
-ATTITUDE_PATIENCE_S = 5.0
-RECOVERY_FIXES, RECOVERY_S = 3, 1.0
-"""A velocity is believed again after so many fixes, and so long, inside the gate."""
-RECOVERY_SIGMAS, RECOVERY_DRIFT = 7.0, 0.3
-"""Between two of them the innovation changes by the receiver's noise (5 sigma of a difference) and
-by what the accelerometer is off, m/s^2."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """What one interval brings, in body axes of its start (m unknowns)."""
-
-    duration: float
-    turn: Array
-    force: Array
-    force_to_end: Array
-    mean_turn: Array
-    columns: Array
-    columns_to_end: Array
-    columns_turn: Array
-
-
-@dataclass(frozen=True, slots=True)
-class Epoch:
-    """What one GPS epoch measures, and the direct columns there.
-
-    ``known_body`` (m/s) and ``known_height`` (m) are what the report differs by, as far as known:
-    the receiver's averaging and the place of its antenna.
-    """
-
-    t: float
-    velocity: Array
-    height: float
-    latitude: float
-    R_attitude: Array | None
-    known_body: Array
-    known_height: float
-    velocity_body: Array
-    velocity_ned: Array
-    position_body: Array
-    position_ned: Array
-    along_velocity: Array
-    attitude_body: Array
-    attitude_ned: Array
-    trusted: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Rows:
-    """Whitened rows of one epoch for every member of the bank.
-
-    ``y`` (B, r), ``h`` (B, r, m); ``log_det`` (B,); the first ``velocities`` rows are velocity,
-    then height if ``height``, then attitude.  ``innovation`` (v rows, m/s) is that of member 0 at
-    the current estimate, not whitened, ``raw_innovation`` and ``raw_columns`` its two parts,
-    ``refused_by`` that of a velocity that was refused.
-    """
-
-    t: float
-    y: Array
-    h: Array
-    log_det: Array
-    velocities: int
-    height: bool
-    innovation: Array
-    raw_innovation: Array
-    raw_columns: Array
-    refused: tuple[str, ...]
-    refused_by: Array
-
 
 _EYE = np.eye(STATES)
 _DIAGONAL = np.arange(STATES)
 _DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
-
-
-def _earth(latitude: float, v_n: Array) -> tuple[Array, Array]:
-    """Coriolis acceleration and turning of NED, for one vector (:mod:`onboard.core.earth`)."""
-    north, east, down = (float(x) for x in v_n)
-    c, s = np.cos(latitude), np.sin(latitude)
-    # A sphere's radius does: half a per cent of 1e-6 rad/s.
-    w = (east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS, -east * s / c / SEMI_MAJOR_AXIS)
-    x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
-    carried = np.array([z * east - y * down, x * down - z * north, y * north - x * east])
-    return carried, np.array([EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2]])
-
-
-def _skew(a: Array) -> Array:
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def _turn(phi: Array) -> Array:
-    """Rodrigues for one vector (the vectorised one costs five times as much)."""
-    angle2 = float(phi @ phi)
-    K = _skew(phi)
-    if angle2 < 1e-8:
-        return np.eye(3) + K + 0.5 * (K @ K)
-    angle = np.sqrt(angle2)
-    out: Array = (
-        np.eye(3) + (np.sin(angle) / angle) * K + ((1.0 - np.cos(angle)) / angle2) * (K @ K)
-    )
-    return out
-
-
-def _angle(R: Array) -> Array:
-    """Rotation vector of one rotation, |angle| well below pi."""
-    v = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    s = float(np.sqrt(v @ v))
-    if s < 1e-9:
-        return v
-    c = 0.5 * (float(np.trace(R)) - 1.0)
-    out: Array = v * (np.arctan2(s, c) / s)
-    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,15 +75,10 @@ class WhiteningFilter:
             self._attitude_var[i] = (q.attitude**2, q.attitude**2, q.heading**2)
             self._colour_var[i] = q.velocity_colour**2
             self._row_var[i] = (*(q.velocity**2,) * 3, q.height**2, *(q.attitude**2,) * 3)
-        self._height_off: float | None = None
-        self._attitude_off: float | None = None
-        self._velocity_off: float | None = None
-        self._good: list[tuple[float, Array]] = []
-        self.noise_gram = np.zeros(3)
+        self._gates = InnovationGates(self.bank[0]) if self.uses.gates else None
         # Noise in the columns is only wanted where the sums will count, not while levels are tried.
-        self._one = B == 1
+        self.column_noise = ColumnNoise() if B == 1 else None
         self._updates = 0
-        self._Xi = np.zeros((3, STATES, STATES))
 
     def start(self, epoch: Epoch, R_nb: Array, tilt_sigma: float, heading_sigma: float) -> None:
         """Begin at an epoch: its velocity and height are the state, as uncertain as they are.
@@ -256,8 +120,10 @@ class WhiteningFilter:
             P[:, i, i] += self._colour_var
             P[:, i, c] = P[:, c, i] = -self._colour_var
         self._X, self._P = X, P
-        self._height_off = self._attitude_off = self._velocity_off = None
-        self._Xi[:] = 0.0
+        if self._gates is not None:
+            self._gates.forget()
+        if self.column_noise is not None:
+            self.column_noise.forget()
 
     @property
     def bias_estimate(self) -> tuple[Array, Array]:
@@ -278,13 +144,13 @@ class WhiteningFilter:
         T, R = step.duration, self.R_nb
         S, S2 = R @ step.force, R @ step.force_to_end
         A = R @ step.mean_turn
-        lever = _skew(S - S2 / T)
+        lever = skew_of(S - S2 / T)
         F = _EYE.copy()
-        F[V, PSI] = -_skew(S)
+        F[V, PSI] = -skew_of(S)
         F[PSI, BIAS] = -A
         F[V, BIAS] = lever @ A
         F[H, 2] = -T
-        F[H, PSI] = _skew(S2)[2]
+        F[H, PSI] = skew_of(S2)[2]
         keep_att, keep_cv = np.exp(-T / ATTITUDE_TIME_S), np.exp(-T / COLOUR_TIME_S)
         F[range(10, 13), range(10, 13)] = keep_att
         F[range(14, 17), range(14, 17)] = keep_cv
@@ -292,7 +158,9 @@ class WhiteningFilter:
         down = _DOWN
         turn_n = None
         if self.uses.earth:
-            carried, turn_n = _earth(latitude, self._X[0, V, 0] + self._X[0, V, 1:] @ theta)
+            carried, turn_n = carried_and_turning(
+                latitude, self._X[0, V, 0] + self._X[0, V, 1:] @ theta
+            )
             down = down + carried
 
         X = F @ self._X
@@ -320,11 +188,10 @@ class WhiteningFilter:
         P = F @ P @ Ft
         P[:, diagonal, diagonal] += Q
         self._P = P
-        if self._one:
-            self._Xi = F @ self._Xi @ Ft
-            self._Xi[:, V, V] += T * R.T[:, :, None] * R.T[:, None, :]
+        if self.column_noise is not None:
+            self.column_noise.predict(F, R, T)
         R = R @ step.turn
-        self.R_nb = R if turn_n is None else _turn(-turn_n * T) @ R
+        self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
         self.t += T
 
     def update(self, epoch: Epoch, theta: Array, covariance: Array) -> Rows | None:
@@ -348,10 +215,15 @@ class WhiteningFilter:
             L = np.linalg.cholesky(HP[:, :, index[0]] + HP[:, :, index[1]] + self._noise(kinds))
             W = np.linalg.solve(L, np.concatenate([E, HP], axis=2))
             y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
-            bad = self._gate(epoch.t, kinds, E[0], y[0], h[0], theta, covariance)
-            if bad is None:
+            verdict = None
+            if self._gates is not None:
+                verdict = self._gates.judge(epoch.t, kinds, E[0], y[0], h[0], theta, covariance)
+            if verdict is None:
                 break
+            bad = verdict.name
             refused.append(bad)
+            if verdict.renewed:
+                self._renew(bad)
             if bad in {"velocity", "recovery"}:
                 n = kinds.count("v")
                 off = E[0, :n, 0] - E[0, :n, 1:] @ theta
@@ -373,8 +245,8 @@ class WhiteningFilter:
             # Rounding makes it drift from symmetry only slowly.
             P = (P + np.swapaxes(P, -1, -2)) / 2
         self._P = P
-        if self._one:
-            self._noise_rows(L[0], back[0], index)
+        if self.column_noise is not None:
+            self.column_noise.update(L[0], back[0], index)
         self._correct(theta)
         log_det = 2.0 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         return Rows(
@@ -445,7 +317,7 @@ class WhiteningFilter:
             )
             at += 1
         if use_a and epoch.R_attitude is not None:
-            E[:, at:, 0] += _angle(epoch.R_attitude @ R.T)
+            E[:, at:, 0] += angle_of(epoch.R_attitude @ R.T)
             E[:, at:, 1:] += R @ epoch.attitude_body + epoch.attitude_ned
         HP = self._P[:, first] + self._P[:, second]
         return kinds, E, HP, (first, second)
@@ -456,100 +328,17 @@ class WhiteningFilter:
         out: Array = self._row_var[:, columns, None] * np.eye(len(columns))
         return out
 
-    def _gate(
-        self, t: float, kinds: str, E: Array, y: Array, h: Array, theta: Array, C: Array
-    ) -> str | None:
-        """Name of the first group whose innovation is impossible, given all uncertainty."""
-        if not self.uses.gates:
-            return None
-        at = 0
-        for kind, name, limit in (
-            ("v", "velocity", GATE_VELOCITY),
-            ("h", "height", GATE_HEIGHT),
-            ("a", "attitude", GATE_ATTITUDE),
-        ):
-            n = kinds.count(kind)
-            if n == 0:
-                continue
-            r, D = y[at : at + n] - h[at : at + n] @ theta, h[at : at + n]
-            at += n
-            chi2 = float(r @ r)
-            if chi2 > limit:
-                # Only now the estimate's own uncertainty matters: it can but lower the figure.
-                chi2 = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
-            if chi2 > limit:
-                if kind == "v":
-                    self._velocity_off = t if self._velocity_off is None else self._velocity_off
-                    self._good = []
-                    return name
-                if not self._patient(kind, t):
-                    return name
-            elif kind == "v":
-                if self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
-                    return "recovery"
-            elif kind == "h":
-                self._height_off = None
-            elif kind == "a":
-                self._attitude_off = None
-        return None
-
-    def _recovers(self, t: float, innovation: Array) -> bool:
-        """True while a receiver that was off has not been right, and steady, for long enough.
-
-        After seconds of coasting the gate is wide; a receiver that is only noisy falls into it,
-        but then its errors jump, while those of the coasting filter cannot.
-        """
-        if self._velocity_off is None:
-            return False
-        if self._good:
-            before, last = self._good[-1]
-            noise = float(np.hypot(self.bank[0].velocity, self.bank[0].velocity_colour))
-            most = RECOVERY_SIGMAS * noise + RECOVERY_DRIFT * (t - before)
-            if len(last) != len(innovation) or float(np.abs(innovation - last).max()) > most:
-                self._good = []
-        self._good.append((t, innovation))
-        if len(self._good) < RECOVERY_FIXES or t - self._good[0][0] < RECOVERY_S:
-            return True
-        self._velocity_off, self._good = None, []
-        return False
-
-    def _patient(self, kind: str, t: float) -> bool:
-        """True when a height or attitude that stays off is taken as a new reference."""
-        if kind == "h":
-            since, patience = self._height_off, HEIGHT_PATIENCE_S
-            self._height_off = t if since is None else since
-        else:
-            since, patience = self._attitude_off, ATTITUDE_PATIENCE_S
-            self._attitude_off = t if since is None else since
-        if since is None or t - since < patience:
-            return False
-        if kind == "h":
+    def _renew(self, reference: str) -> None:
+        """What it differs by is unknown from here on."""
+        if reference == "height":
             self._P[:, CH, CH] += 1e4
-            self._height_off = None
         else:
             self._P[:, range(10, 13), range(10, 13)] += 0.3**2
-            self._attitude_off = None
-        return False
-
-    def _noise_rows(self, L: Array, back: Array, index: tuple[list[int], list[int]]) -> None:
-        """What unit white noise on each accelerometer axis leaves in the rows, squared."""
-        first, second = index
-        picked = self._Xi[:, first] + self._Xi[:, second]
-        W = np.linalg.solve(L, picked)
-        square = W[:, :, first] + W[:, :, second]
-        white = np.linalg.solve(L, np.swapaxes(square, -1, -2))
-        self.noise_gram += np.trace(white, axis1=-2, axis2=-1)
-        # (I - K H) Xi (I - K H)^T with K = back L^-1.
-        gain = np.eye(STATES)
-        K = np.linalg.solve(L.T, back.T).T
-        gain[:, first] -= K
-        gain[:, second] -= K
-        self._Xi = gain @ self._Xi @ gain.T
 
     def _correct(self, theta: Array) -> None:
         """Turn the attitude by the filter's own estimate, so that errors stay small angles."""
         if self.uses.recorded_attitude:
             return
         psi = self._X[0, PSI, 0] + self._X[0, PSI, 1:] @ theta
-        self.R_nb = _turn(psi) @ self.R_nb
+        self.R_nb = turn_by(psi) @ self.R_nb
         self._X[:, PSI, 0] -= psi

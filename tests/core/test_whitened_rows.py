@@ -8,10 +8,12 @@ from onboard.core.columns import Model
 from onboard.core.criterion import InitialVelocity, IntegralCriterion, Weighting
 from onboard.core.earth import STANDARD_GRAVITY
 from onboard.core.frames import rotation_from_vector
+from onboard.core.linearisation import Linearisation
 from onboard.core.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
-from onboard.core.passes import Linearisation, Pass
+from onboard.core.passes import Pass
+from onboard.core.rows import Epoch, Step
 from onboard.core.stretch import Fixes, Stretch
-from onboard.core.whitening import Epoch, Step, Uses, WhiteningFilter
+from onboard.core.whitening import Uses, WhiteningFilter
 
 PAPER = Uses(height=False, attitude=False, recorded_attitude=True, earth=False, gates=False)
 SCALE = np.array([1.02, 0.97, 1.01])

@@ -7,8 +7,9 @@ from onboard.core.calibration_columns import Six
 from onboard.core.columns import Model
 from onboard.core.criterion import InitialVelocity, IntegralCriterion, Weighting
 from onboard.core.frames import rotation_from_euler
+from onboard.core.linearisation import Linearisation
 from onboard.core.noise import NoiseLevels
-from onboard.core.passes import Linearisation, Pass
+from onboard.core.passes import Pass
 from onboard.core.stretch import Fixes, Stretch
 from onboard.core.whitening import Uses
 

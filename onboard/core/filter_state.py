@@ -1,0 +1,29 @@
+"""The state of the whitening filter: which slice is what, and how it moves.
+
+An error of what the inertial samples alone would give:
+
+=======  =======================================  =============================
+slice    what                                     model
+=======  =======================================  =============================
+V        velocity, NED, m/s                       random walk (accelerometer)
+H        height, m                                integral of -v_down
+PSI      attitude error, NED rotation vector      random walk (gyroscope)
+BIAS     gyroscope bias, body, rad/s              random walk
+ATT      slow error of the recorded attitude      Gauss-Markov
+CH       wander of GPS height, m                  random walk
+CV       coloured GPS velocity error, m/s         Gauss-Markov
+=======  =======================================  =============================
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+V: Final = slice(0, 3)
+H: Final = 3
+PSI: Final = slice(4, 7)
+BIAS: Final = slice(7, 10)
+ATT: Final = slice(10, 13)
+CH: Final = 13
+CV: Final = slice(14, 17)
+STATES: Final = 17
