@@ -72,6 +72,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "roll_back_aborted": Line(WARNING, "{imu} not rolled back", "push {imu}"),
         "roll_back_interrupted": Line(ERROR, "{imu} roll-back interrupted", "push {imu}"),
         "physics_missing": Line(WARNING, "", "physics"),
+        "worth_knowing": Line(INFO, "", "physics"),
         "approval_needed": Line(NOTICE, "calibration waits for OBC_APPROVE 1"),
         "approved": Line(NOTICE, "push approved"),
         "parameter_denied": Line(WARNING),

@@ -27,6 +27,7 @@ from onboard.daemon.snapshot import Snapshot
 from onboard.errors import OnboardError, RefusedError
 from onboard.mavlink.autopilot import Participant
 from onboard.mavlink.parameter_server import ParameterServer, Writable
+from onboard.push.physics import IN_EVERY_MODEL
 from onboard.push.policy import Mode
 
 if TYPE_CHECKING:
@@ -197,15 +198,17 @@ class Outlets:
     # Diagnosis
 
     def _tell_of_physics(self, snapshot: Snapshot) -> None:
-        """Say once that physics is missing, and which."""
+        """Say once that physics is missing, and which; what the model has is no alarm."""
         number = finding_number(snapshot.diagnosis)
         effect = top_effect(snapshot.diagnosis)
         name = "" if effect is None else str(effect.get("name"))
         if (number, name) == self._finding:
             return
         self._finding = (number, name)
-        if name:
-            what = name.replace("_", " ")
+        what = name.replace("_", " ")
+        if name in IN_EVERY_MODEL:
+            self._notices.post("worth_knowing", f"worth knowing: {what}")
+        elif name:
             self._notices.post("physics_missing", f"physics missing: {what}", warning=True)
         elif number == UNEXPLAINED:
             self._notices.post("physics_missing", "physics missing: no known effect", warning=True)

@@ -37,6 +37,7 @@ from typing import Any, Final
 
 from onboard.core.accelerometer import AXES
 from onboard.daemon.snapshot import ImuView, Number, Snapshot, Three
+from onboard.push.physics import IN_EVERY_MODEL
 
 STATES: Final[Mapping[str, int]] = MappingProxyType(
     {
@@ -135,9 +136,17 @@ def parameter_values(snapshot: Snapshot, *, imus: int, approving: bool = False) 
 
 
 def top_effect(diagnosis: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-    """The effect with the largest share of the mismatch, None if there is none."""
+    """The effect that matters most for what is written, None if there is none.
+
+    One that the calibration lacks comes before those that it has, whatever their shares of the
+    mismatch: every receiver is late, and that falsifies nothing.
+    """
     effects = (diagnosis or {}).get("effects") or ()
-    return max(effects, key=lambda effect: effect.get("share_of_mismatch") or 0.0, default=None)
+    return max(
+        effects,
+        key=lambda e: (e.get("name") not in IN_EVERY_MODEL, e.get("share_of_mismatch") or 0.0),
+        default=None,
+    )
 
 
 def finding_number(diagnosis: Mapping[str, Any] | None) -> int:

@@ -144,5 +144,5 @@ def _listed(effects: list[Effect]) -> str:
 
 def _words(effect: Effect) -> str:
     size = float(np.linalg.norm([q.value for q in effect.unknowns.values()]))
-    text = WORDS.get(effect.name, effect.name.replace("_", " "))
-    return text.format(size=size, degrees=np.degrees(size))
+    text = WORDS.get(effect.name, "something is missing")
+    return f"{text.format(size=size, degrees=np.degrees(size))} ({effect.name})"

@@ -1,55 +1,12 @@
 """The daemon against the built-in autopilot over real UDP: it flies, learns, lands, writes."""
 
-import asyncio
-import socket
-from contextlib import asynccontextmanager
-
 import numpy as np
 import pytest
 from daemons import until
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from flights import TRUE_SIX, GroundStation, flying, six
 
-from onboard.core.accelerometer import parameter_names
 from onboard.core.calibrator import Calibrator
 from onboard.replay import replay
-from sitl.builtin.autopilot import Autopilot
-from sitl.builtin.mission import Mission
-from sitl.builtin.server import Server
-from sitl.builtin.truth import ImuTruth, Truth
-
-SPEEDUP = 20.0
-FLIGHT_S = 120.0
-TRUE_SCALE = np.array([1.02, 0.985, 1.015])
-TRUE_OFFSET = np.array([0.2, -0.15, 0.3])
-IMU = ImuTruth(scale=tuple(TRUE_SCALE), offset=tuple(TRUE_OFFSET))
-
-
-@asynccontextmanager
-async def flying(port, *, flights=1):
-    """A copter that flies by itself, at many times the pace of real life."""
-    autopilot = Autopilot("copter", Truth(imus=(IMU,), seed=5))
-    mission = Mission(flights=flights, duration=FLIGHT_S, ground=20.0)
-    server = Server(autopilot, speedup=SPEEDUP, driver=mission)
-    await server.connect_udp("127.0.0.1", port)
-    station = await server.listen_udp()
-    task = asyncio.create_task(server.run())
-    try:
-        yield autopilot, station
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-
-def ground_station_sets(port, name, value):
-    """Somebody else's PARAM_SET, on another link to the same autopilot."""
-    packer = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
-    message = mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-        station.sendto(message.pack(packer), ("127.0.0.1", port))
-
-
-def six(autopilot):
-    return np.array([autopilot.parameters[name] for name in parameter_names(1).six])
 
 
 @pytest.fixture
@@ -61,12 +18,14 @@ def in_a_hurry(document, tmp_path):
 
 
 async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemon, port, tmp_path):
-    async with daemon(in_a_hurry) as service, flying(port) as (autopilot, station):
+    async with daemon(in_a_hurry) as service, flying(port) as (autopilot, _, station_port):
         await until(lambda: autopilot.flying)
         await until(lambda: service.snapshot().imus)
         # A ground station changes a parameter in the middle of the window: sums are raw.
-        ground_station_sets(station, "INS_ACCOFFS_X", 0.5)
+        station = GroundStation(station_port)
+        station.set("INS_ACCOFFS_X", 0.5)
         await until(lambda: service.snapshot().parameters["INS_ACCOFFS_X"] == 0.5)
+        station.close()
         before = six(autopilot)
         assert before[3] == 0.5
         await until(lambda: not autopilot.flying)
@@ -80,14 +39,14 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         imu = service.learning.learned.calibrations[1]
         estimate = np.array(imu.scale + imu.offset)
         sigma = np.array(imu.scale_sigma + imu.offset_sigma)
-        error = estimate - np.concatenate([TRUE_SCALE, TRUE_OFFSET])
+        error = estimate - TRUE_SIX
         assert np.all(np.abs(error) < 4.0 * sigma)
         assert np.all(np.abs(error[:3]) < 0.01)
         assert np.all(np.abs(error[3:]) < 0.05)
         # What the autopilot has now is what was proposed, and better than what it had.
         planned = service._journal.last_completed(1).plan
         assert six(autopilot) == pytest.approx(list(planned.wanted.values()), abs=1e-7)
-        pushed_error = six(autopilot) - np.concatenate([TRUE_SCALE, TRUE_OFFSET])
+        pushed_error = six(autopilot) - TRUE_SIX
         assert np.all(np.abs(pushed_error) < 4.0 * sigma)
         assert imu.held_out_after < imu.held_out_before or imu.in_force_scale != (1.0, 1.0, 1.0)
         imu_view = service.snapshot().imus[0]

@@ -64,11 +64,12 @@ def test_a_flight_as_the_pilot_hears_it():
         ("push_interrupted", ERROR),
         ("push_worse", WARNING),
         ("physics_missing", WARNING),
+        ("worth_knowing", INFO),
         ("roll_back_completed", NOTICE),
         ("invalid", WARNING),
     ],
 )
-def test_bad_news_sound_bad(kind, severity):
+def test_news_sound_as_bad_as_they_are(kind, severity):
     cockpit = Cockpit()
     cockpit.post(kind, "IMU 2: something")
     cockpit.pass_time(1.0)

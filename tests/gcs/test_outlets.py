@@ -42,15 +42,28 @@ def diagnosis(*names, verdict="explained"):
 def test_missing_physics_is_told_once_for_each_answer():
     stage = Stage()
     for _ in range(3):
-        stage.show(diagnosis=diagnosis("gps_latency", "heading_error"))
-    stage.show(diagnosis=diagnosis("heading_error"))
+        stage.show(diagnosis=diagnosis("cross_axis", "mount_tilt"))
+    stage.show(diagnosis=diagnosis("mount_tilt"))
     stage.show(diagnosis=diagnosis(verdict="clean"))
     stage.show(diagnosis=diagnosis(verdict="unexplained"))
     assert stage.told("physics_missing") == [
-        "physics missing: gps latency",
-        "physics missing: heading error",
+        "physics missing: cross axis",
+        "physics missing: mount tilt",
         "physics missing: no known effect",
     ]
+
+
+def test_a_late_receiver_is_worth_knowing_and_no_alarm():
+    stage = Stage()
+    stage.show(diagnosis=diagnosis("gps_latency", "gps_smoothing"))
+    assert stage.told("worth_knowing") == ["worth knowing: gps latency"]
+    assert stage.told("physics_missing") == []
+
+
+def test_what_falsifies_the_numbers_is_told_however_small_its_share():
+    stage = Stage()
+    stage.show(diagnosis=diagnosis("gps_latency", "gps_lever_arm"))
+    assert stage.told("physics_missing") == ["physics missing: gps lever arm"]
 
 
 @pytest.mark.parametrize("verdict", ["clean", "insufficient"])
@@ -79,6 +92,6 @@ def test_every_tick_reaches_the_parameters():
 def test_what_is_switched_off_is_not_there_but_the_log_has_the_news():
     stage = Stage(parameters={"enabled": False, "messages": False})
     assert stage.participants == []
-    stage.show(diagnosis=diagnosis("gps_latency"))
+    stage.show(diagnosis=diagnosis("gps_lever_arm"))
     assert stage.outlets.counters == {}
     assert len(stage.told("physics_missing")) == 1

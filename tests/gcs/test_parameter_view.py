@@ -142,10 +142,17 @@ def effect(name, share):
 
 
 def test_the_top_finding_is_the_one_with_the_largest_share():
-    effects = [effect("gps_latency", 0.2), effect("heading_error", 0.7), effect("gravity", None)]
+    effects = [effect("cross_axis", 0.2), effect("mount_tilt", 0.7), effect("gravity", None)]
     diagnosis = {"verdict": "explained", "effects": effects}
-    assert finding_number(diagnosis) == FINDINGS["heading_error"]
-    assert values(seen(diagnosis=diagnosis))["OBC_FINDING"] == FINDINGS["heading_error"]
+    assert finding_number(diagnosis) == FINDINGS["mount_tilt"]
+    assert values(seen(diagnosis=diagnosis))["OBC_FINDING"] == FINDINGS["mount_tilt"]
+
+
+def test_a_finding_that_falsifies_the_numbers_comes_before_one_that_is_in_every_model():
+    effects = [effect("gps_latency", 0.9), effect("gps_lever_arm", 0.05)]
+    diagnosis = {"verdict": "explained", "effects": effects}
+    assert finding_number(diagnosis) == FINDINGS["gps_lever_arm"]
+    assert finding_number(diagnosis | {"effects": effects[:1]}) == FINDINGS["gps_latency"]
 
 
 @pytest.mark.parametrize("verdict", list(Verdict))

@@ -124,3 +124,27 @@ async def test_a_broker_that_comes_late_gets_everything(tmp_path):
                     await asyncio.sleep(0.02)
         finally:
             await broker.stop()
+
+
+async def test_missing_physics_is_retained_for_everybody_who_comes_later(tmp_path, broker):
+    from daemons import calibration, convinced, running, until  # noqa: PLC0415
+    from standing_vehicle import Vehicle  # noqa: PLC0415
+
+    port = free_port()
+    async with running(configuration(tmp_path, port, broker.port)) as service, Vehicle(port):
+        why = "the GPS antenna is elsewhere (gps_lever_arm)"
+        convinced(service, calibration(1), missing=why, effects=("gps_lever_arm",))
+        await until(lambda: service.snapshot().diagnosis)
+        async with Subscriber(broker.client()) as late:
+            await late.until(
+                lambda: (
+                    b"gps_lever_arm" in late.latest.get("onboard/1/diagnosis", b"")
+                    and "onboard/1/state" in late.latest
+                )
+            )
+            await late.until(
+                lambda: any(
+                    why in proposal["held_back"].get("physics_missing", "")
+                    for proposal in json.loads(late.latest["onboard/1/state"])["push"]["proposals"]
+                )
+            )
