@@ -62,6 +62,8 @@ class EffectDocument(msgspec.Struct, frozen=True, kw_only=True):
     rivals: list[RivalDocument]
     intervals: list[list[float]]
     formula: str = ""
+    held_out_velocity_rms_before_m_s: float | None = None
+    held_out_velocity_rms_after_m_s: float | None = None
 
 
 class MismatchDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -75,6 +77,8 @@ class MismatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     velocity_rms_after_m_s: float | None
     held_out_whitened_rms_before: float | None
     held_out_whitened_rms_after: float | None
+    held_out_velocity_rms_before_m_s: float | None
+    held_out_velocity_rms_after_m_s: float | None
     where: list[WhereDocument]
 
 
@@ -98,6 +102,8 @@ class RungDocument(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     whitened_rms: float | None
     held_out_whitened_rms: float | None
+    velocity_rms_m_s: float | None
+    held_out_velocity_rms_m_s: float | None
 
 
 class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
@@ -161,6 +167,8 @@ def explain_document(
             velocity_rms_after_m_s=finite(m.velocity_rms_after),
             held_out_whitened_rms_before=finite(m.held_out_before),
             held_out_whitened_rms_after=finite(m.held_out_after),
+            held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
+            held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
             where=[_where(w) for w in m.where],
         ),
         effects=[_effect(e, autopilot) for e in diagnosis.effects],
@@ -174,6 +182,8 @@ def explain_document(
                 name=r.name,
                 whitened_rms=finite(r.whitened_rms),
                 held_out_whitened_rms=finite(r.held_out),
+                velocity_rms_m_s=finite(r.velocity_rms),
+                held_out_velocity_rms_m_s=finite(r.held_out_velocity),
             )
             for r in diagnosis.ladder
         ],
@@ -197,6 +207,8 @@ def _effect(e: Effect, autopilot: str) -> EffectDocument:
         rivals=[RivalDocument(name=r.name, delta_bic=finite(r.delta_bic)) for r in e.rivals],
         intervals=[[float(a), float(b)] for a, b in e.intervals],
         formula=e.formula,
+        held_out_velocity_rms_before_m_s=finite(e.held_out_velocity_before),
+        held_out_velocity_rms_after_m_s=finite(e.held_out_velocity_after),
     )
 
 

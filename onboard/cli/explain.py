@@ -14,11 +14,14 @@ from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.core.result import SIX_NAMES
+from onboard.errors import UsageError
 from onboard.explain import Explanation
 from onboard.explain import explain as explain_recordings
+from onboard.report import verdict
 from onboard.report.parameters import is_qgc, parameter_text
-from onboard.report.words import EFFECTS, VERDICTS
+from onboard.report.words import fixed, percent
 
+MOST_SPANS = 3
 EXAMPLES = """\
 \b
 onboard explain flight.BIN
@@ -71,75 +74,99 @@ def explain(
         )
         write_text(page, report_file)
     if param_file is not None:
+        if result.source.autopilot != "ardupilot":
+            raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
         text = parameter_text(result.diagnosis, result.files, qgc=is_qgc(param_file))
         write_text(text, param_file)
-    if json_file != STANDARD_OUTPUT:
+    if STANDARD_OUTPUT not in (json_file, report_file, param_file):
         console = Console(highlight=False)
         for part in summary(result):
             console.print(part)
 
 
 def summary(result: Explanation) -> Iterator[RenderableType]:
-    """What a pilot reads in ten seconds."""
+    """What a pilot reads in ten seconds, and then the numbers."""
     d = result.diagnosis
-    colour, words = VERDICTS[d.verdict]
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
-    yield Text(words, style=f"bold {colour}")
+    yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[d.verdict]}")
+    yield _answers(d, parameters=result.source.autopilot == "ardupilot")
     if d.verdict is Verdict.INSUFFICIENT:
-        yield Text(d.note)
         return
-    if d.effects:
-        yield _effects(d.effects)
-        cures = [e for e in d.effects if e.cure or e.parameters]
-        yield Text("What to do", style="bold")
-        for e in cures:
-            settings = ", ".join(f"{n} = {v:.6g}" for n, v in e.parameters.items())
-            yield Text(f"  {e.name}: {e.cure}" + (f" ({settings})" if settings else ""))
-    m = d.mismatch
-    yield Text(
-        f"Residual on data not fitted, whitened: {m.held_out_before:.2f} with six numbers only, "
-        f"{m.held_out_after:.2f} with all that was found."
-    )
-    for a in d.ambiguous:
-        yield Text(f"Not told apart: {' and '.join(a.names)}. To tell: {a.tell_apart}.")
-    if d.not_testable:
-        yield Text("Could not be tested: " + ", ".join(n.name for n in d.not_testable) + ".")
+    yield ""
     yield _six(d)
-    if d.note:
-        yield Text(d.note)
+    yield from _limits(d)
 
 
-def _effects(effects: tuple[Effect, ...]) -> Table:
-    table = Table(box=None, padding=(0, 1), show_edge=False)
-    table.add_column("what is missing", ratio=3)
-    table.add_column("size", ratio=3)
-    table.add_column("share", justify="right")
-    for e in effects:
-        size = ", ".join(
-            f"{k} {q.value:.3g} ± {q.sigma:.1g} {q.unit}" for k, q in e.unknowns.items()
-        )
-        spans = "; ".join(f"{a:.0f}-{b:.0f} s" for a, b in e.intervals[:4])
-        table.add_row(
-            f"{EFFECTS.get(e.name, e.name)} ({e.name})",
-            size + (f"; {spans}" if spans else ""),
-            f"{100 * e.share_of_mismatch:.0f} %",
-        )
+def _answers(d: Diagnosis, *, parameters: bool) -> Table:
+    """What, how sure, what to do: the same words as on the page."""
+    refused = d.verdict is Verdict.INSUFFICIENT
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    found = verdict.missing(d)
+    if d.effects and not refused:
+        found = [f"{said[:-1]} ({named(e)})." for said, e in zip(found, d.effects, strict=False)]
+        found += verdict.missing(d)[len(d.effects) :]
+    rows = [
+        ("Missing", found),
+        ("Proof", [verdict.proof(d)]),
+        ("To fly" if refused else "To do", verdict.cures(d, parameters=parameters)),
+        ("Note", verdict.remarks(d)),
+    ]
+    for label, sentences in rows:
+        for k, sentence in enumerate(sentences):
+            table.add_row("" if k else label, _plain(sentence))
     return table
+
+
+def named(effect: Effect) -> str:
+    """The effect's name for other programs, when it acts, and how much of the mismatch it is."""
+    spans = [f"{a:.0f}-{b:.0f} s" for a, b in effect.intervals[:MOST_SPANS]]
+    if len(effect.intervals) > MOST_SPANS:
+        spans.append("...")
+    when = f", {'; '.join(spans)}" if spans else ""
+    return f"{effect.name}{when}, {percent(effect.share_of_mismatch)}"
+
+
+def _limits(d: Diagnosis) -> Iterator[RenderableType]:
+    """What this flight could not show."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for k, a in enumerate(d.ambiguous):
+        apart = f"{' and '.join(a.names)}. To tell: {a.tell_apart}."
+        table.add_row("" if k else "Not told apart", _plain(apart))
+    for k, sentence in enumerate(verdict.to_fly(d)):
+        table.add_row("" if k else "Not shown", _plain(sentence))
+    if d.not_testable:
+        names = dict.fromkeys(n.name for n in d.not_testable)
+        table.add_row("Not tested", _plain(", ".join(names) + "."))
+    if table.row_count:
+        yield from ("", table)
 
 
 def _six(d: Diagnosis) -> Table:
     c = d.calibration
     table = Table(box=None, padding=(0, 1), show_edge=False)
-    for heading in ("", "estimate", "sigma", "in force", "seen"):
-        table.add_column(heading, justify="left" if heading == "" else "right")
+    headings = (f"calibration: {c.status.value}", "in force", "estimate", "sigma", "seen")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading is headings[0] else "right")
     rows = zip(
         SIX_NAMES,
+        c.in_force_scale + c.in_force_offset,
         c.scale + c.offset,
         c.scale_sigma + c.offset_sigma,
-        c.in_force_scale + c.in_force_offset,
         c.observable,
         strict=True,
     )
-    for name, value, sigma, force, seen in rows:
-        table.add_row(name, f"{value:.4f}", f"{sigma:.4f}", f"{force:.4f}", "yes" if seen else "no")
+    for name, *numbers, seen in rows:
+        shown = [fixed(x, 4).replace("−", "-") for x in numbers]
+        table.add_row(name, *shown, "yes" if seen else "no")
     return table
+
+
+def _plain(sentence: str, style: str = "") -> Text:
+    """Words of the page for a terminal, which may not know every sign and breaks at any space."""
+    for sign, ours in (("−", "-"), ("\u00a0%", "%"), (" %", "%")):
+        sentence = sentence.replace(sign, ours)
+    return Text(sentence, style=style)

@@ -78,7 +78,7 @@ def replay(
         write_text(calibration_text(result.calibrations, names, qgc=qgc), param_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
-    if json_file != STANDARD_OUTPUT:
+    if STANDARD_OUTPUT not in (json_file, report_file, param_file):
         console = Console(highlight=False)
         for part in replay_report(result):
             console.print(part)
@@ -100,11 +100,14 @@ def write_json(document: bytes, file: str) -> None:
 
 
 def write_text(text: str, file: str) -> None:
-    """Write a text in UTF-8.
+    """Write a text in UTF-8 to a file, or to standard output for ``-``.
 
     Raises:
         UsageError: the file cannot be written.
     """
+    if file == STANDARD_OUTPUT:
+        click.echo(text, nl=False)
+        return
     try:
         Path(file).write_text(text, encoding="utf-8")
     except OSError as error:

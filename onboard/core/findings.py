@@ -6,7 +6,7 @@ first inertial sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from onboard.core.result import Calibration, Estimate
 
 Array = NDArray[np.float64]
+
+NAN = float("nan")
+"""What was not measured."""
 
 
 class Verdict(Enum):
@@ -56,11 +59,41 @@ class Rival:
 
 
 @dataclass(frozen=True, slots=True)
+class Imprint:
+    """What an effect makes of the velocity, and what data say of it; m/s, (n,), NaN where unused.
+
+    ``left`` is what the model leaves with this effect alone taken out, along the earth ``axis``;
+    ``made`` is what the effect says should be left.  ``t`` is a stretch where it does most.
+    """
+
+    axis: str
+    t: Array
+    left: Array
+    made: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """How a quantity goes with a signal, over the range that was flown: ``x`` (n,).
+
+    ``y`` and ``sigma`` have a curve (n,) for each unknown, by its name.
+    """
+
+    signal: str
+    unit: str
+    quantity: str
+    quantity_unit: str
+    x: Array
+    y: dict[str, Array]
+    sigma: dict[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """One accepted effect with its evidence.
 
     ``parameters`` are the autopilot parameters to set and their values; ``cure`` says in words what
-    to do where no parameter helps.
+    to do where no parameter helps.  ``held_out_velocity_*`` are the held-out residual in m/s.
     """
 
     name: str
@@ -75,6 +108,10 @@ class Effect:
     rivals: tuple[Rival, ...] = ()
     intervals: tuple[tuple[float, float], ...] = ()
     formula: str = ""
+    held_out_velocity_before: float = NAN
+    held_out_velocity_after: float = NAN
+    imprint: Imprint | None = None
+    law: Law | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +132,16 @@ class NotTestable:
 
 @dataclass(frozen=True, slots=True)
 class Rung:
-    """One step of the ladder of models: what was added, and its residuals."""
+    """One step of the ladder of models: what was added, and its residuals.
+
+    ``whitened_rms`` and ``held_out`` are in units of the noise, the velocities in m/s.
+    """
 
     name: str
     whitened_rms: float
     held_out: float
+    velocity_rms: float = NAN
+    held_out_velocity: float = NAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +157,8 @@ class Mismatch:
     held_out_before: float
     held_out_after: float
     where: tuple[Where, ...] = ()
+    held_out_velocity_before: float = NAN
+    held_out_velocity_after: float = NAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +177,14 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class RegimeResidual:
-    """Whitened residual in one flight regime, before and after."""
+    """Residual in one flight regime, before and after: whitened, and of the velocity in m/s."""
 
     regime: str
     seconds: float
     rms_before: float
     rms_after: float
+    velocity_before: float = NAN
+    velocity_after: float = NAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,4 +203,3 @@ class Diagnosis:
     regimes: tuple[RegimeResidual, ...]
     series: Series
     note: str
-    curves: dict[str, tuple[Array, Array]] = field(default_factory=dict)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.choice import HELD_OUT_GAIN, MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
+from onboard.core.epochs import Epochs, rms
 from onboard.core.examination import Examination
 from onboard.core.findings import (
     Ambiguity,
@@ -24,6 +25,7 @@ from onboard.core.findings import (
     Verdict,
     Where,
 )
+from onboard.core.laws import law_of
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
 from onboard.core.physics.offsets import BiasStep
@@ -84,6 +86,7 @@ class Judge:
         self.excluded = list(excluded)
         self.told = calibrator.parameters.gps_delay_told
         self.traces = final.traces
+        self.epochs = Epochs.of(final.traces, final.all_portions, final.model.size)
         self.calibration: Calibration = calibrator.calibration_with(imu, final)
         self.solution = final.found()
         self.fitter = Fitter(final.all_portions, final.model, self.solution.inflation, final.absent)
@@ -105,8 +108,8 @@ class Judge:
         standing = standing_effects(
             timing, self.solution, self.index, self.told, self.calibrator.parameters.trim
         )
-        ladder, held = self._ladder()
-        before, after = held[0], held[-1]
+        ladder, fits = self._ladder()
+        before, after = fits[0], fits[-1]
         effects = [
             self._standing(n, q, cure, p)
             for n, (q, cure, p) in standing.items()
@@ -115,7 +118,7 @@ class Judge:
         effects += [self._effect(f) for f in self.families]
         effects += self.excluded
         insufficient = not self.calibrator.engine(self.imu).moving
-        mismatch = self._mismatch(before, after, effects)
+        mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, insufficient=insufficient)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
@@ -141,26 +144,37 @@ class Judge:
         return without(names, self.index, self.engine.point, self.engine.absent, self.told, trim)
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
-        """Six numbers only, + timing (and constant attitude errors), + each effect."""
+        """Six numbers only, + timing, + constant attitude errors, + each effect."""
         timing = ["gps_delay", "window_squared", "attitude_delay"]
         constant = ["tilt_roll", "tilt_pitch", "heading"]
-        out = [self.index[n] for n in timing + constant]
-        mine = [i for f in self.families for i in self.all if i in self.engine.indices(f)]
-        free = [i for i in self.all if i not in out and i not in mine]
-        fits = [self.fitter.fit(free, self._held(timing))]
-        names = ["six numbers only"]
-        free = free + out
-        fits.append(self.fitter.fit(free))
-        names.append("+ timing and attitude")
+        late, turned = ([self.index[n] for n in names] for names in (timing, constant))
+        mine = self.engine.indices_of(self.families)
+        free = [i for i in self.all if i not in (*late, *turned, *mine)]
+        rungs: list[Rung] = []
+        fits: list[Fit] = []
+
+        def climb(name: str, held: Array | None = None) -> None:
+            fit = self.fitter.fit(free, held)
+            fits.append(fit)
+            rungs.append(
+                Rung(
+                    name,
+                    self.fitter.rms(fit),
+                    self.fitter.held_rms(fit),
+                    rms(self.epochs.residual(fit.theta)),
+                    self._held_velocity(free, held),
+                )
+            )
+
+        climb("six numbers only", self._held(timing))
+        free = free + late
+        climb("+ timing")
+        free = free + turned
+        climb("+ attitude")
         for f in self.families:
-            free = free + [i for i in self.all if i in self.engine.indices(f)]
-            fits.append(self.fitter.fit(free))
-            names.append(f"+ {f.effect}")
-        rungs = tuple(
-            Rung(name, self.fitter.rms(fit), self.fitter.held_rms(fit))
-            for name, fit in zip(names, fits, strict=True)
-        )
-        return rungs, fits
+            free = free + self.engine.indices(f)
+            climb(f"+ {f.effect}")
+        return tuple(rungs), fits
 
     def _without(self, index: Sequence[int], held: Array | None = None) -> tuple[Fit, Fit]:
         rest = [i for i in self.all if i not in index]
@@ -175,8 +189,8 @@ class Judge:
     ) -> Effect:
         columns = STANDING[name]
         index = [self.index[c] for c in columns]
-        absent, with_it = self._without(index, self._held(columns))
-        made = self._record(name, quantities, index, absent, with_it, parameters, cure)
+        held = self._held(columns)
+        made = self._record(name, quantities, index, held, parameters, cure)
         return replace(made, rivals=self._standing_rivals(name, columns))
 
     def _holds(self, name: str) -> bool:
@@ -202,7 +216,6 @@ class Judge:
 
     def _effect(self, f: EffectColumns) -> Effect:
         index = [i for i in self.all if i in self.engine.indices(f)]
-        without, with_it = self._without(index)
         sigma = np.sqrt(np.diag(self.solution.covariance))
         taken = {"clock_rate": self.engine.point.skew}
         quantities = {
@@ -214,9 +227,8 @@ class Judge:
         if isinstance(f, BiasStep):
             quantities = {"time": Quantity(f.at - self.origin.t0, 0.5, "s"), **quantities}
         values = {k: q.value for k, q in quantities.items()}
-        made = self._record(
-            f.effect, quantities, index, without, with_it, f.parameters(values), f.cure
-        )
+        held = self.engine.absent
+        made = self._record(f.effect, quantities, index, held, f.parameters(values), f.cure)
         made = replace(made, rivals=self._rivals(f))
         if isinstance(f, Product):
             made = replace(made, formula=f.written([q.value for q in quantities.values()]))
@@ -231,11 +243,13 @@ class Judge:
         name: str,
         quantities: dict[str, Quantity],
         index: Sequence[int],
-        without: Fit,
-        with_it: Fit,
+        held: Array,
         parameters: dict[str, float],
         cure: str,
     ) -> Effect:
+        without, with_it = self._without(index, held)
+        rest = [i for i in self.all if i not in index]
+        theta = self.solution.theta
         bic = self.fitter.gain(without, with_it) - len(index) * np.log(max(self.fitter.rows, 2.0))
         return Effect(
             name=name,
@@ -247,6 +261,14 @@ class Judge:
             parameters=parameters,
             cure=cure,
             where=self._where(index, without.theta, with_it.theta),
+            held_out_velocity_before=self._held_velocity(rest, held),
+            held_out_velocity_after=self._held_velocity(self.all),
+            imprint=self.epochs.imprint(
+                index, theta[list(index)] - held[list(index)], theta, self.origin.t0
+            ),
+            law=law_of(
+                name, quantities, self.engine.chunks, self.origin.t0, self.origin.temperature
+            ),
         )
 
     def _where(self, index: Sequence[int], before: Array, after: Array) -> tuple[Where, ...]:
@@ -269,7 +291,9 @@ class Judge:
         out += self.engine.indices_of([f for f in self.families if f.effect in names])
         return out or list(range(6))
 
-    def _mismatch(self, before: Fit, after: Fit, effects: Sequence[Effect]) -> Mismatch:
+    def _mismatch(
+        self, before: Fit, after: Fit, effects: Sequence[Effect], ladder: Sequence[Rung]
+    ) -> Mismatch:
         n = len(self.all)
         gain = self.fitter.gain(before, after)
         series = self._series(before.theta, after.theta)
@@ -278,21 +302,22 @@ class Judge:
             whitened_rms_before=self.fitter.rms(before),
             whitened_rms_after=self.fitter.rms(after),
             p_value=float(np.exp(-0.5 * min(max(gain, 0.0), 1400.0))),
-            velocity_rms_before=_rms(series.before),
-            velocity_rms_after=_rms(series.after),
+            velocity_rms_before=rms(series.before),
+            velocity_rms_after=rms(series.after),
             held_out_before=self.fitter.held_rms(before),
             held_out_after=self.fitter.held_rms(after),
             where=self._where(self._found(effects), before.theta, after.theta),
+            held_out_velocity_before=ladder[0].held_out_velocity,
+            held_out_velocity_after=ladder[-1].held_out_velocity,
         )
 
     def _series(self, before: Array, after: Array) -> Series:
-        t = np.array([x.t for x in self.traces]) - self.origin.t0
-        one, two = (np.full((len(t), 3), np.nan) for _ in range(2))
-        for k, x in enumerate(self.traces):
-            one[k, : x.velocities] = x.innovation - x.columns @ before
-            two[k, : x.velocities] = x.innovation - x.columns @ after
-        refused = np.array(["velocity" in x.refused for x in self.traces], dtype=bool)
-        return Series(t, one, two, refused)
+        e = self.epochs
+        return Series(e.t - self.origin.t0, e.residual(before), e.residual(after), e.refused)
+
+    def _held_velocity(self, free: Sequence[int], held: Array | None = None) -> float:
+        """Velocity residual, m/s, on portions that a fit of ``free`` has not seen."""
+        return self.epochs.held_out_rms(self.fitter.held_fits(free, held))
 
     def _verdict(self, effects: list[Effect], *, insufficient: bool) -> tuple[Verdict, str]:
         note = self.calibration.note
@@ -355,8 +380,3 @@ class Judge:
                     )
                 )
         return out
-
-
-def _rms(x: Array) -> float:
-    seen = x[np.isfinite(x)]
-    return float(np.sqrt(np.mean(seen**2))) if len(seen) else float("nan")

@@ -13,6 +13,7 @@ with each other.  The eigenvector *within* a coupled group then says which combi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -79,7 +80,13 @@ class Observability:
     @property
     def note(self) -> str:
         """All that is weak, as sentences for a person; empty if nothing is."""
-        return " ".join(f"{direction.sentence}: {direction.advice}." for direction in self.weak)
+        longer = [i for w in self.weak if w.advice == _LONGER for i in w.members]
+        rest = [w for w in self.weak if w.advice != _LONGER]
+        said = [f"{w.sentence}: {w.advice}." for w in rest]
+        if longer:
+            verb = "is" if len(longer) == 1 else "are"
+            said.append(f"{_listed(sorted(longer))} {verb} not known well enough: {_LONGER}.")
+        return " ".join(said)
 
 
 def assess(information: ArrayLike, needs: Needs = Needs()) -> Observability:
@@ -208,8 +215,13 @@ def describe(members: tuple[int, ...]) -> tuple[str, str]:
         if index < 3:
             return f"{names[0]} is not excited enough", _CHANGE_FORCE[index]
         return f"{names[0]} is not known well enough", _LONGER
-    listed = ", ".join(names[:-1]) + " and " + names[-1]
-    sentence = f"{listed} cannot be told apart"
+    sentence = f"{_listed(members)} cannot be told apart"
     if not scales:
         return sentence, _ROLL_OVER_HEADINGS
     return sentence, "; ".join(_CHANGE_FORCE[axis] for axis in axes)
+
+
+def _listed(members: Sequence[int]) -> str:
+    """``x offset``; ``x offset and y offset``; with commas where there are more."""
+    names = [SIX_NAMES[i] for i in members]
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]

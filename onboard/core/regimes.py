@@ -149,18 +149,20 @@ def regime_residuals(
 ) -> tuple[RegimeResidual, ...]:
     """Whitened residual by regime, before and after."""
     edges = [(float(c.fixes.t[0]) - 0.5, float(c.fixes.t[-1]) + 0.5, regime_of(c)) for c in chunks]
-    squares: dict[str, list[float]] = {}
+    squares: dict[str, Array] = {}
     for x in traces:
         regime = next((r for a, b, r in edges if a <= x.t <= b), None)
         if regime is None or len(x.y) == 0:
             continue
         one, two = x.y - x.h @ before, x.y - x.h @ after
-        s = squares.setdefault(regime, [0.0, 0.0, 0.0])
-        s[0] += float(one @ one)
-        s[1] += float(two @ two)
-        s[2] += len(one)
+        v_one, v_two = x.innovation - x.columns @ before, x.innovation - x.columns @ after
+        s = squares.setdefault(regime, np.zeros(6))
+        sums = (one @ one, two @ two, len(one), v_one @ v_one, v_two @ v_two, len(v_one))
+        s += np.array(sums)
     seconds = {r: sum(c.duration for c in chunks if regime_of(c) == r) for r in squares}
-    return tuple(
-        RegimeResidual(r, seconds[r], float(np.sqrt(s[0] / s[2])), float(np.sqrt(s[1] / s[2])))
-        for r, s in sorted(squares.items())
-    )
+    out = []
+    for r, s in sorted(squares.items()):
+        whitened = np.sqrt(s[:2] / s[2])
+        velocity = np.sqrt(s[3:5] / s[5]) if s[5] else np.full(2, np.nan)
+        out.append(RegimeResidual(r, seconds[r], *map(float, (*whitened, *velocity))))
+    return tuple(out)

@@ -58,7 +58,8 @@ class Fitter:
         self.sums = total(self.portions)
         self._prior = 1.0 / model.prior_sigma**2
         folds = np.array_split(np.arange(len(self.portions)), min(FOLDS, len(self.portions)))
-        self._folds = [total([self.portions[i] for i in fold]) for fold in folds if len(fold) > 0]
+        self._members = [fold for fold in folds if len(fold) > 0]
+        self._folds = [total([self.portions[i] for i in fold]) for fold in self._members]
 
     @property
     def rows(self) -> float:
@@ -81,6 +82,14 @@ class Fitter:
         covariance = np.zeros_like(self.sums.N)
         covariance[np.ix_(free, free)] = np.linalg.inv(A) * self.weaken
         return Fit(theta, covariance, chi2, out)
+
+    def held_fits(
+        self, free: Sequence[int], held: Array | None = None
+    ) -> list[tuple[NDArray[np.intp], Array]]:
+        """Portions of each fold, and the unknowns (m,) of a fit that has not seen them."""
+        at = (self.absent if held is None else held).copy()
+        pairs = zip(self._members, self._folds, strict=True) if len(self._folds) > 1 else ()
+        return [(members, self._solve(self.sums - fold, free, at)[0]) for members, fold in pairs]
 
     def _solve(self, sums: NormalSums, free: Sequence[int], at: Array) -> tuple[Array, Array]:
         index = list(free)

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1000.0, 300.0
 MOST_POINTS = 1400
-LONGEST_STEP_S = 5.0
-"""A longer pause in the data is drawn as a gap."""
+LONGEST_STEP_S = 1.0
+"""A pause in the data longer than this, and than four usual steps, is drawn as a gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +76,17 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
         return []
     raw = span / most
     power = 10.0 ** math.floor(math.log10(raw))
-    step = next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= raw * (1.0 - 1e-9))
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    return [k * step for k in range(first, last + 1)]
+    steps = [k * power for k in (0.5, 1.0, 2.0, 5.0, 10.0)]
+    rough = next(i for i, step in enumerate(steps) if step >= raw * (1.0 - 1e-9))
+    found: list[float] = []
+    # One number is no scale: then rather more of them than asked for.
+    for step in steps[rough : max(rough - 2, -1) : -1]:
+        first = math.ceil(low / step - 1e-9)
+        last = math.floor(high / step + 1e-9)
+        found = [k * step for k in range(first, last + 1)]
+        if len(found) > 2:
+            break
+    return found
 
 
 def line_chart(
@@ -93,11 +100,13 @@ def line_chart(
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
     symmetric: bool = True,
+    summary: str = "",
 ) -> Markup:
     """Curves over a common axis; a sentence instead if there is not one finite point.
 
     The vertical range covers 99.5 % of all points, so that a single wild value does not flatten the
     rest; what is beyond is cut at the edge.  ``x_range`` and ``y_range`` set the ranges instead.
+    ``summary`` tells those who do not see the curves what they show.
     """
     drawn = [(*decimate(line.x, line.y), line) for line in lines]
     xs = np.concatenate([x for x, _, _ in drawn]) if drawn else np.zeros(0)
@@ -142,7 +151,7 @@ def line_chart(
         x_unit,
         WIDTH,
         HEIGHT,
-        title,
+        f"{title}: {summary}" if summary else title,
         Markup("".join(shapes)),  # noqa: S704  numbers and escaped classes only
         Markup("".join(labels)),  # noqa: S704
     )
@@ -201,6 +210,6 @@ def _path(px: Sequence[float], py: Sequence[float], x: Array) -> str:
     longest = max(LONGEST_STEP_S, 4.0 * float(np.median(steps))) if len(steps) else 0.0
     out = []
     for k, (a, b) in enumerate(zip(px, py, strict=True)):
-        begins = k == 0 or steps[k - 1] > longest
+        begins = k == 0 or not 0.0 <= steps[k - 1] <= longest
         out.append(f"{'M' if begins else 'L'}{a:.1f} {b:.1f}")
     return "".join(out)

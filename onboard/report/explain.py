@@ -6,19 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from markupsafe import Markup
-
-from onboard.core.findings import Diagnosis, Effect, Where
+from onboard.core.findings import Diagnosis, Effect, Verdict, Where
 from onboard.core.result import SIX_NAMES
-from onboard.report import words
-from onboard.report.chart import Band, Line, line_chart, pair_bar
+from onboard.report import residual_charts, verdict, words
+from onboard.report.chart import pair_bar
 from onboard.report.page import render
 from onboard.report.parameters import changes
 
 TEMPLATE = "explain.html.j2"
-COMPONENTS = ("North", "East", "Down")
-MOST_BANDS = 200
+MOST_SPANS = 8
 
 
 def explain_html(
@@ -35,27 +31,28 @@ def explain_html(
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
     """
-    m = diagnosis.mismatch
-    missing, sure, change = words.sentences(diagnosis)
     unclear = {n for a in diagnosis.ambiguous for n in a.names}
+    ours = autopilot == "ardupilot"
+    refused = diagnosis.verdict is Verdict.INSUFFICIENT
     return render(
         TEMPLATE,
         files=list(files),
         autopilot=autopilot,
-        duration=words.number(duration_s),
+        duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
-        headline=words.HEADLINES[diagnosis.verdict],
-        missing=missing,
-        sure=sure,
-        change=change,
-        note=diagnosis.note,
-        charts=_charts(diagnosis),
-        shaded=bool(m.where),
-        fault=any(e.intervals for e in diagnosis.effects),
-        refused=bool(np.any(diagnosis.series.refused)),
+        headline=verdict.headline(diagnosis),
+        missing=verdict.missing(diagnosis),
+        sure=verdict.proof(diagnosis),
+        change=verdict.cures(diagnosis, parameters=ours),
+        remarks=verdict.remarks(diagnosis),
+        to_fly=() if refused else verdict.to_fly(diagnosis),
+        charts=residual_charts.of_flight(diagnosis, duration_s),
+        shading=residual_charts.shading(diagnosis),
         fits=_fits(diagnosis),
-        where=[_where(w) for w in m.where],
+        where=[_where(w) for w in diagnosis.mismatch.where]
+        if residual_charts.is_located(diagnosis)
+        else [],
         regimes=_regimes(diagnosis),
         effects=[_card(e, autopilot, ambiguous=e.name in unclear) for e in diagnosis.effects],
         ladder=_ladder(diagnosis),
@@ -63,13 +60,10 @@ def explain_html(
         status=diagnosis.calibration.status.value,
         known=diagnosis.calibration.parameters_known,
         timing=[
-            (name.replace("_", " "), words.with_sigma(e.value, e.sigma))
+            (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
             for name, e in diagnosis.timing.items()
         ],
-        parameters=[
-            (c.name, f"{c.value:.7g}", c.reason, c.withheld)
-            for c in (changes(diagnosis) if autopilot == "ardupilot" else ())
-        ],
+        parameters=_parameters(diagnosis) if ours else (),
         ambiguous=[
             ([words.effect_title(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous
         ],
@@ -77,51 +71,45 @@ def explain_html(
     )
 
 
-def _charts(d: Diagnosis) -> list[Markup]:
-    """Residual over time by component with the located intervals, then the other curves."""
-    bands = [Band(w.start_s, w.end_s, "located") for w in d.mismatch.where]
-    bands += [Band(a, b, "interval") for e in d.effects for a, b in e.intervals[:MOST_BANDS]]
-    s = d.series
-    out = []
-    for k, component in enumerate(COMPONENTS):
-        lines = [
-            Line(s.t, s.before[:, k], "before", "before"),
-            Line(s.t, s.after[:, k], "after", "after"),
-        ]
-        out.append(line_chart(f"{component} velocity residual", "m/s", lines, bands))
-    for name, (x, y) in d.curves.items():
-        title = name.replace("_", " ")
-        line = Line(x, y, "after", title)
-        out.append(line_chart(title, "value", [line], x_unit="argument", symmetric=False))
-    return out
-
-
 def _fits(d: Diagnosis) -> list[dict[str, Any]]:
-    """Error before and after: on all data, on held-out data, in m/s."""
+    """Error before and after, on flight that was not fitted and on all of it."""
     m = d.mismatch
     rows = [
-        ("Not used in the fit", "× noise", m.held_out_before, m.held_out_after),
-        ("All data", "× noise", m.whitened_rms_before, m.whitened_rms_after),
-        ("Velocity", "m/s", m.velocity_rms_before, m.velocity_rms_after),
+        ("Not used in the fit", m.held_out_velocity_before, m.held_out_velocity_after, "m/s"),
+        ("All flight", m.velocity_rms_before, m.velocity_rms_after, "m/s"),
+        ("Not used in the fit", m.held_out_before, m.held_out_after, "× noise"),
+        ("All flight", m.whitened_rms_before, m.whitened_rms_after, "× noise"),
     ]
-    return [_pair(label, unit, a, b, _longest((a, b))) for label, unit, a, b in rows]
+    longest = {u: _longest([x for _, a, b, v in rows if v == u for x in (a, b)]) for *_, u in rows}
+    return [_pair(label, unit, a, b, longest[unit]) for label, a, b, unit in rows]
 
 
 def _regimes(d: Diagnosis) -> list[dict[str, Any]]:
-    longest = _longest([v for r in d.regimes for v in (r.rms_before, r.rms_after)])
+    longest = _longest([v for r in d.regimes for v in (r.velocity_before, r.velocity_after)])
     return [
-        _pair(f"{r.regime} ({words.fixed(r.seconds, 0)} s)", "", r.rms_before, r.rms_after, longest)
+        _pair(
+            f"{r.regime} ({words.fixed(r.seconds, 0)} s)",
+            "m/s",
+            r.velocity_before,
+            r.velocity_after,
+            longest,
+        )
+        | {
+            "name": r.regime,
+            "noise": f"{words.number(r.rms_before, 2)} → {words.number(r.rms_after, 2)}",
+        }
         for r in d.regimes
     ]
 
 
 def _pair(label: str, unit: str, before: float, after: float, longest: float) -> dict[str, Any]:
+    one, two = words.number(before), words.number(after)
     return {
         "label": label,
         "unit": unit,
-        "before": words.number(before),
-        "after": words.number(after),
-        "bar": pair_bar(before, after, longest, label),
+        "before": one,
+        "after": two,
+        "bar": pair_bar(before, after, longest, f"{label}: {one} before, {two} after, {unit}"),
     }
 
 
@@ -130,8 +118,32 @@ def _longest(values: Sequence[float]) -> float:
 
 
 def _ladder(d: Diagnosis) -> list[dict[str, Any]]:
-    longest = _longest([v for r in d.ladder for v in (r.whitened_rms, r.held_out)])
-    return [_pair(r.name, "", r.whitened_rms, r.held_out, longest) for r in d.ladder]
+    """Each step's errors, and what the step has brought on flight that was not fitted."""
+    longest = _longest([r.held_out_velocity for r in d.ladder])
+    out = []
+    for k, r in enumerate(d.ladder):
+        last = d.ladder[k - 1].held_out_velocity if k else math.nan
+        error = words.number(r.held_out_velocity)
+        out.append(
+            {
+                "name": _step(r.name),
+                "error": error,
+                "bar": pair_bar(math.nan, r.held_out_velocity, longest, f"{error} m/s"),
+                "change": verdict.fall(last, r.held_out_velocity) if k else "",
+                "fitted": words.number(r.velocity_rms),
+                "noise": words.number(r.held_out),
+            }
+        )
+    return out
+
+
+def _step(name: str) -> tuple[str, str]:
+    """A step in words, and the effect's name if it is one."""
+    effect = name.removeprefix("+ ")
+    if effect in words.EFFECTS:
+        title = words.effect_title(effect)
+        return "+ " + (title if title[:2].isupper() else title[:1].lower() + title[1:]), effect
+    return name, ""
 
 
 def _where(w: Where) -> str:
@@ -141,32 +153,60 @@ def _where(w: Where) -> str:
 
 
 def _card(e: Effect, autopilot: str, *, ambiguous: bool) -> dict[str, Any]:
+    before, after = e.held_out_velocity_before, e.held_out_velocity_after
+    known = math.isfinite(before) and math.isfinite(after)
     return {
-        "title": words.effect_title(e.name),
+        "title": verdict.sized(e),
         "name": e.name,
-        "unknowns": [(n.replace("_", " "), words.quantity(q)) for n, q in e.unknowns.items()],
+        "unknowns": [
+            (n.replace("_", " "), words.quantity(q))
+            for n, q in e.unknowns.items()
+            if verdict.is_known(e, n)
+        ],
         "formula": e.formula,
         "share": words.percent(e.share_of_mismatch),
-        "sure": words.surely(e, ambiguous=ambiguous),
-        "bic": words.number(e.delta_bic),
-        "bar": pair_bar(
-            e.held_out_before,
-            e.held_out_after,
-            _longest((e.held_out_before, e.held_out_after)),
-            "error on data not used in the fit",
-        ),
-        "before": words.number(e.held_out_before),
-        "after": words.number(e.held_out_after),
+        "sure": verdict.surely(e, ambiguous=ambiguous),
+        "bic": words.number(e.delta_bic) if e.name not in verdict.EXCLUDED else "",
+        "fit": _pair("Not used in the fit", "m/s", before, after, _longest((before, after)))
+        if known
+        else None,
+        "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
+        "charts": residual_charts.of_effect(e),
         "rivals": [(words.effect_title(r.name), words.number(r.delta_bic)) for r in e.rivals],
         "cure": e.cure,
         "parameters": [
-            (n, f"{v:.6g}" if math.isfinite(v) else words.UNKNOWN)
+            (n, words.setting(v))
             for n, v in (e.parameters.items() if autopilot == "ardupilot" else ())
         ],
-        "intervals": [f"{words.fixed(a, 1)} to {words.fixed(b, 1)} s" for a, b in e.intervals[:8]],
-        "more": max(len(e.intervals) - 8, 0),
-        "where": [_where(w) for w in e.where[:3]],
+        "intervals": _intervals(e),
+        "more": max(len(e.intervals) - MOST_SPANS, 0),
+        "where": [] if e.intervals else [_where(w) for w in e.where[:3]],
     }
+
+
+def _intervals(e: Effect) -> list[str]:
+    return [f"{words.fixed(a, 1)} to {words.fixed(b, 1)} s" for a, b in e.intervals[:MOST_SPANS]]
+
+
+def _parameters(d: Diagnosis) -> list[dict[str, str]]:
+    """What to set, beside what is in force where that is known."""
+    c = d.calibration
+    in_force: dict[str, float] = {}
+    if c.parameters_known:
+        numbers = zip(SIX_NAMES, c.in_force_scale + c.in_force_offset, strict=True)
+        in_force = dict(numbers)
+    return [
+        {
+            "name": change.name,
+            "now": words.fixed(in_force[change.number], 4) if change.number in in_force else "",
+            "value": f"{round(change.value, 4) + 0.0:.4f}"
+            if change.number
+            else words.setting(change.value),
+            "reason": change.reason,
+            "withheld": change.withheld,
+        }
+        for change in changes(d)
+    ]
 
 
 def _six(d: Diagnosis) -> list[tuple[str, str, str, str, bool]]:

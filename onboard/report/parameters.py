@@ -24,12 +24,16 @@ INTEGERS = {"GPS1_DELAY_MS": 4, "INS_ACCEL_FILTER": 4, "INS_TCAL": 2, "COMPASS_O
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One parameter to set: its value, why, and why not to load it (empty: load it)."""
+    """One parameter to set: its value, why, and why not to load it (empty: load it).
+
+    ``number`` is its name in SIX_NAMES if it is one of the six.
+    """
 
     name: str
     value: float
     reason: str
     withheld: str = ""
+    number: str = ""
 
 
 def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
@@ -124,7 +128,7 @@ def _calibration(calibration: Calibration) -> Iterator[Change]:
     for name, words, value, sigma, seen in rows:
         if seen:
             spread = f", sigma {sigma:.2g}" if math.isfinite(sigma) else ""
-            yield Change(name, value, f"calibration: {words}{spread}", withheld)
+            yield Change(name, value, f"calibration: {words}{spread}", withheld, words)
 
 
 def _cures(diagnosis: Diagnosis, unclear: set[str]) -> Iterator[Change]:

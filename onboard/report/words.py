@@ -3,28 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from onboard.core.findings import Diagnosis, Effect, Quantity, Verdict
+from onboard.core.findings import Quantity
 
 UNKNOWN = "not known"
 DEGREE = math.pi / 180.0
-
-HEADLINES = {
-    Verdict.CLEAN: "Nothing is missing",
-    Verdict.EXPLAINED: "Something was missing, and it was found",
-    Verdict.PARTLY_EXPLAINED: "Something is missing, and a part of it was found",
-    Verdict.UNEXPLAINED: "Something is missing, and nothing known explains it",
-    Verdict.INSUFFICIENT: "This flight cannot tell",
-}
-
-VERDICTS: dict[Verdict, tuple[str, str]] = {
-    Verdict.CLEAN: ("green", "Nothing is missing: six numbers and timing explain this flight."),
-    Verdict.EXPLAINED: ("yellow", "Physics is missing from the model, and it was found."),
-    Verdict.PARTLY_EXPLAINED: ("yellow", "Physics is missing; a part of it was found."),
-    Verdict.UNEXPLAINED: ("red", "Something is missing, and nothing in the catalogue explains it."),
-    Verdict.INSUFFICIENT: ("red", "This flight is too quiet to say."),
-}
-"""Colour and one line for terminals."""
 
 EFFECTS = {
     "gps_latency": "GPS is late",
@@ -97,7 +81,10 @@ def number(value: float, digits: int = 3) -> str:
 
 def fixed(value: float, places: int) -> str:
     """``value`` with ``places`` decimals; words where it is not finite."""
-    return f"{value:.{places}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
+    if not math.isfinite(value):
+        return UNKNOWN
+    rounded = round(value, places) + 0.0  # no minus before a zero
+    return f"{rounded:.{places}f}".replace("-", "−")
 
 
 def signed(value: float, places: int) -> str:
@@ -108,6 +95,11 @@ def signed(value: float, places: int) -> str:
 def seconds(value: float, sigma: float) -> str:
     """A time in ms with its sigma."""
     return quantity(Quantity(value, sigma, "s")) if math.isfinite(value) else UNKNOWN
+
+
+def setting(value: float) -> str:
+    """A parameter's value as one types it; words where it is not finite."""
+    return f"{value + 0.0:.4g}" if math.isfinite(value) else UNKNOWN
 
 
 def percent(share: float) -> str:
@@ -133,67 +125,22 @@ def quantity(q: Quantity) -> str:
     elif q.unit.startswith("rad"):
         scale, unit = 1.0 / DEGREE, "°" + q.unit[3:]
     text = with_sigma(q.value * scale, q.sigma * scale)
-    return f"{text} {unit}".rstrip(" -")
+    return f"{text} {unit_in_words(unit)}".rstrip(" -")
 
 
-def strength(delta_bic: float) -> str:
-    """Words for a difference of BIC, after Kass and Raftery (1995)."""
-    if not math.isfinite(delta_bic):
-        return "evidence not known"
-    gain = -delta_bic
-    if gain > 10.0:
-        return "very strong evidence"
-    if gain > 6.0:
-        return "strong evidence"
-    if gain > 2.0:
-        return "some evidence"
-    return "weak evidence"
+def unit_in_words(unit: str) -> str:
+    """A unit with raised digits; nothing for a plain number."""
+    return "" if unit in ("1", "-") else unit.replace("^2", "²").replace("^3", "³")
 
 
-def surely(effect: Effect, *, ambiguous: bool) -> str:
-    """How sure one effect is, as a sentence."""
-    text = strength(effect.delta_bic).capitalize()
-    before, after = effect.held_out_before, effect.held_out_after
-    if math.isfinite(before) and math.isfinite(after) and before > 0.0:
-        less = 100.0 * (1.0 - after / before)
-        change = "lowers" if less >= 0.0 else "raises"
-        text += f"; it {change} the error on data not used in the fit by {abs(less):.0f} %"
-    if ambiguous:
-        text += "; but this flight cannot tell it from another effect"
-    return text + "."
+def listed(parts: Sequence[str]) -> str:
+    """``a``; ``a and b``; ``a, b and c``."""
+    *most, last = parts
+    return f"{', '.join(most)} and {last}" if most else last
 
 
-def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
-    """What is missing, how sure, what to change: three short paragraphs."""
-    m = diagnosis.mismatch
-    names = [effect_title(e.name) for e in diagnosis.effects]
-    if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return (
-            "There is too little motion with trusted GPS to say what is missing.",
-            "Not at all: no effect was accepted or ruled out.",
-            diagnosis.note or "Fly again, with accelerations, turns and climbs.",
-        )
-    if names:
-        missing = "; ".join(names) + "."
-    elif diagnosis.verdict is Verdict.CLEAN:
-        missing = "Scale, offset and timing explain this flight down to the noise."
-    else:
-        missing = "The residual is larger than noise, but no effect of the catalogue fits it."
-    sure = "The residual could not be judged on data not used in the fit."
-    if math.isfinite(m.held_out_before) and math.isfinite(m.held_out_after):
-        sure = (
-            f"On data not used in the fit, the error is {m.held_out_after:.2f} times the noise "
-            f"(it was {m.held_out_before:.2f} with scale and offset only; about 1 is ideal)."
-        )
-    if diagnosis.ambiguous:
-        sure += " Some effects could not be told apart, see below."
-    cures = [e.cure for e in diagnosis.effects if e.cure]
-    if cures:
-        change = "; ".join(dict.fromkeys(c.rstrip(".") for c in cures)) + "."
-    elif names:
-        change = "No parameter cures what was found."
-    elif diagnosis.verdict is Verdict.CLEAN:
-        change = "Nothing beyond the calibration itself."
-    else:
-        change = "Look at where the residual lives, below, for a cause."
-    return missing, sure, change
+def capital(sentence: str) -> str:
+    """The sentence with a large first letter, unless that is the name of an axis."""
+    if sentence[1:2] == " ":
+        return sentence
+    return sentence[:1].upper() + sentence[1:]

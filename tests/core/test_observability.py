@@ -158,3 +158,9 @@ def test_every_group_has_a_sentence_and_an_advice():
         sentence, advice = describe(members)
         assert all(SIX_NAMES[i] in sentence for i in members)
         assert advice
+
+
+def test_offsets_that_need_the_same_flight_are_said_in_one_sentence():
+    note = assess(np.zeros((6, 6))).note
+    assert note.count("turn through all headings") == 1
+    assert "x offset, y offset and z offset are not known well enough" in note

@@ -108,3 +108,21 @@ def test_the_parameter_file_reads_back(diagnosis):
     seen = sum(diagnosis.calibration.observable)
     assert sum(name.startswith("INS_ACC") for name in pairs) == seen
     assert float(pairs["GPS1_POS_X"]) == pytest.approx(0.8, abs=0.1)
+
+
+def test_held_out_errors_are_told_in_metres_per_second_too(diagnosis):
+    d = json.loads(document(diagnosis))
+    before, after = (d["mismatch"][f"held_out_velocity_rms_{x}_m_s"] for x in ("before", "after"))
+    steps = [r["held_out_velocity_rms_m_s"] for r in d["ladder"]]
+    assert steps[0] == before
+    assert steps[-1] == after
+    assert after < 0.5 * before
+    # Predicting what was not fitted is never easier than fitting it, but for chance.
+    assert after > 0.9 * d["mismatch"]["velocity_rms_after_m_s"]
+
+
+def test_the_effect_follows_the_data_that_are_left_without_it(diagnosis):
+    arm = next(e for e in diagnosis.effects if e.name == "gps_lever_arm")
+    left, made = arm.imprint.left, arm.imprint.made
+    assert np.nanstd(left - made) < 0.5 * np.nanstd(left)
+    assert arm.held_out_velocity_after < arm.held_out_velocity_before

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnoses_by_hand import diagnosis, effect, told_apart_not, unknown
 from html_page import Page
 
-from onboard.core.findings import Diagnosis, Quantity, Verdict
+from onboard.core.findings import Diagnosis, Imprint, Law, Quantity, Verdict
 from onboard.explain import explain
 from onboard.report.explain import explain_html
 
@@ -46,11 +47,52 @@ def test_says_what_how_sure_and_what_to_change():
         "GPS1_DELAY_MS = 210",
         "GPS averages its velocity",
         "no temperature in the recording",
-        "+ gps_latency",
+        "+ GPS is late gps_latency",
         "1.0123",
         "turning (60 s)",
     ):
         assert said in parsed.words
+
+
+def test_the_verdict_names_what_was_found_and_proves_it_in_metres_per_second():
+    html, parsed = page(diagnosis())
+    assert re.search(r"<h1>GPS is late</h1>", html)
+    for said in ("GPS is late by 210 ± 4 ms.", "0.055 m/s", "0.65 m/s", "−92\u00a0%".strip()):
+        assert said.replace("\u00a0", " ") in parsed.words
+    assert "0.650 m/s" in parsed.words  # the ladder's first step, held out
+
+
+def test_an_effect_is_drawn_over_the_data_that_it_explains():
+    t = np.arange(100) * 0.2
+    imprint = Imprint("earth_east", t, np.sin(t), 0.9 * np.sin(t))
+    law = Law(
+        signal="temperature",
+        unit="°C",
+        quantity="offset error",
+        quantity_unit="m/s^2",
+        x=np.linspace(20.0, 50.0, 30),
+        y={"x": np.linspace(-0.1, 0.2, 30), "y": np.full(30, np.nan)},
+        sigma={"x": np.full(30, 0.01), "y": np.full(30, np.nan)},
+    )
+    html, parsed = page(diagnosis(effects=(effect(imprint=imprint, law=law),)))
+    assert "East velocity: data and effect" in parsed.words
+    assert "Offset error over temperature" in parsed.words
+    assert len(re.findall('class="line (data|made)"', html)) == 2
+    assert len(re.findall('class="ribbon', html)) == 1
+
+
+@pytest.mark.parametrize("verdict", [Verdict.CLEAN, Verdict.INSUFFICIENT])
+def test_where_nothing_was_found_nothing_is_shaded(verdict):
+    html, parsed = page(diagnosis(verdict=verdict, effects=()))
+    assert "band located" not in html
+    assert "Where the mismatch lives" not in parsed.words
+
+
+def test_charts_say_in_words_what_they_show():
+    _, parsed = page(diagnosis())
+    drawn = [a for tag, a in parsed.tags if tag == "svg"]
+    assert drawn
+    assert all(a.get("role") == "img" and re.search(r"\d", a["aria-label"] or "") for a in drawn)
 
 
 def test_angles_are_shown_in_degrees():

@@ -1,0 +1,196 @@
+"""The verdict of a diagnosis in words: for the top of the page, and for terminals."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from onboard.core.findings import Diagnosis, Effect, Verdict
+from onboard.report.sizes import size_in_words
+from onboard.report.words import capital, effect_title, fixed, listed, number, setting, signed
+
+COLOURS = {
+    Verdict.CLEAN: "green",
+    Verdict.EXPLAINED: "yellow",
+    Verdict.PARTLY_EXPLAINED: "yellow",
+    Verdict.UNEXPLAINED: "red",
+    Verdict.INSUFFICIENT: "red",
+}
+"""For terminals."""
+EXCLUDED = ("gps_fault", "saturation")
+"""Effects that are seen in the data themselves, which are then left out of the fit."""
+MOST_NAMED = 2
+NOISE = 1.3
+"""Held-out residual, in units of the noise, up to which it may be called noise."""
+FEW = 0.5
+SAID_ABOVE = (
+    "Too little excitation",
+    "What was found does not explain",
+    "The residual is not noise",
+    "A formula of measured signals",
+)
+"""Sentences of the note that repeat the verdict."""
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The verdict as one short sentence."""
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return "This flight cannot tell"
+    if diagnosis.verdict is Verdict.CLEAN:
+        return "Nothing is missing"
+    named = [e for e in diagnosis.effects if e.name != "empirical"]
+    if not named:
+        return "Something is missing, and nothing known explains it"
+    titles = [effect_title(e.name) for e in named[:MOST_NAMED]]
+    # A name that begins with capitals keeps them in the middle of a sentence.
+    rest = [t if t[:2].isupper() else t[:1].lower() + t[1:] for t in titles[1:]]
+    more = len(named) - len(titles)
+    found = [titles[0], *rest, *([f"{more} more"] if more else [])]
+    if diagnosis.verdict is Verdict.EXPLAINED:
+        return listed(found) if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
+    return ", ".join(found) + ", and something else is missing"
+
+
+def missing(diagnosis: Diagnosis) -> list[str]:
+    """What is missing, with sizes: one sentence for each effect."""
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return ["There is too little motion with trusted GPS to say what is missing."]
+    said = [sized(e) + "." for e in diagnosis.effects]
+    if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
+        said.append("That is not all: what is left is more than noise.")
+    if said:
+        return said
+    if diagnosis.verdict is Verdict.CLEAN:
+        return ["Scale, offset and timing explain this flight down to the noise."]
+    return ["The residual is larger than noise, but no effect of the catalogue fits it."]
+
+
+def sized(effect: Effect) -> str:
+    """An effect with its size: ``GPS is late by 259 ± 8 ms``."""
+    if effect.name == "empirical":
+        return f"{effect_title(effect.name)}: {effect.formula}"
+    size = size_in_words(effect)
+    if not size:
+        return effect_title(effect.name)
+    joint = " " if size.startswith(("by ", "at ", "over ", "of ")) else ": "
+    return f"{effect_title(effect.name)}{joint}{size}"
+
+
+def is_known(effect: Effect, unknown: str) -> bool:
+    """Whether there is anything to say of an unknown.
+
+    A receiver that contradicts itself while the inertia is lost shows a fault without its size.
+    """
+    q = effect.unknowns[unknown]
+    return not (effect.name == "gps_fault" and unknown == "offset" and q.value == 0.0)
+
+
+def proof(diagnosis: Diagnosis) -> str:
+    """How sure: the residual on data that were not fitted, before and after."""
+    m = diagnosis.mismatch
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return "Not at all: no effect was accepted or ruled out."
+    before, after = m.held_out_velocity_before, m.held_out_velocity_after
+    noise = m.held_out_after
+    if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
+        return "The residual could not be judged on data not used in the fit."
+    left = "which is noise" if noise <= NOISE else f"{noise:.1f} times what noise would leave"
+    if diagnosis.verdict is Verdict.CLEAN:
+        said = f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s, {left}."
+    else:
+        said = (
+            f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s, {left}; "
+            f"it was {number(before, 2)} m/s with scale and offset only ({fall(before, after)})."
+        )
+    if diagnosis.ambiguous:
+        said += " Some effects could not be told apart, see below."
+    return said
+
+
+def fall(before: float, after: float) -> str:
+    """By how much something has become less: ``−47 %``."""
+    if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
+        return "not known"
+    change = 100.0 * (after / before - 1.0)
+    return f"{signed(change, 0) if abs(change) >= 0.5 else '0'}\u00a0%"
+
+
+def cures(diagnosis: Diagnosis, *, parameters: bool = True) -> list[str]:
+    """What to do, one sentence for each effect; ``parameters`` names those to set."""
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
+    out = []
+    for e in diagnosis.effects:
+        settings = ", ".join(
+            f"{n} = {setting(v)}"
+            for n, v in e.parameters.items()
+            if math.isfinite(v) and parameters
+        )
+        if e.cure or settings:
+            out.append(_sentence(e.cure, settings))
+    if out:
+        return list(dict.fromkeys(out))
+    if diagnosis.effects:
+        return ["No parameter cures what was found."]
+    if diagnosis.verdict is Verdict.CLEAN:
+        return ["Nothing beyond the calibration itself."]
+    return ["Look at where the residual lives for a cause."]
+
+
+def _sentence(cure: str, settings: str) -> str:
+    text = capital(cure.rstrip("."))
+    if not settings:
+        return f"{text}."
+    return f"{text}: {settings}." if text else f"Set {settings}."
+
+
+def to_fly(diagnosis: Diagnosis) -> list[str]:
+    """What this flight did not show, each with what to fly: sentences."""
+    return [s for s in _sentences(diagnosis.note) if ":" in s]
+
+
+def remarks(diagnosis: Diagnosis) -> list[str]:
+    """What else there is to say: the other sentences of the note, and how little was usable."""
+    out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(SAID_ABOVE)]
+    fixes = len(diagnosis.series.t)
+    used = int(np.any(np.isfinite(diagnosis.series.after), axis=1).sum())
+    if fixes and used < FEW * fixes:
+        out.append(f"Only {used} of {fixes} GPS fixes could be used.")
+    return out
+
+
+def _sentences(note: str) -> list[str]:
+    parts = (p.strip() for p in re.split(r"(?<=\.)\s+", note))
+    # A calibration that points here is no news here.
+    return [capital(p) for p in parts if p and "see onboard explain" not in p]
+
+
+def strength(delta_bic: float) -> str:
+    """Words for a difference of BIC, after Kass and Raftery (1995)."""
+    if not math.isfinite(delta_bic):
+        return "evidence not known"
+    gain = -delta_bic
+    if gain > 10.0:
+        return "very strong evidence"
+    if gain > 6.0:
+        return "strong evidence"
+    if gain > 2.0:
+        return "some evidence"
+    return "weak evidence"
+
+
+def surely(effect: Effect, *, ambiguous: bool) -> str:
+    """How sure one effect is, as a sentence."""
+    if effect.name in EXCLUDED:
+        return "Seen in the measurements themselves; they were left out of the fit."
+    text = strength(effect.delta_bic).capitalize()
+    before, after = effect.held_out_velocity_before, effect.held_out_velocity_after
+    if math.isfinite(before) and math.isfinite(after) and before > 0.0:
+        change = "lowers" if after <= before else "raises"
+        text += f"; it {change} the velocity error on flight not used in the fit by "
+        text += f"{fixed(abs(100.0 * (1.0 - after / before)), 0)} %"
+    if ambiguous:
+        text += "; but this flight cannot tell it from another effect"
+    return text + "."

@@ -1,0 +1,101 @@
+"""Effects and verdicts in words: true to size, unit and sign, for every name of the vocabulary."""
+
+from __future__ import annotations
+
+import pytest
+from diagnoses_by_hand import NAN, diagnosis, effect
+
+from onboard.core.findings import Quantity, Verdict
+from onboard.report.sizes import size_in_words
+from onboard.report.verdict import cures, headline, missing, proof, remarks, sized, to_fly
+from onboard.report.words import EFFECTS
+
+
+def of(name: str, unit: str, /, intervals=(), **values: float):
+    unknowns = {k: Quantity(v, 0.01 * abs(v) or 0.01, unit) for k, v in values.items()}
+    return effect(name, unknowns=unknowns, intervals=intervals)
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (of("gps_latency", "s", delay=0.2), "by 200 ± 2 ms"),
+        (of("gps_latency", "s", delay=-0.2), "by −200 ± 2 ms"),
+        (of("gps_lever_arm", "m", x=0.8, y=-0.5), "0.80 m forward and 0.50 m left"),
+        (of("gps_lever_arm", "m", x=1, y=2, z=-4), "1.00 m forward, 2.00 m right and 4.00 m up"),
+        (of("gps_lever_arm", "m", x=-0.8, y=0.5, z=0.0), "0.80 m back and 0.50 m right"),
+        (of("mount_tilt", "rad", roll=0.0349066, pitch=-0.0523599), "by roll 2.00, pitch −3.00°"),
+        (of("heading_error", "rad", yaw=0.0872665), "by 5.00 ± 0.05°"),
+        (of("clock_skew", "1", rate=2e-4), "by 200 ± 2 ppm"),
+        (of("scale_nonlinearity", "1/g", x=0.01, y=0.0, z=0.02), "x 1.00, z 2.00 % per g"),
+        (of("saturation", "m/s^2", ((1.0, 2.0), (3.0, 4.0)), limit=39.2), "of 39.2 m/s², 2 times"),
+        (of("gps_fault", "m/s", ((10.0, 25.0),), offset=4.0), "by 4.0 m/s, 15 s in all"),
+        (of("gps_fault", "m/s", ((10.0, 25.0),), offset=0.0), "15 s in all"),
+    ],
+)  # fmt: skip
+def test_sizes_are_said_as_people_say_them(made, said):
+    assert size_in_words(made) == said
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_every_effect_can_be_said_with_and_without_a_known_size(name):
+    known = of(name, "m/s^2", ((1.0, 2.0),), x=0.3, y=0.1)
+    assert sized(known).startswith(EFFECTS[name])
+    unknown = effect(name, unknowns={"x": Quantity(NAN, NAN, "m/s^2")})
+    assert "nan" not in sized(unknown)
+
+
+def test_a_jump_says_when_and_leaves_out_axes_that_did_not_jump():
+    jump = effect(
+        "bias_step",
+        unknowns={
+            "time": Quantity(187.6, 0.5, "s"),
+            "x": Quantity(0.353, 0.002, "m/s^2"),
+            "y": Quantity(0.001, 0.002, "m/s^2"),
+        },
+    )
+    assert sized(jump) == "The offset jumped at 188 s by x 0.353 m/s²"
+
+
+def test_the_headline_names_what_was_found():
+    late, tilt = effect("gps_latency"), effect("mount_tilt")
+    assert headline(diagnosis(effects=(late, tilt))) == (
+        "GPS is late, and the accelerometer is tilted against the attitude"
+    )
+    assert headline(diagnosis(verdict=Verdict.PARTLY_EXPLAINED)).endswith("else is missing")
+    three = headline(diagnosis(effects=(late, tilt, effect("bias_ramp"))))
+    assert three.endswith("and 1 more")
+
+
+def test_a_formula_without_a_name_is_no_finding():
+    unnamed = effect("empirical", formula="throttle * w_z")
+    d = diagnosis(verdict=Verdict.UNEXPLAINED, effects=(unnamed,))
+    assert "nothing known" in headline(d)
+    assert "throttle * w_z" in missing(d)[0]
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_every_verdict_has_words_for_everything(verdict):
+    effects = () if verdict in (Verdict.CLEAN, Verdict.INSUFFICIENT) else (effect(),)
+    d = diagnosis(verdict=verdict, effects=effects)
+    assert headline(d)
+    assert missing(d)
+    assert proof(d)
+    assert cures(d)
+
+
+def test_parameters_are_left_out_where_they_are_not_the_autopilots():
+    assert "GPS1_DELAY_MS" in cures(diagnosis())[0]
+    other = diagnosis(effects=(effect(cure="tell it the delay"),))
+    assert cures(other, parameters=False) == ["Tell it the delay."]
+
+
+def test_the_note_is_sorted_into_what_to_fly_and_the_rest():
+    d = diagnosis(
+        verdict=Verdict.PARTLY_EXPLAINED,
+        note="what was found does not explain all of the residual. the flight contradicts itself: "
+        "something is missing from the model, see onboard explain. x scale is not excited enough: "
+        "brake hard. a remark.",
+    )
+    assert to_fly(d) == ["x scale is not excited enough: brake hard."]
+    assert [r for r in remarks(d) if "fixes" not in r] == ["a remark."]
