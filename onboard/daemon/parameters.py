@@ -80,6 +80,11 @@ class ParameterWatch:
         return self._answered.issuperset((*REQUIRED, *MEANING))
 
     @property
+    def confirmed(self) -> set[str]:
+        """Names whose values were read since the autopilot was (again) there."""
+        return (self._answered & self.values.keys()) - self._absent.keys()
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """Names of the first accelerometer that are needed and not known."""
         return tuple(name for name in FIRST if name not in self.values)

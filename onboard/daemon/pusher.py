@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import uuid
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from onboard.core.result import Calibration
@@ -24,7 +25,16 @@ from onboard.errors import RefusedError, StateError
 from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import SendAction, parameter_event, parameter_message
-from onboard.push.entries import Entry, Planned, Purpose, Recovery, Result, Verdict, Watched
+from onboard.push.entries import (
+    Entry,
+    Planned,
+    Purpose,
+    Recovery,
+    Result,
+    Verdict,
+    Watched,
+    audit,
+)
 from onboard.push.journal import Journal
 from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan
@@ -83,6 +93,8 @@ class Pusher:
         self._outbox: list[Message] = []
         self._recoveries: list[Recovery] = []
         self._condemned: dict[int, Planned] = {}
+        self._not_before: dict[str, float] = {}
+        self._to_audit = False
         self._closing = False
         self.idle = asyncio.Event()
         self.idle.set()
@@ -96,8 +108,10 @@ class Pusher:
     # What the link calls
 
     def start(self, system: int, component: int, now: float) -> None:  # noqa: ARG002 - the participants' signature
-        """An autopilot is there (again): open transactions may be taken up."""
+        """An autopilot is there (again): open transactions may be taken up, pushes have to show."""
         self._target = (system, component)
+        self._not_before.clear()
+        self._to_audit = True
         self._read_journal()
 
     def feed(self, message: Message, now: float) -> Sequence[Message]:
@@ -144,8 +158,13 @@ class Pusher:
         condition: VehicleCondition,
         diagnosed: Mapping[int, Diagnosed],
         diagnosing: Sequence[int] = (),
+        confirmed: Collection[str] | None = None,
     ) -> None:
-        """Propose anew; start what nothing holds back: unfinished business first."""
+        """Propose anew; start what nothing holds back: unfinished business first.
+
+        ``confirmed`` are names whose values were read since the autopilot was (again) there;
+        None: all.
+        """
         self._condition = condition
         report = VehicleReport(
             condition.armed,
@@ -168,9 +187,10 @@ class Pusher:
         )
         if self._transaction is not None or self._closing or proposals.forbidden:
             return
+        if self._to_audit and not self._recoveries:
+            self._audit(parameters, parameters.keys() if confirmed is None else confirmed)
         if self._recoveries:
-            if not self._against_now():
-                self._resume(self._recoveries.pop(0), now)
+            self._take_up(now)
         elif self._condemned:
             imu, planned = next(iter(self._condemned.items()))
             if not self._against_now() and now >= proposals.standing(imu).not_before:
@@ -268,6 +288,33 @@ class Pusher:
                 self._condemned[imu] = planned
                 self._proposals.refuse(imu, f"after the last push {verdict.sentence}")
 
+    def _audit(self, values: Mapping[str, float], confirmed: Collection[str]) -> None:
+        """Whether what was pushed is still there, now that the autopilot has (perhaps) rebooted."""
+        self._to_audit = False
+        for imu in range(1, 6):
+            planned = self._journal.last_completed(imu)
+            if planned is None or not planned.plan.wanted.keys() <= set(confirmed):
+                continue
+            self.counters["audits"] += 1
+            recovery = audit(planned, values)
+            if recovery is not None:
+                text = f"IMU {imu}: values that were written are gone: the push is taken back"
+                self._notices.post("push_not_stored", text, warning=True)
+                self._recoveries.append(recovery)
+            elif all(values[name] == value for name, value in planned.plan.wanted.items()):
+                text = f"IMU {imu}: the autopilot has the values of the last push"
+                self._notices.post("push_stored", text)
+
+    def _take_up(self, now: float) -> None:
+        """The first open transaction whose pause is over and whose vehicle may be there."""
+        if self._against_now():
+            return
+        for recovery in self._recoveries:
+            if now >= self._not_before.get(recovery.transaction, now):
+                self._recoveries.remove(recovery)
+                self._resume(recovery, now)
+                return
+
     def _begin(
         self, plan: PushPlan, purpose: Purpose, now: float, *, in_flight: bool = False
     ) -> None:
@@ -348,6 +395,12 @@ class Pusher:
             self._proposals.succeeded(imu)
         else:
             self._proposals.failed(imu, now)
+        if outcome.open:  # once more after a pause; of another vehicle when one turns up anew
+            other = outcome.result is Result.OTHER_VEHICLE
+            pause_ends = self._proposals.standing(imu).not_before
+            self._not_before[outcome.transaction] = math.inf if other else pause_ends
+        if outcome.reason is Reason.RESTARTED:
+            self._to_audit = True  # one audit may have found more than one accelerometer
         condemned = self._condemned.get(imu)
         if condemned is not None and outcome.reason is Reason.CHANGED_BY_OTHER:
             sentence = "not taken back: somebody has changed the parameters since"

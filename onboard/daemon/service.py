@@ -220,6 +220,7 @@ class Service:
                 condition=condition,
                 diagnosed=learned.diagnosed,
                 diagnosing=learned.diagnosing,
+                confirmed=self._parameters.confirmed,
             )
         if self.server is not None:
             self.server.publish()

@@ -42,6 +42,9 @@ NO_POSITION_FIX = 1
 DETECTED = 3
 """GPS_JAMMING_STATE and GPS_SPOOFING_STATE: detected and not mitigated."""
 ON_GROUND, LANDED_UNKNOWN = 1, 0
+PARAM_VALUE = MESSAGE_IDS["PARAM_VALUE"]
+EARLY_SOURCES, EARLY_PARAMETERS = 8, 3000
+"""How much is kept for a sender whose HEARTBEAT is still to come."""
 NOTHING: Samples = ()
 
 
@@ -50,8 +53,9 @@ class Decoder:
 
     Only the autopilot is listened to: the system and component given, or else those of the
     first HEARTBEAT that comes from an autopilot (gimbals, ground stations and companions
-    send heartbeats, too).  Until then nothing comes out.  Messages without a time of their
-    own get the latest boot time heard.  ``refused`` counts what could not be used, by name.
+    send heartbeats, too).  Until then nothing comes out but what has no time: parameters that
+    were told before are told then.  Messages without a time of their own get the latest boot
+    time heard.  ``refused`` counts what could not be used, by name.
     """
 
     names: tuple[str, ...] = (
@@ -82,6 +86,7 @@ class Decoder:
         self._system = system
         self._component = component
         self._has_battery_status = False
+        self._early: dict[tuple[int, int], dict[str, Message]] = {}
         self._decoders: dict[int, Callable[[Message], Samples]] = {
             MESSAGE_IDS[name]: getattr(self, f"_{name.lower()}") for name in self.names
         }
@@ -101,9 +106,24 @@ class Decoder:
         if (
             message.get_srcComponent() == self._component
             and message.get_srcSystem() == self._system
-        ) or self._adopts(message):
+        ):
             return decoder(message)
+        if self._adopts(message):
+            early = self._early.pop((message.get_srcSystem(), message.get_srcComponent()), {})
+            self._early.clear()
+            told = tuple(sample for m in early.values() for sample in self._param_value(m))
+            return told + decoder(message)
+        if self._component is None and message.get_msgId() == PARAM_VALUE:
+            self._keep(message)
         return NOTHING
+
+    def _keep(self, message: Message) -> None:
+        """A parameter of somebody who may turn out to be the autopilot."""
+        source = message.get_srcSystem(), message.get_srcComponent()
+        if len(self._early) < EARLY_SOURCES or source in self._early:
+            kept = self._early.setdefault(source, {})
+            if len(kept) < EARLY_PARAMETERS or message.param_id in kept:
+                kept[message.param_id] = message
 
     def _adopts(self, message: Message) -> bool:
         """Settle on the sender if it is the first autopilot heard (of the system asked for)."""

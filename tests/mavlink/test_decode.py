@@ -231,6 +231,14 @@ class TestSource:
             assert decoder.decode(received(attitude(20_000), *source)) == ()
         assert decoder.clock.latest == 10.0
 
+    def test_parameters_told_before_the_first_heartbeat_are_not_lost(self):
+        decoder = Decoder()
+        for source, value in (((1, 1), 0.5), ((1, 191), 7.0), ((1, 1), 0.25)):
+            message = mavlink.MAVLink_param_value_message(b"GPS1_POS_X", value, 9, 1000, 65535)
+            assert decoder.decode(received(message, *source)) == ()
+        assert decoder.decode(received(heartbeat())) == (ParameterValue("GPS1_POS_X", 0.25, None),)
+        assert decode(decoder, heartbeat()) == ()
+
     def test_a_system_asked_for_is_waited_for(self):
         decoder = Decoder(system=2)
         decoder.decode(received(heartbeat(), system=1))

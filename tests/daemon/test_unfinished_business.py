@@ -1,0 +1,151 @@
+"""What earlier pushes still ask for: after crashes, power cuts, reboots, and of other vehicles."""
+
+import asyncio
+
+import pytest
+from daemons import calibration, convinced, until
+from standing_vehicle import Vehicle
+
+from onboard.core.accelerometer import parameter_names
+from onboard.daemon.configuration import from_mapping
+from onboard.daemon.service import Service
+
+SIX = parameter_names(1).six
+WANTED = calibration()
+
+
+def in_force(vehicle):
+    return tuple(vehicle.parameters[name] for name in SIX)
+
+
+def notices(service, kind):
+    return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
+
+
+async def ticks(service, number):
+    """Let the service judge so many times."""
+    count = 0
+    judged = service._pusher.consider
+
+    def counted(*args, **kwargs):
+        nonlocal count
+        count += 1
+        return judged(*args, **kwargs)
+
+    service._pusher.consider = counted
+    await until(lambda: count >= number)
+    service._pusher.consider = judged
+
+
+async def crashed_in_the_middle(document, vehicle):
+    """A push of which half is written, by a daemon that is no more."""
+    vehicle.mute_after_sets = 3
+    service = Service(from_mapping(document, source="test"))
+    task = asyncio.create_task(service.run())
+    convinced(service, WANTED)
+    await until(lambda: len(vehicle.sets) == 3)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    vehicle.mute_after_sets = None
+    vehicle.sets.clear()
+
+
+async def pushed(service, vehicle):
+    convinced(service, WANTED)
+    await until(lambda: service.snapshot().push.can_roll_back == (1,))
+    assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+
+
+async def test_an_open_write_of_another_vehicle_is_said_once_and_waits(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        await crashed_in_the_middle(document, vehicle)
+        vehicle.parameters["INS_ACC_ID"] = 4711.0  # somebody has swapped the board
+        async with daemon(document) as service:
+            await until(lambda: notices(service, "push_other_vehicle"))
+            await ticks(service, 20)
+            assert service.snapshot().counters["resumed"] == 1
+            assert vehicle.sets == []
+            assert service.snapshot().push.state == "interrupted"
+            # The right board is back: that takes a power cycle, and so a reboot.
+            vehicle.parameters["INS_ACC_ID"] = 2_700_001.0
+            vehicle.reboot()
+            await until(lambda: service.snapshot().push.state == "idle")
+            assert "rolled back" in service.snapshot().push.last_outcome
+
+
+async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        await crashed_in_the_middle(document, vehicle)
+        vehicle.mute_after_sets = 0  # it can be read, but takes no writes
+        async with daemon(document) as service:
+            await until(lambda: notices(service, "push_interrupted"))
+            await ticks(service, 20)
+            assert service.snapshot().counters["resumed"] == 1
+            vehicle.mute_after_sets = None
+            service._pusher._not_before.clear()  # the pause is over
+            await until(lambda: service.snapshot().push.state == "idle")
+            assert "rolled back" in service.snapshot().push.last_outcome
+
+
+async def test_what_a_reboot_has_kept_stays(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await pushed(service, vehicle)
+        vehicle.sets.clear()
+        vehicle.reboot()
+        await until(lambda: notices(service, "push_stored"))
+        assert vehicle.sets == []
+        assert service.snapshot().push.can_roll_back == (1,)
+
+
+async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        await pushed(service, vehicle)
+        vehicle.parameters["INS_ACCSCAL_Y"] = before[1]  # was not stored
+        vehicle.reboot()
+        await until(lambda: notices(service, "push_not_stored"))
+        await until(lambda: service.snapshot().push.can_roll_back == ())
+        assert in_force(vehicle) == before
+        kinds = [line.kind for line in service.snapshot().journal]
+        assert kinds[-1] == "closed"
+
+
+async def test_a_reboot_while_the_daemon_was_off_is_audited_at_its_start(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            await pushed(service, vehicle)
+        for name, value in zip(SIX, before, strict=True):
+            vehicle.parameters[name] = value
+        vehicle.sets.clear()
+        async with daemon(document) as again:
+            await until(lambda: notices(again, "push_not_stored"))
+            await until(lambda: again.snapshot().push.can_roll_back == ())
+            assert vehicle.sets == [], "all six are old already: it only has to be written down"
+
+
+async def test_what_somebody_has_set_since_is_not_touched_by_an_audit(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await pushed(service, vehicle)
+        await service.reject((1,))
+        vehicle.sets.clear()
+        vehicle.parameters["INS_ACCSCAL_Y"] = 1.03125
+        vehicle.reboot()
+        await until(lambda: service.snapshot().parameters["INS_ACCSCAL_Y"] == 1.03125)
+        await ticks(service, 20)
+        assert not notices(service, "push_not_stored")
+        assert vehicle.sets == []
+
+
+async def test_a_daemon_started_in_flight_waits_for_the_landing(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        vehicle.armed, vehicle.landed = True, False
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            convinced(service, WANTED)
+            await until(lambda: service.snapshot().push.proposals)
+            await ticks(service, 20)
+            assert vehicle.sets == []
+            assert in_force(vehicle) == before
+            vehicle.armed, vehicle.landed = False, True
+            await until(lambda: service.snapshot().push.can_roll_back == (1,))
