@@ -18,11 +18,12 @@ AXES = ("X", "Y", "Z")
 
 @dataclass(frozen=True, slots=True)
 class ParameterNames:
-    """Names of the parameters of one accelerometer (``imu`` counts from 1)."""
+    """Names of the parameters of one accelerometer and of the gyroscope of the same number."""
 
     scale: tuple[str, str, str]
     offset: tuple[str, str, str]
     device_id: str
+    gyro_id: str
 
     @property
     def six(self) -> tuple[str, ...]:
@@ -43,13 +44,12 @@ def parameter_names(imu: int) -> ParameterNames:
         scale, offset, device = f"INS_ACC{n}SCAL_", f"INS_ACC{n}OFFS_", f"INS_ACC{n}_ID"
     else:
         scale, offset, device = f"INS{imu}_ACCSCAL_", f"INS{imu}_ACCOFFS_", f"INS{imu}_ACC_ID"
-    if imu == 1:
-        device = "INS_ACC_ID"
     x, y, z = AXES
     return ParameterNames(
         scale=(scale + x, scale + y, scale + z),
         offset=(offset + x, offset + y, offset + z),
         device_id=device,
+        gyro_id=device.replace("ACC", "GYR"),
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from onboard.core.engine import Chunk
 from onboard.core.frames import untrimmed_rotation, untrimmed_rotation_dcm
+from onboard.core.gyroscopes import rates_at
 from onboard.core.parameters import ParametersInForce
 from onboard.core.samples import (
     AirData,
@@ -45,6 +46,7 @@ class Assembly:
         self._fixes = FixTrack()
         self._over_mavlink = False
         self._fresh: dict[int, float] = {}
+        self._gyro: dict[int, int] = {}
         self._R_bs: tuple[float, Array | None] = (0.0, None)
 
     def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
@@ -130,8 +132,8 @@ class Assembly:
             np.array([f.latitude for f in fixes]),
         )
         out: dict[int, list[Chunk]] = {}
-        for imu, track in live.items():
-            chunks = self._cut(imu, track, even, trusted, parameters)
+        for imu in live:
+            chunks = self._cut(imu, live, even, trusted, parameters)
             if chunks:
                 out[imu] = chunks
         keep = float(t[-1]) - REACH_S - 0.3
@@ -144,13 +146,13 @@ class Assembly:
     def _cut(
         self,
         imu: int,
-        track: ImuTrack,
+        live: dict[int, ImuTrack],
         fixes: Fixes,
         trusted: NDArray[np.bool_],
         parameters: ParametersInForce,
     ) -> list[Chunk]:
         """Chunks of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
-        stamps, rows = track.arrays()
+        stamps, rows = live[imu].arrays()
         if len(stamps) < 8 or len(self._attitude) < 2:
             return []
         # The median: a gap does not make the rest of the stream slow.
@@ -164,11 +166,19 @@ class Assembly:
                 continue
             begin, end = t[piece[0]], t[piece[-1]]
             inside = np.flatnonzero((fixes.t >= begin + REACH_S - 0.1) & (fixes.t <= end - 0.3))
+            if len(inside) == 0:
+                continue
+            needed = piece[_needed(t[piece], fixes.t[inside])]
+            if len(needed) < 8:
+                continue
+            gyro, turning = self._rates(imu, live, stamps[needed], rows[needed], parameters)
             known = fixes.t[inside] >= self._attitude.first + REACH_S
             good = inside[trusted[inside] & known]
-            fresh = len(inside) == 0 or self._fresh.get(imu) != float(fixes.t[inside[0]])
+            # Another gyroscope has another bias: the filter's belongs to the one before.
+            same = self._gyro.get(imu, gyro) == gyro
+            fresh = not same or self._fresh.get(imu) != float(fixes.t[inside[0]])
             # Flight without a fix to be believed goes on inertially, if anything went before.
-            if len(inside) == 0 or (fresh and len(good) == 0):
+            if fresh and len(good) == 0:
                 continue
             # A filter can only start where GPS is to be believed.
             first = int(good[0]) if fresh else int(inside[0])
@@ -178,22 +188,34 @@ class Assembly:
             chosen = fixes.between(first, last + 1)
             out.append(
                 Chunk(
-                    self._stretch(t[piece], rows[piece], chosen, parameters, imu),
+                    self._stretch(t[needed], turning, chosen, parameters, imu),
                     chosen,
                     trusted[first : last + 1],
                     fresh,
                 )
             )
-            self._fresh[imu] = float(fixes.t[last])
+            self._fresh[imu], self._gyro[imu] = float(fixes.t[last]), gyro
         return out
+
+    def _rates(
+        self,
+        imu: int,
+        live: dict[int, ImuTrack],
+        at: Array,
+        rows: Array,
+        parameters: ParametersInForce,
+    ) -> tuple[int, Array]:
+        """Whose gyroscope it is, and rows with its rates instead of the accelerometer's own."""
+        first = min(live)
+        if imu == first or parameters.one_chip(imu):
+            return imu, rows
+        w = rates_at(live[first], at, IMU_GAP_S)
+        return (imu, rows) if w is None else (first, np.hstack([w, rows[:, 3:]]))
 
     def _stretch(
         self, t: Array, rows: Array, fixes: Fixes, parameters: ParametersInForce, imu: int
     ) -> Stretch:
-        cut = slice(
-            int(np.searchsorted(t, fixes.t[0] - REACH_S - 0.1)),
-            int(np.searchsorted(t, fixes.t[-1] + AHEAD_S)),
-        )
+        cut = _needed(t, fixes.t)
         t, rows = t[cut], rows[cut]
         w_b = rows[:, :3]
         lag = parameters.gyro_lag
@@ -230,3 +252,11 @@ class Assembly:
         if self._over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
             pitch_trim = float(np.deg2rad(parameters.get("PTCH_TRIM_DEG", default=0.0)))
         return untrimmed_rotation(roll, pitch, yaw, parameters.trim, pitch_trim)
+
+
+def _needed(t: Array, epochs: Array) -> slice:
+    """The samples at ``t`` that fixes at ``epochs`` need, to either side of them."""
+    return slice(
+        int(np.searchsorted(t, epochs[0] - REACH_S - 0.1)),
+        int(np.searchsorted(t, epochs[-1] + AHEAD_S)),
+    )

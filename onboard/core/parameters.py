@@ -49,6 +49,17 @@ class ParametersInForce:
         """INS_ACCn_ID as reported; None if it was not."""
         return self.values.get(parameter_names(imu).device_id)
 
+    def one_chip(self, imu: int) -> bool:
+        """True if this IMU's accelerometer and gyroscope are known to be one chip.
+
+        The low 16 bits of a device id are bus type, bus and address on it (AP_HAL::Device).
+        """
+        names = parameter_names(imu)
+        ids = [
+            int(self.values.get(name, 0.0)) & 0xFFFF for name in (names.device_id, names.gyro_id)
+        ]
+        return ids[0] == ids[1] != 0
+
     def six(self, imu: int) -> SixParameters:
         """Scale and offset in force; one and zero where they were never reported."""
         names = parameter_names(imu)
