@@ -52,6 +52,9 @@ class Simulator(Protocol):
     async def land(self) -> None:
         """Lands; returns when it has disarmed."""
 
+    async def reboot(self) -> None:
+        """Reboots the autopilot, disarmed; returns when it runs again."""
+
     async def parameter(self, name: str) -> float:
         """The value of a parameter."""
 
@@ -160,6 +163,12 @@ class _Builtin:
         while self.autopilot.armed or self.autopilot.flying:
             await self._step()
 
+    async def reboot(self) -> None:
+        before = self.autopilot.parameters["STAT_BOOTCNT"]
+        await self._do(lambda autopilot: autopilot.request_reboot())
+        while self.autopilot.parameters["STAT_BOOTCNT"] == before:
+            await self._step()
+
     async def parameter(self, name: str) -> float:
         return self.autopilot.parameters[name]
 
@@ -200,6 +209,9 @@ class _Ardupilot:
 
     async def land(self) -> None:
         await self._pilot.land()
+
+    async def reboot(self) -> None:
+        await self._pilot.reboot()
 
     async def parameter(self, name: str) -> float:
         return await self._pilot.parameter(name)

@@ -36,7 +36,10 @@ MODES = {
     "copter": {"guided": 4, "land": 9},
     "plane": {"take off": 13, "fly by wire": 6, "land": 26},
 }
-ARM_DISARM, TAKE_OFF, SET_MODE, SET_INTERVAL = 400, 22, 176, 511
+ARM_DISARM, TAKE_OFF, SET_MODE, SET_INTERVAL, REBOOT = 400, 22, 176, 511, 246
+INTERVALS = ((30, 50_000), (33, 100_000), (24, 200_000))
+"""Messages that it needs, by number, us."""
+REBOOT_TRIES, REBOOT_PAUSE = 60, 1.0
 GUIDED_VELOCITY_AND_YAW = 0b0000_1001_1100_0111
 """Type mask of SET_POSITION_TARGET_LOCAL_NED: velocity and yaw count, nothing else."""
 
@@ -85,7 +88,7 @@ class Pilot:
     async def _watch(self) -> None:
         for name in ("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "STATUSTEXT"):
             self._tasks.append(asyncio.create_task(self._follow(name), name=f"pilot: {name}"))
-        for message, interval_us in ((30, 50_000), (33, 100_000), (24, 200_000)):
+        for message, interval_us in INTERVALS:
             await self.command(SET_INTERVAL, message, interval_us)
 
     async def _follow(self, name: str) -> None:
@@ -232,6 +235,27 @@ class Pilot:
             if not self.armed or (self.standing and await self.command(ARM_DISARM, 0)):
                 break
         await self._until(lambda: not self.armed, "disarming after the landing")
+
+    async def reboot(self) -> None:
+        """Reboots the autopilot and waits until its clock has begun anew.
+
+        Raises:
+            SitlError: it does not come back.
+        """
+        before = self.time
+        fields = {f"param{i}": 1.0 if i == 1 else 0.0 for i in range(1, 8)}
+        fields |= {"target_system": 1, "target_component": 1, "command": REBOOT, "confirmation": 0}
+        # Not as a command that is waited for: it may be gone before its answer is.
+        await self._direct.send_message(_message("COMMAND_LONG", fields))
+        for _ in range(REBOOT_TRIES):
+            await asyncio.sleep(REBOOT_PAUSE)
+            if self.time < before:
+                return
+            # What was asked for before the reboot is forgotten: nothing tells the time.
+            for message, interval_us in INTERVALS:
+                fields |= {"command": SET_INTERVAL, "param1": message, "param2": interval_us}
+                await self._direct.send_message(_message("COMMAND_LONG", fields))
+        raise SitlError("waited in vain for the reboot")
 
     async def _velocity_step(self) -> None:
         """One velocity and heading for a few seconds, kept within a band of heights."""

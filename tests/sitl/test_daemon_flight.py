@@ -1,0 +1,82 @@
+"""The main job on either simulator: fly, learn, land, write, read back, and a reboot keeps it.
+
+Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from onboard.core.accelerometer import parameter_names
+from sitl import harness
+
+DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
+"""How a daemon is run is known to its own tests."""
+SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
+TRUTH = np.array(SCALE + OFFSET)
+SIX = parameter_names(1).six
+FLIGHT_S = 200.0
+
+
+@pytest.fixture
+def kind(request):
+    chosen = request.config.getoption("--sitl")
+    reason = harness.unavailable(chosen, "copter")
+    if reason:
+        pytest.skip(reason)
+    return chosen
+
+
+@pytest.fixture
+def document(tmp_path):
+    """A flight of minutes need not show everything as well as the default policy asks for."""
+    return {
+        "push": {"scale_sigma_max": 0.02, "offset_sigma_max": 0.15},
+        "state": {"directory": str(tmp_path / "state")},
+        "http": {"enabled": False},
+    }
+
+
+def first(service):
+    return next((p for p in service.snapshot().push.proposals if p.imu == 1), None)
+
+
+def told(service, kind):
+    return [n.text for n in service.snapshot().notices if n.kind == kind and "IMU 1" in n.text]
+
+
+@pytest.mark.slow
+async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, monkeypatch):
+    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
+    from daemons import running, until  # noqa: PLC0415 - on the path from here on
+
+    speedup = 15 if kind == "builtin" else 6
+    async with harness.simulator(kind, "copter", speedup=speedup) as sitl:
+        await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
+        document["link"] = {"endpoints": [sitl.endpoint]}
+        async with running(document) as service:
+            await until(lambda: service.snapshot().parameters.keys() >= set(SIX))
+            before = [await sitl.parameter(name) for name in SIX]
+            await sitl.fly(FLIGHT_S)
+            assert [await sitl.parameter(name) for name in SIX] == before, "not in flight"
+            await sitl.land()
+            await until(lambda: 1 in service.snapshot().push.can_roll_back)
+
+            planned = service._journal.last_completed(1).plan
+            now = np.array([await sitl.parameter(name) for name in SIX])
+            assert now == pytest.approx(list(planned.wanted.values()), abs=1e-6)
+            for change, truth in zip(planned.changes, TRUTH, strict=True):
+                if not change.kept:
+                    assert abs(change.wanted - truth) < 4.0 * change.sigma
+                    bound = 0.01 if "SCAL" in change.name else 0.06
+                    assert abs(change.wanted - truth) < bound
+            assert sum(not change.kept for change in planned.changes) >= 5
+
+            await until(lambda: service.snapshot().push.state == "idle")
+            await sitl.reboot()
+            await until(lambda: service.snapshot().counters.get("autopilot_rebooted"))
+            await until(lambda: told(service, "push_stored"))
+            assert not told(service, "push_not_stored")
+            after = np.array([await sitl.parameter(name) for name in SIX])
+            assert np.array_equal(after, now)
