@@ -31,6 +31,8 @@ class Diagnoses:
             if self._told.get(imu) is found:
                 continue
             self._told[imu] = found
+            if found.resumed:  # told before the restart
+                continue
             self._write(Found(uuid.uuid4().hex, imu, found.verdict, found.effects, found.missing))
             text = f"IMU {imu}: {diagnosis_in_words(found.verdict, found.effects)}"
             if found.missing:

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from onboard import __version__
 from onboard.core.calibrator import Calibrator, FlightEnded, Restarted
@@ -24,13 +26,15 @@ from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
 from onboard.daemon.examiner import Examiner
 from onboard.daemon.snapshot import TrustView
-from onboard.daemon.store import Store
+from onboard.daemon.store import Kept, Store
 from onboard.daemon.view import trust_view
 from onboard.errors import StateError
 from onboard.push.physics import Diagnosed
 
 SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
+SAME = 1e-6
+"""Parameters are float32."""
 KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
 """Beginnings of the names that change what an estimator makes of the messages."""
 
@@ -78,6 +82,7 @@ class Learner:
         self._armed = False
         self._in_flight: bool | None = None
         self._examiner = Examiner(clock)
+        self._kept: dict[int, Kept] = {}
         self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
         self._answers: dict[int, Calibration] = {}
@@ -96,6 +101,7 @@ class Learner:
             if saved is None:
                 return
             self._calibrator = Calibrator.from_bytes(saved.sums, self._settings)
+            self._kept = self._store.diagnoses(saved)
         except StateError as error:
             self._counters["state_refused"] += 1
             self._tell("state_refused", f"starting from nothing: {error}", warning=True)
@@ -124,6 +130,7 @@ class Learner:
                 self._fly(sample)
         if not judging:
             self._flight = None
+        self._take_back()
         learned = self._learned()
         if in_flight and self._in_flight:
             ready = (i for i, c in self._answers.items() if c.status is Status.CALIBRATED)
@@ -145,6 +152,7 @@ class Learner:
         self._windows = 0
         self._flight = None
         self._examiner.took_off()
+        self._kept.clear()
         self._stale = self._urgent = True
         if self._system_id is not None:
             self._store.path(self._system_id).unlink(missing_ok=True)
@@ -163,15 +171,45 @@ class Learner:
             self._calibrator.to_bytes(),
             version=__version__,
             saved_at=saved_at,
+            diagnosed=[*self._kept.values(), *self._to_keep()],
         )
         self._counters["saves"] += 1
+
+    def _to_keep(self) -> Iterable[Kept]:
+        """The diagnoses that a restart must not lose, by the sensors that they are about."""
+        for imu, found in self._examiner.diagnosed.items():
+            device_id = self._calibrator.parameters.device_id(imu)
+            if device_id is not None:
+                yield Kept(device_id, found)
+
+    def _take_back(self) -> None:
+        """The diagnoses of before the restart, once it is known that the sensors are those."""
+        for imu, kept in tuple(self._kept.items()):
+            device_id = self._calibrator.parameters.device_id(imu)
+            if device_id is None or not self._calibrator.parameters.known(imu):
+                continue
+            del self._kept[imu]
+            if device_id == kept.device_id:
+                self._examiner.diagnosed[imu] = replace(kept.diagnosed, resumed=True)
+                self._tell("diagnosis_resumed", f"IMU {imu}: the last flight is diagnosed already")
+
+    def _resumed(self) -> dict[int, Calibration]:
+        """Calibrations of before the restart, where nothing has changed since."""
+        found = {}
+        for imu, diagnosed in self._examiner.diagnosed.items():
+            then = diagnosed.calibration
+            now = self._calibrator.parameters.six(imu).as_vector()
+            in_force = np.array(then.in_force_scale + then.in_force_offset)
+            if diagnosed.resumed and np.allclose(now, in_force, rtol=0.0, atol=SAME):
+                found[imu] = then
+        return found
 
     def _learned(self) -> Learned:
         self._solve()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
         return Learned(
-            calibrations=self._answers,
+            calibrations=self._resumed() | self._answers,
             trust=trust_view(self._calibrator.trust, windows=self._windows),
             counters={**self._counters, **self._examiner.counters},
             news=news,
@@ -199,14 +237,16 @@ class Learner:
     def _arming(self, *, armed: bool) -> None:
         """A flight begins: nothing of it is diagnosed, and what was wrong is not carried on."""
         if armed and not self._in_flight:
-            for imu, found in self._examiner.diagnosed.items():
-                if found.missing and imu in self._calibrator.imus:
+            kept = {imu: one.diagnosed for imu, one in self._kept.items()}
+            for imu, found in (kept | self._examiner.diagnosed).items():
+                if found.missing:
                     self._calibrator.begin_anew(imu)
                     self._calibrated.discard(imu)
                     self._stale = self._urgent = True
                     text = f"IMU {imu}: learning anew, physics was missing in the flight before"
                     self._tell("begun_anew", text)
             self._examiner.took_off()
+            self._kept.clear()
         self._in_flight = armed
 
     def _fly(self, sample: Sample) -> None:

@@ -101,6 +101,7 @@ class Learning:
         if learned.diagnosing and not self._closing:
             self._busy_since = self._clock()
             self._accept(await self._call(self._learner.examine))
+            self._next_save = now  # the flight cannot be diagnosed again after a power cut
         if now >= self._next_save:
             self._next_save = now + self._save_every_s
             await self.save()

@@ -13,7 +13,7 @@ may have it written all the same, but has to say so: naming the accelerometer an
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from onboard.core.accelerometer import SixParameters
@@ -73,6 +73,8 @@ class Proposals:
         self.counters: Counter[str] = Counter()
         self._imus = imus
         self._standing: dict[int, Standing] = {}
+        self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
+        """Called when a refusal begins, or ends (then with nothing to say)."""
         self._diagnosed: Mapping[int, Diagnosed] = {}
 
     def update(
@@ -164,6 +166,7 @@ class Proposals:
             raise RefusedError("nothing waits for approval")
         for imu in waiting:
             despite = self._diagnosed.get(imu, NOT_DIAGNOSED) if against[imu] else None
+            self._lift(imu)
             self._standing[imu] = Standing(approved=self.current[imu].plan, despite=despite)
         self.counters["approvals"] += len(waiting)
         return f"{named(waiting)} approved: written as soon as policy and flight state allow"
@@ -186,7 +189,14 @@ class Proposals:
         """Hold this accelerometer back until a person approves."""
         standing = self.standing(imu)
         standing.approved = None
-        standing.refused = why
+        if standing.refused != why:
+            standing.refused = why
+            self.on_refusal(imu, why)
+
+    def restore(self, refusals: Mapping[int, str]) -> None:
+        """What was refused before the service started."""
+        for imu, why in refusals.items():
+            self.standing(imu).refused = why
 
     def succeeded(self, imu: int) -> None:
         """A transaction completed: its approval is used up."""
@@ -207,8 +217,16 @@ class Proposals:
 
     def forget(self) -> None:
         """What was learned is reset: what was said about it means nothing any more."""
+        for imu in self._standing:
+            self._lift(imu)
         self._standing.clear()
         self.current = {}
+
+    def _lift(self, imu: int) -> None:
+        """It is refused no longer."""
+        if self.standing(imu).refused:
+            self.standing(imu).refused = ""
+            self.on_refusal(imu, "")
 
     def view(self) -> tuple[ProposalView, ...]:
         """For the snapshot."""

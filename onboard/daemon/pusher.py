@@ -30,6 +30,7 @@ from onboard.push.entries import (
     Planned,
     Purpose,
     Recovery,
+    Refused,
     Result,
     Verdict,
     Watched,
@@ -98,6 +99,8 @@ class Pusher:
         self._closing = False
         self.idle = asyncio.Event()
         self.idle.set()
+        proposals.restore(journal.refusals())
+        proposals.on_refusal = self._refusal
         self._read_journal()
 
     @property
@@ -369,6 +372,10 @@ class Pusher:
                     self._outbox.append(
                         parameter_message(output, self._codec, system=system, component=component)
                     )
+
+    def _refusal(self, imu: int, why: str) -> None:
+        """Remember it: a restart must not write what was refused."""
+        self.append(Refused(uuid.uuid4().hex, imu, why))
 
     def append(self, entry: Entry) -> JournalWritten | JournalFailed:
         """Write to the journal; a disk that does not take it is counted and logged."""

@@ -1,5 +1,8 @@
 """The sums on disk: what the daemon has learned of each vehicle, across restarts.
 
+With them goes what the diagnosis of the last flight said: without it nothing may be written, and
+the flight itself is not kept.
+
 One file per vehicle (system id), replaced whole: temporary file, fsync, rename, fsync of the
 directory.  A file that is damaged or of another version is set aside with the reason, never half
 used.  Whether sums are of the sensor that is there now, the estimator itself looks after.
@@ -8,18 +11,20 @@ used.  Whether sums are of the sensor that is there now, the estimator itself lo
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from zlib import crc32
 
 import msgspec
 
 from onboard.errors import StateError
+from onboard.push.physics import Diagnosed
 
 SCHEMA = 1
 
 
 class Saved(msgspec.Struct, frozen=True, kw_only=True):
-    """The sums of one vehicle; ``saved_at`` is Unix time."""
+    """The sums of one vehicle; ``saved_at`` is Unix time, ``diagnosed`` encoded, or empty."""
 
     schema: int = SCHEMA
     version: str
@@ -27,6 +32,14 @@ class Saved(msgspec.Struct, frozen=True, kw_only=True):
     saved_at: float
     sums: bytes
     check: int
+    diagnosed: bytes = b""
+
+
+class Kept(msgspec.Struct, frozen=True):
+    """A diagnosis, and the INS_ACCn_ID of the accelerometer that it is about."""
+
+    device_id: float
+    diagnosed: Diagnosed
 
 
 class Store:
@@ -62,7 +75,7 @@ class Store:
             raise StateError(f"{path}: {error.strerror}") from None
         except msgspec.DecodeError:
             raise StateError(f"{path}: damaged, set aside as {self.set_aside(system_id)}") from None
-        if saved.schema != SCHEMA or crc32(saved.sums) != saved.check:
+        if saved.schema != SCHEMA or crc32(saved.sums + saved.diagnosed) != saved.check:
             why = "damaged" if saved.schema == SCHEMA else f"of version {saved.schema}"
             raise StateError(f"{path}: {why}, set aside as {self.set_aside(system_id)}")
         return saved
@@ -74,6 +87,7 @@ class Store:
         *,
         version: str,
         saved_at: float,
+        diagnosed: Sequence[Kept] = (),
     ) -> None:
         """Replace the file; it is on the disk when this returns.
 
@@ -81,12 +95,14 @@ class Store:
             StateError: it could not be written; the file before is untouched.
         """
         path = self.path(system_id)
+        found = msgspec.msgpack.encode(diagnosed) if diagnosed else b""
         saved = Saved(
             version=version,
             system_id=system_id,
             saved_at=saved_at,
             sums=sums,
-            check=crc32(sums),
+            check=crc32(sums + found),
+            diagnosed=found,
         )
         temporary = path.with_suffix(".new")
         try:
@@ -102,6 +118,17 @@ class Store:
                 os.close(directory)
         except OSError as error:
             raise StateError(f"{path}: {error.strerror}") from None
+
+    @staticmethod
+    def diagnoses(saved: Saved) -> dict[int, Kept]:
+        """What was diagnosed, by accelerometer; nothing if another version wrote it differently."""
+        if not saved.diagnosed:
+            return {}
+        try:
+            kept = msgspec.msgpack.decode(saved.diagnosed, type=list[Kept])
+        except msgspec.DecodeError:
+            return {}
+        return {one.diagnosed.imu: one for one in kept}
 
     def set_aside(self, system_id: int) -> str:
         """Rename the file so that it is not read again but can be looked at; its new name."""

@@ -27,6 +27,7 @@ from onboard.push.entries import (
     Found,
     Planned,
     Purpose,
+    Refused,
     Undoing,
     Watched,
     Writing,
@@ -120,6 +121,9 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
                 text = f"flight diagnosed: {diagnosis_in_words(verdict, effects)}"
                 if missing:
                     text += f"; not to be written by itself: {missing}"
+            case Refused(imu=imu, sentence=sentence):
+                imus[entry.transaction] = imu
+                text = f"held back: {sentence}" if sentence else "no longer held back"
             case _:
                 continue
         shown.append(

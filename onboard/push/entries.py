@@ -113,7 +113,18 @@ class Found(Struct, frozen=True, tag="found"):
     missing: str
 
 
-Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched | Found
+class Refused(Struct, frozen=True, tag="refused"):
+    """An accelerometer is held back until a person approves; ``sentence`` empty: no longer.
+
+    ``transaction`` names the refusal; it belongs to no push.
+    """
+
+    transaction: str
+    imu: int
+    sentence: str
+
+
+Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched | Found | Refused
 
 
 @dataclass(frozen=True, slots=True)

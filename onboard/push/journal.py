@@ -37,6 +37,7 @@ from onboard.push.entries import (
     Purpose,
     ReadBack,
     Recovery,
+    Refused,
     Result,
     Undoing,
     Watched,
@@ -129,7 +130,7 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
-        if self._size > self._limit and isinstance(entry, Closed | Watched | Found):
+        if self._size > self._limit and isinstance(entry, Closed | Watched | Found | Refused):
             self._compact()
 
     def recover(self) -> tuple[Recovery, ...]:
@@ -164,6 +165,11 @@ class Journal:
                 found = None  # completed once, undone by an audit
         return found
 
+    def refusals(self) -> dict[int, str]:
+        """Accelerometers that are held back until a person approves, and why."""
+        last = {e.imu: e.sentence for _, e in self._lines if isinstance(e, Refused)}
+        return {imu: sentence for imu, sentence in last.items() if sentence}
+
     def unwatched(self) -> tuple[Planned, ...]:
         """Pushes in force on which no flight has given its verdict yet."""
         seen = {e.transaction for _, e in self._lines if isinstance(e, Watched)}
@@ -178,7 +184,7 @@ class Journal:
         for _, entry in self._lines:
             if isinstance(entry, Closed):
                 order.pop(entry.transaction, None)
-            elif not isinstance(entry, Watched | Found):
+            elif not isinstance(entry, Watched | Found | Refused):
                 order.setdefault(entry.transaction)
         return list(order)
 
@@ -242,6 +248,8 @@ class Journal:
             last = self.last_completed(imu)
             if last is not None:
                 keep.add(last.transaction)
+        said = {e.imu: e.transaction for _, e in self._lines if isinstance(e, Refused)}
+        keep.update(said.values())
         closed = [e.transaction for _, e in self._lines if isinstance(e, Closed | Found)]
         keep.update(closed[max(0, len(closed) - self._keep) :])
         lines = [(at, e) for at, e in self._lines if e.transaction in keep]

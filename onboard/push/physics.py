@@ -63,6 +63,7 @@ class Diagnosed:
         missing: why it must not be written by itself, in words; empty if nothing forbids it.
         modelled: the calibration is that of the fuller model.
         document: the diagnosis as other programs read it.
+        resumed: it was made before the service last started.
     """
 
     imu: int
@@ -72,6 +73,7 @@ class Diagnosed:
     missing: str = ""
     modelled: bool = False
     document: dict[str, Any] = field(default_factory=dict)
+    resumed: bool = False
 
 
 def judge_physics(

@@ -18,6 +18,11 @@ def in_force(vehicle):
     return tuple(vehicle.parameters[name] for name in SIX)
 
 
+def held_back(service):
+    proposals = service.snapshot().push.proposals
+    return proposals[0].held_back if proposals else {}
+
+
 def notices(service, kind):
     return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
 
@@ -149,3 +154,90 @@ async def test_a_daemon_started_in_flight_waits_for_the_landing(document, daemon
             assert in_force(vehicle) == before
             vehicle.armed, vehicle.landed = False, True
             await until(lambda: service.snapshot().push.can_roll_back == (1,))
+
+
+async def test_a_proposal_outlives_the_service(document, daemon, port):
+    document["push"]["approval"] = True
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED, effects=("gps_latency",))
+            await until(lambda: service.snapshot().push.approval_needed)
+            (proposed,) = service.snapshot().push.proposals
+            diagnosis = service.snapshot().diagnosis
+        async with daemon(document) as again:
+            await until(lambda: again.snapshot().push.approval_needed)
+            assert again.snapshot().push.proposals == (proposed,)
+            assert again.snapshot().diagnosis == diagnosis
+            found = [line for line in again.snapshot().journal if line.kind == "found"]
+            assert len(found) == 1, "it was made once"
+            await again.approve((1,))
+            await until(lambda: again.snapshot().push.can_roll_back == (1,))
+            assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+
+
+async def test_what_the_diagnosis_forbids_it_forbids_after_a_restart(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED, missing="the antenna is elsewhere")
+            await until(lambda: "physics_missing" in held_back(service))
+        async with daemon(document) as again:
+            await until(lambda: "physics_missing" in held_back(again))
+            await until(lambda: held_back(again).keys() == {"physics_missing"})
+            assert vehicle.sets == []
+
+
+async def test_a_diagnosis_is_of_one_sensor_and_of_no_other(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            vehicle.armed = True
+            convinced(service, WANTED)
+            await until(lambda: held_back(service).keys() == {"armed"})
+        vehicle.armed = False
+        vehicle.parameters["INS_ACC_ID"] = 4711.0
+        async with daemon(document) as again:
+            await until(lambda: again._parameters.complete)
+            await ticks(again, 20)
+            assert again.snapshot().push.proposals == ()
+            assert vehicle.sets == []
+
+
+async def test_a_new_flight_ends_what_was_kept(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            vehicle.armed = True
+            convinced(service, WANTED)
+            await until(lambda: held_back(service).keys() == {"armed"})
+        async with daemon(document) as again:  # the vehicle is flying when it starts
+            await until(lambda: again.snapshot().link.armed)
+            await until(lambda: again._parameters.complete)
+            vehicle.armed = False
+            await until(lambda: again.snapshot().link.armed is False)
+            await ticks(again, 20)
+            assert vehicle.sets == []
+
+
+@pytest.mark.parametrize("how", ["rejected", "rolled back"])
+async def test_what_a_person_has_refused_stays_refused_after_a_restart(document, daemon, port, how):
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            if how == "rejected":
+                vehicle.armed = True
+                convinced(service, WANTED)
+                await until(lambda: service.snapshot().push.proposals)
+                await service.reject((1,))
+            else:
+                await pushed(service, vehicle)
+                await until(lambda: service.snapshot().link.armed is False)
+                await service.rollback(())
+                await until(lambda: service.snapshot().push.can_roll_back == ())
+        vehicle.armed = False
+        async with daemon(document) as again:
+            await until(lambda: "refused" in held_back(again))
+            await ticks(again, 20)
+            assert in_force(vehicle) == before
+            await again.approve((1,))
+            await until(lambda: again.snapshot().push.can_roll_back == (1,))
+        async with daemon(document) as third:
+            await until(lambda: third._parameters.complete)
+            assert third._journal.refusals() == {}
