@@ -16,6 +16,7 @@ from benchmarks import (
     daemon,
     ekf_bias,
     error_state,
+    explain_time,
     explaining,
     lag,
     link,
@@ -54,6 +55,7 @@ def main() -> None:
             "Concealed effects, sealed answers",
             lambda: explaining.main(["--count", str(chosen.recordings)]),
         ),
+        "explain_time": ("Time of an explanation", lambda: explain_time.main([])),
         "cost": ("Cost of the estimator", lambda: cost.main([])),
         "paths": ("Cost of link and service", _paths),
     }

@@ -11,11 +11,10 @@ import re
 import struct
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from onboard.core.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
+from onboard.recordings.packets import Unpacker
 from onboard.recordings.recording import Recording, elapsed_s
 
 Bytes = bytes | mmap
@@ -266,7 +266,7 @@ def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]
     # As on a live link, nothing is taken before the autopilot's first heartbeat, if there is one.
     system, component = source
     decoder = Decoder(system, component if vehicle.autopilot is None else None)
-    unpack = mavlink.MAVLink(None).decode
+    unpack = Unpacker()
     for at, length in zip(vehicle.offsets, vehicle.lengths, strict=True):
         yield from _decoded(unpack, data[at : at + length], decoder)
 
@@ -274,7 +274,7 @@ def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]
 def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
     """Parameters that are reported late, and always with the same value."""
     decoder = Decoder(*source)
-    unpack = mavlink.MAVLink(None).decode
+    unpack = Unpacker()
     values: dict[str, set[float]] = {}
     late: dict[str, bool] = {}
     for at, length, is_late in vehicle.parameters:
@@ -287,10 +287,8 @@ def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Param
             yield ParameterValue(name, seen.pop())
 
 
-def _decoded(
-    unpack: Callable[[bytearray], Any], packet: bytes, decoder: Decoder
-) -> tuple[Sample, ...]:
+def _decoded(unpack: Unpacker, packet: bytes, decoder: Decoder) -> tuple[Sample, ...]:
     try:
-        return decoder.decode(unpack(bytearray(packet)))
+        return decoder.decode(unpack(packet))
     except mavlink.MAVError:
         return ()  # a right checksum over a payload that cannot be unpacked
