@@ -1,12 +1,15 @@
 """The status page in a real browser, against the daemon's HTTP server and a told story."""
 
 import re
+from importlib import resources
 
 import msgspec
 import pytest
 from browsing import LAPTOP, PHONE
 from page_server import PageServer
 from story import story
+
+from onboard.report.words import EFFECTS
 
 STALE = ("WebSocket", "Failed to load resource")
 
@@ -138,6 +141,15 @@ def test_a_restart_of_the_service_is_said_and_survived(browser, served):
     browser.expect_complaints(*STALE)
 
 
+def holding(held_back):
+    """The push of a flight with these reasons against it, for both accelerometers."""
+    push = story(160).push
+    proposals = tuple(
+        msgspec.structs.replace(proposal, held_back=held_back) for proposal in push.proposals
+    )
+    return msgspec.structs.replace(push, approval_needed=False, proposals=proposals)
+
+
 @pytest.mark.parametrize(
     ("held_back", "headline", "detail"),
     [
@@ -163,14 +175,7 @@ def test_a_restart_of_the_service_is_said_and_survived(browser, served):
 def test_of_many_reasons_the_telling_one_is_in_the_glance(
     browser, served, held_back, headline, detail
 ):
-    push = story(160).push
-    proposals = tuple(
-        msgspec.structs.replace(proposal, held_back=held_back) for proposal in push.proposals
-    )
-    served.tell(
-        story(160),
-        push=msgspec.structs.replace(push, approval_needed=False, proposals=proposals),
-    )
+    served.tell(story(160), push=holding(held_back))
     browser.open(served.url)
     assert browser.text("#glance-push .headline") == headline
     assert browser.text("#glance-push .detail").startswith(detail)
@@ -179,11 +184,52 @@ def test_of_many_reasons_the_telling_one_is_in_the_glance(
 def test_diagnosis_in_words(browser, served):
     browser.open(served.url)
     served.tell(story(20), diagnosis=DIAGNOSIS)
-    browser.until_says("#diagnosis-body", "GPS arrives late")
+    browser.until_says("#diagnosis-body", "GPS is late")
     words = browser.text("#diagnosis-body")
     assert "GPS1_DELAY_MS = 210" in words
     assert "83 % of the mismatch" in words
     assert "fly banked turns both ways" in words
+    assert "0.055 m/s; it was 0.65 m/s" in words
+
+
+@pytest.mark.parametrize(
+    ("held_back", "heading"),
+    [
+        ({}, "about to be written"),
+        ({"approval": "a person has to approve"}, "waits for your approval"),
+        ({"approval": "a person has to approve", "armed": "armed"}, "waits for your approval"),
+        ({"in_air": "in the air"}, "waits for its moment"),
+        ({"not_calibrated": "it is collecting", "armed": "armed"}, "not calibrated yet"),
+        ({"physics_missing": "physics missing: GPS is late"}, "held back by the diagnosis"),
+        ({"sigma_too_large": "sigma is above", "armed": "armed"}, "held back"),
+    ],
+)
+def test_the_heading_of_a_proposal_says_what_becomes_of_it(browser, served, held_back, heading):
+    served.tell(story(160), push=holding(held_back))
+    browser.open(served.url)
+    assert browser.text('[data-imu="1"] h3') == f"IMU 1: {heading}"
+
+
+def test_where_nothing_would_change_there_is_nothing_to_approve(browser, served):
+    served.tell(story(160), push=holding({"nothing_to_change": "no value differs by 2 sigma"}))
+    browser.open(served.url)
+    assert browser.text('[data-imu="1"] h3') == "IMU 1: nothing to change"
+    assert "no value differs by 2 sigma" in browser.text('[data-imu="1"]')
+    assert browser.elements('[data-imu="1"] button') == []
+
+
+def test_the_diagnosis_says_what_it_holds_back(browser, served):
+    served.tell(story(160), diagnosis=DIAGNOSIS)
+    browser.open(served.url)
+    assert "held back" not in browser.text("#diagnosis-body")
+    served.tell(push=holding({"physics_missing": "physics missing: GPS is late"}))
+    browser.until_says("#diagnosis-body", "held back for IMU 1, IMU 2")
+
+
+def test_page_and_reports_say_the_same_of_every_effect():
+    words = resources.files("onboard.web").joinpath("static", "words.js").read_text("utf-8")
+    for name, title in EFFECTS.items():
+        assert f'{name}: "{title}",' in words
 
 
 def test_text_from_outside_is_text(browser, served):
@@ -311,6 +357,11 @@ def _fields(record):
 DIAGNOSIS = {
     "schema": "onboard.explain/1",
     "verdict": "partly_explained",
+    "recording": {"imu": 1},
+    "mismatch": {
+        "held_out_velocity_rms_before_m_s": 0.65,
+        "held_out_velocity_rms_after_m_s": 0.055,
+    },
     "effects": [
         {
             "name": "gps_latency",

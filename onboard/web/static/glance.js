@@ -1,10 +1,8 @@
 // The four answers that one glance gives.
 
 import { byId, say, tone } from "./dom.js";
-import { capital, duration, reasonInWords, statusInWords } from "./words.js";
+import { SOON, capital, duration, reasonInWords, statusInWords } from "./words.js";
 
-/** Reasons that go away by themselves once the vehicle stands disarmed. */
-const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
 
 function tell(id, headline, detail, kind) {
   const article = byId(id);

@@ -26,7 +26,7 @@ function showSnapshot(snapshot) {
   showGlance(snapshot);
   imus.show(snapshot.imus);
   push.show(snapshot.push, snapshot.imus);
-  showDiagnosis(snapshot.diagnosis);
+  showDiagnosis(snapshot.diagnosis, snapshot.push);
   showJournal(snapshot.journal, snapshot.notices);
   showLink(snapshot.link);
   showHeader(snapshot);

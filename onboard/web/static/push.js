@@ -1,7 +1,7 @@
 // What will be written, and the three things that a person may say to it.
 
 import { byId, h, renew, say } from "./dom.js";
-import { brief, capital, fixed, plain, policyInWords } from "./words.js";
+import { SOON, brief, capital, fixed, plain, policyInWords } from "./words.js";
 
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
@@ -57,14 +57,12 @@ export class Push {
   proposal(proposal) {
     const reasons = Object.entries(proposal.held_back);
     const waits = reasons.some(([name]) => PEOPLE.includes(name));
-    const asked = reasons.length === 1 && waits;
-    const said = proposal.rejected ? "rejected" : proposal.approved ? "approved" : "";
-    const state = said || (asked ? "waits for your approval" : reasons.length ? "held back" : "about to be written");
     const imus = [proposal.imu];
+    if (proposal.held_back.nothing_to_change && !proposal.rejected) return same(proposal);
     return h(
       "div",
       { class: "proposal", "data-imu": proposal.imu },
-      h("h3", { text: `IMU ${proposal.imu}: ${state}` }),
+      h("h3", { text: `IMU ${proposal.imu}: ${heading(proposal)}` }),
       changesTable(proposal.changes),
       ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
       ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([, sentence]) => h("li", { text: sentence })))] : []),
@@ -131,6 +129,31 @@ export class Push {
     result.classList.toggle("bad", kind === "bad");
     say(result, text && capital(text));
   }
+}
+
+// What becomes of a proposal, by the reason that decides.
+function heading(proposal) {
+  const reasons = Object.keys(proposal.held_back);
+  const others = reasons.filter((name) => !SOON.includes(name));
+  if (proposal.rejected) return "rejected";
+  if (proposal.held_back.not_calibrated) return "not calibrated yet";
+  if (against(proposal)) return "held back by the diagnosis";
+  if (proposal.approved) return others.length ? "approved, but held back" : "approved";
+  if (reasons.length === 0) return "about to be written";
+  if (others.length === 0) return "waits for its moment";
+  if (others.every((name) => PEOPLE.includes(name))) return "waits for your approval";
+  return "held back";
+}
+
+// A proposal that would change nothing: there is nothing to approve.
+function same(proposal) {
+  return h(
+    "div",
+    { class: "proposal", "data-imu": proposal.imu },
+    h("h3", { text: `IMU ${proposal.imu}: nothing to change` }),
+    h("p", { class: "soft", text: `The autopilot has these values: ${proposal.held_back.nothing_to_change}.` }),
+    h("details", { "data-key": `same-${proposal.imu}` }, h("summary", { text: "The numbers" }), changesTable(proposal.changes)),
+  );
 }
 
 // What the diagnosis has against writing a proposal, empty if nothing.

@@ -23,40 +23,43 @@ const STATUS = {
   invalid: ["invalid", "bad"],
 };
 const EFFECTS = {
-  gps_latency: "GPS arrives late",
-  gps_smoothing: "The receiver smooths its velocity",
-  gps_lever_arm: "The antenna is away from the accelerometer",
-  imu_delay: "Attitude and accelerometer are apart in time",
-  cross_axis: "The axes are not square to each other",
-  mount_tilt: "The autopilot is mounted at a tilt",
+  gps_latency: "GPS is late",
+  gps_smoothing: "GPS averages its velocity",
+  gps_lever_arm: "The GPS antenna is away from the IMU",
+  imu_delay: "Attitude and accelerometer are not simultaneous",
+  cross_axis: "The accelerometer's axes are not square",
+  mount_tilt: "The accelerometer is tilted against the attitude",
   heading_error: "The heading is off",
-  heading_by_throttle: "Throttle pulls the heading",
-  temperature_drift: "The offsets drift with temperature",
-  bias_ramp: "The offsets drift with time",
-  bias_step: "The offsets jumped",
-  scale_nonlinearity: "The scale bends with load",
-  vibration_rectification: "Vibration shifts the offsets",
-  throttle_coupling: "Throttle shifts the offsets",
+  heading_by_throttle: "The motors pull the compass",
+  temperature_drift: "The offset follows the temperature",
+  bias_ramp: "The offset grows with time",
+  bias_step: "The offset jumped",
+  scale_nonlinearity: "The scale changes with the load",
+  vibration_rectification: "Vibration shifts the offset",
+  throttle_coupling: "The throttle shifts the offset",
   saturation: "The accelerometer hit its limit",
-  gps_fault: "GPS was wrong for a while",
-  clock_skew: "The clocks run at different rates",
-  gravity: "Gravity differs from the assumed value",
+  gps_fault: "GPS velocity was false for a while",
+  clock_skew: "The GPS and IMU clocks run at different rates",
+  gravity: "Gravity differs from the expected value",
   load_flex: "The mount bends under load",
-  rotor_drag: "Rotor drag",
-  empirical: "A term without a physical name",
+  rotor_drag: "The rotors drag in the wind",
+  empirical: "An unnamed dependence on a measured signal",
 };
 const VERDICTS = {
   clean: ["Nothing is missing beyond the six numbers and the timing.", "good"],
-  explained: ["What was missing is found.", "good"],
-  partly_explained: ["Part of what is missing is found.", "warn"],
-  unexplained: ["Something is missing and no known effect explains it.", "bad"],
-  insufficient: ["Too little excitation to say.", "warn"],
+  explained: ["Physics is missing from the model, and it was found.", "warn"],
+  partly_explained: ["Physics is missing from the model; a part of it was found.", "warn"],
+  unexplained: ["Something is missing, and nothing known explains it.", "bad"],
+  insufficient: ["This flight cannot tell.", "warn"],
 };
 const POLICIES = {
   never: "nothing is ever written",
   landed: "written when landed and disarmed",
   in_flight: "written in flight in bounded steps",
 };
+
+/** Reasons against a push that go away by themselves once the vehicle stands disarmed. */
+export const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
 
 const FIRMWARE = { ardupilot: "ArduPilot", px4: "PX4" };
 
@@ -71,6 +74,8 @@ export const reasonInWords = (name) => REASONS[name] ?? plain(name);
 export const statusInWords = (name) => STATUS[name] ?? [plain(name), "warn"];
 export const effectInWords = (name) => EFFECTS[name] ?? capital(plain(name));
 export const verdictInWords = (name) => VERDICTS[name] ?? [capital(plain(name)), "warn"];
+/** A unit with raised digits; nothing for a plain number. */
+export const unitInWords = (unit) => (unit === "1" || unit === "-" ? "" : unit.replaceAll("^2", "²").replaceAll("^3", "³"));
 export const policyInWords = (name) => POLICIES[name] ?? plain(name);
 export { plain, capital };
 
