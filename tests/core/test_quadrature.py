@@ -81,6 +81,15 @@ def test_a_constant_turn_is_exact():
     np.testing.assert_allclose(increments[0], np.tile(0.05 * w, (4, 1)), atol=1e-15)
 
 
+def test_a_constant_rate_turns_an_interval_by_its_angle():
+    t = np.arange(0.0, 2.0, 0.02)
+    w = np.tile([0.3, -0.5, 0.8], (len(t), 1))
+    still = np.array([np.eye(3)] * 2)  # attitude is known at two moments only
+    stretch = Stretch(t, w, np.zeros_like(w), t[:2], still, np.eye(3))
+    made = NodeMaker(stretch, np.zeros(3), NOMINAL).intervals(np.array([0.5]), np.array([0.9]))
+    np.testing.assert_allclose(made.P[0, -1], rotation_from_vector(0.4 * w[0]), atol=1e-9)
+
+
 def test_increments_are_of_fourth_order():
     errors = []
     for h in (0.2, 0.1):
@@ -149,7 +158,7 @@ def test_bias_is_subtracted_and_the_six_applied():
     np.testing.assert_allclose(got.f_b, (force(t[5:9]) * six[:3] + six[3:]) @ R_bs.T, atol=1e-12)
 
 
-@pytest.mark.parametrize("count", [4, 10])
+@pytest.mark.parametrize("count", [4, 8, 10])
 def test_simpson_is_exact_for_cubics(count):
     x = np.linspace(0.0, 1.0, count + 1)
     for power in range(4):

@@ -101,6 +101,31 @@ def test_without_process_noise_windows_add_up_as_in_the_criterion_of_the_paper()
     np.testing.assert_allclose(N_whitened, N_literal, rtol=0.0, atol=1e-6 * np.abs(N_literal).max())
 
 
+def test_what_a_fit_leaves_is_chi_square():
+    noise, rng = 0.1, np.random.default_rng(5)
+    t = np.arange(0.0, 201.0, 5e-3)
+    euler, raw = manoeuvres(t)
+    R = matrices(euler)
+    a = np.einsum("nij,nj->ni", R, SCALE * raw + BETA) + GRAVITY
+    v = np.vstack([np.zeros(3), np.cumsum(2.5e-3 * (a[1:] + a[:-1]), axis=0)])
+    at = np.arange(200, len(t) - 200, 40)
+    n = len(at)
+    made = Pass(
+        Model([Six(scale_sigma=1e5, beta_sigma=1e5)]),
+        Linearisation(delay=0.0),
+        (NoiseLevels(velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9),),
+        uses=PAPER,
+    )
+    fixes = Fixes(t[at], v[at] + noise * rng.normal(size=(n, 3)), np.zeros(n), np.zeros(n))
+    stretch = Stretch(t, np.zeros_like(raw), raw, t, R, np.eye(3))
+    sums = made.process(stretch, fixes, np.ones(n, dtype=bool)).portion.sums
+    theta = np.linalg.solve(sums.N, sums.b)
+    np.testing.assert_allclose(theta[:3], SCALE, atol=0.02)
+    # n - 6 degrees of freedom: five sigma either way.
+    free = sums.rows - 6
+    assert abs(sums.residual(theta) - free) < 5.0 * np.sqrt(2.0 * free)
+
+
 LEVELS = NoiseLevels(
     velocity=0.05,
     velocity_colour=0.04,
