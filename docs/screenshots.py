@@ -1,4 +1,4 @@
-"""Makes the pictures that the README shows: the status page during the demo, and a report.
+"""Makes the pictures that the README shows: the status page during the demo, and two reports.
 
     python docs/screenshots.py [FOLDER]
 
@@ -29,6 +29,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 
+from sitl.builtin.effects import Effect, TemperatureDrift
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, write_tlog
 
@@ -54,6 +55,7 @@ IN_FLIGHT: tuple[Shot, ...] = (
 )
 WRITTEN: tuple[Shot, ...] = (("written-laptop-dark.png", 1440, 900, "dark"),)
 REPORT: Shot = ("report-laptop.png", 1180, 1000, "light")
+EXPLAINED: Shot = ("explained-laptop.png", 1180, 1160, "light")
 
 
 def main(folder: Path) -> None:
@@ -73,16 +75,21 @@ def main(folder: Path) -> None:
         for shot in WRITTEN:
             _take(browser, folder, shot)
         with tempfile.TemporaryDirectory() as scratch:
-            browser.get(_report(Path(scratch)).as_uri())
-            _take(browser, folder, REPORT)
+            for command, effects, shot in (
+                ("replay", (), REPORT),
+                ("explain", (TemperatureDrift(x=0.012, y=-0.008, z=0.01),), EXPLAINED),
+            ):
+                browser.get(_report(Path(scratch), command, effects).as_uri())
+                _take(browser, folder, shot)
 
 
-def _report(scratch: Path) -> Path:
-    """The page of a replay of a simulated flight."""
-    log, page = scratch / "flight.tlog", scratch / "flight.html"
+def _report(scratch: Path, verb: str, effects: tuple[Effect, ...]) -> Path:
+    """The page of a simulated flight."""
+    log, page = scratch / "flight.tlog", scratch / f"{verb}.html"
     truth = ImuTruth(scale=(1.021, 0.986, 1.013), offset=(0.21, -0.15, 0.3))
-    write_tlog(FlightSpec(vehicle="plane", duration=260.0, imus=(truth,), seed=3), log)
-    command = [sys.executable, "-m", "onboard", "replay", str(log), "--report", str(page)]
+    spec = FlightSpec(vehicle="plane", duration=260.0, imus=(truth,), seed=3, effects=effects)
+    write_tlog(spec, log)
+    command = [sys.executable, "-m", "onboard", verb, str(log), "--report", str(page)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - ours
     return page
 

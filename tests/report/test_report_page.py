@@ -172,3 +172,9 @@ def test_a_real_diagnosis(recordings: Path):
     assert len(html.encode()) < 500_000
     for e in result.diagnosis.effects:
         assert e.name in parsed.words
+
+
+def test_paper_is_never_dark():
+    html, _ = page(diagnosis())
+    assert "@media screen and (prefers-color-scheme: dark)" in html
+    assert "@media (prefers-color-scheme" not in html
