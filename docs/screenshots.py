@@ -77,7 +77,7 @@ def main(folder: Path) -> None:
         with tempfile.TemporaryDirectory() as scratch:
             for command, effects, shot in (
                 ("replay", (), REPORT),
-                ("explain", (TemperatureDrift(x=0.012, y=-0.008, z=0.01),), EXPLAINED),
+                ("explain", (TemperatureDrift(x=0.02, y=-0.015, z=0.008),), EXPLAINED),
             ):
                 browser.get(_report(Path(scratch), command, effects).as_uri())
                 _take(browser, folder, shot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import diagnose
 from onboard.core.findings import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.result import Calibration
+from onboard.core.samples import ImuSample, Sample
 from onboard.core.settings import EstimatorSettings
 from onboard.explain_document import ExplainDocument, explain_document
 from onboard.replay import Replay, replay
@@ -69,14 +70,45 @@ def explain(
         RecordingError: a file that cannot be used.
         UsageError: there is no such accelerometer.
     """
-    # Timing and noise are the diagnosis' own: estimating them while reading would be done twice.
-    calibrator = Calibrator(EstimatorSettings(refine=False, buffer_s=LONGEST_FLIGHT_S))
-    source = replay(paths, calibrator, imu=imu, progress=progress)
+    calibrator, source = _read(paths, imu, frozenset({1, imu or 1}), progress)
+    if imu is None and 1 not in calibrator.imus:
+        calibrator, source = _read(paths, imu, frozenset(), progress)
     chosen = imu if imu is not None else min(calibrator.imus, default=1)
     if chosen in calibrator.imus:
         return Explanation(diagnose(calibrator, chosen), source, chosen)
     calibration = next((c for c in source.calibrations if c.imu == chosen), source.calibrations[0])
     return Explanation(nothing_to_say(calibration), source, calibration.imu)
+
+
+def _read(
+    paths: Sequence[str | Path],
+    imu: int | None,
+    wanted: frozenset[int],
+    progress: Callable[[float], None] | None,
+) -> tuple[Calibrator, Replay]:
+    # Timing and noise are the diagnosis' own: estimating them while reading would be done twice.
+    calibrator = Calibrator(EstimatorSettings(refine=False, buffer_s=LONGEST_FLIGHT_S))
+    source = replay(paths, _Only(calibrator, wanted), imu=imu, progress=progress)
+    # What it says of the accelerometers that were not fed is not so.
+    return calibrator, replace(source, notes=())
+
+
+class _Only:
+    """Feeds a calibrator some accelerometers (none named: all): each costs as much as another."""
+
+    def __init__(self, calibrator: Calibrator, wanted: frozenset[int]) -> None:
+        self._calibrator, self._wanted = calibrator, wanted
+        self.restart, self.finish = calibrator.restart, calibrator.finish
+        self.calibration = calibrator.calibration
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        return self._calibrator.imus
+
+    def feed(self, sample: Sample) -> object:
+        if self._wanted and isinstance(sample, ImuSample) and sample.imu not in self._wanted:
+            return ()
+        return self._calibrator.feed(sample)
 
 
 def nothing_to_say(calibration: Calibration) -> Diagnosis:

@@ -255,7 +255,7 @@ class Proposals:
         if standing.approved is not None and standing.despite is (found or NOT_DIAGNOSED):
             return {}
         if found is None:
-            return {"not_diagnosed": "no flight was diagnosed since the start: fly again"}
+            return {"not_diagnosed": "no flight was diagnosed yet: that is done after a landing"}
         if not found.missing:
             return {}
         offered = "; these values have it modelled" if found.modelled else ""

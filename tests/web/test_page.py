@@ -169,6 +169,12 @@ def holding(held_back):
             "Held back by the diagnosis",
             "IMU 1: GPS is late (83 %)",
         ),
+        (
+            {"not_diagnosed": "no flight was diagnosed yet", "armed": "armed"},
+            "Written after landing",
+            "IMU 1, IMU 2; this flight will be diagnosed",
+        ),
+        ({"not_diagnosed": "no flight was diagnosed yet"}, "Held back", "no flight was diagnosed"),
         ({"nothing_to_change": "no value differs"}, "Nothing to write", ""),
     ],
 )
@@ -199,6 +205,8 @@ def test_diagnosis_in_words(browser, served):
         ({"approval": "a person has to approve"}, "waits for your approval"),
         ({"approval": "a person has to approve", "armed": "armed"}, "waits for your approval"),
         ({"in_air": "in the air"}, "waits for its moment"),
+        ({"in_air": "in the air", "not_diagnosed": "none yet"}, "waits for its moment"),
+        ({"not_diagnosed": "none yet"}, "not diagnosed yet"),
         ({"not_calibrated": "it is collecting", "armed": "armed"}, "not calibrated yet"),
         ({"physics_missing": "physics missing: GPS is late"}, "held back by the diagnosis"),
         ({"sigma_too_large": "sigma is above", "armed": "armed"}, "held back"),

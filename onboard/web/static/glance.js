@@ -1,7 +1,7 @@
 // The four answers that one glance gives.
 
 import { byId, say, tone } from "./dom.js";
-import { SOON, capital, duration, reasonInWords, statusInWords } from "./words.js";
+import { capital, duration, passes, reasonInWords, statusInWords, whyNot } from "./words.js";
 
 
 function tell(id, headline, detail, kind) {
@@ -62,12 +62,12 @@ function showPush(push) {
   if (real.every((p) => p.rejected)) return tell("glance-push", "Rejected", named(real), "");
   const open = real.filter((p) => !p.rejected);
   const has = (p, name) => name in p.held_back;
-  const sentence = (p) => Object.entries(p.held_back).find(([name]) => !SOON.includes(name))?.[1];
+  const sentence = (p) => Object.entries(p.held_back).find(([name]) => !passes(name, p.held_back))?.[1];
   const also = (...parts) => [...parts, done].filter(Boolean).join("; ");
   if (open.every((p) => has(p, "not_calibrated"))) return tell("glance-push", "Nothing to write yet", also(`${named(open)} not calibrated yet`), "");
   const missing = open.find((p) => has(p, "physics_missing"));
   if (missing) return tell("glance-push", "Held back by the diagnosis", also(`IMU ${missing.imu}: ${missing.held_back.physics_missing}`), "bad");
   const soon = open.filter((p) => sentence(p) === undefined);
-  if (soon.length) return tell("glance-push", push.policy === "in_flight" ? "Waits for its moment" : "Written after landing", also(named(soon), Object.values(soon[0].held_back)[0]), "");
+  if (soon.length) return tell("glance-push", push.policy === "in_flight" ? "Waits for its moment" : "Written after landing", also(named(soon), whyNot(Object.keys(soon[0].held_back)[0], soon[0].held_back)), "");
   tell("glance-push", "Held back", also(sentence(open.find((p) => !has(p, "not_calibrated")))), "");
 }

@@ -1,7 +1,7 @@
 // What will be written, and the three things that a person may say to it.
 
 import { byId, h, renew, say } from "./dom.js";
-import { SOON, brief, capital, fixed, plain, policyInWords } from "./words.js";
+import { brief, capital, fixed, passes, plain, policyInWords, whyNot } from "./words.js";
 
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
@@ -65,7 +65,7 @@ export class Push {
       h("h3", { text: `IMU ${proposal.imu}: ${heading(proposal)}` }),
       changesTable(proposal.changes),
       ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
-      ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([, sentence]) => h("li", { text: sentence })))] : []),
+      ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([name]) => h("li", { text: whyNot(name, proposal.held_back) })))] : []),
       h(
         "div",
         { class: "row actions" },
@@ -134,10 +134,10 @@ export class Push {
 // What becomes of a proposal, by the reason that decides.
 function heading(proposal) {
   const reasons = Object.keys(proposal.held_back);
-  const others = reasons.filter((name) => !SOON.includes(name));
+  const others = reasons.filter((name) => !passes(name, proposal.held_back));
   if (proposal.rejected) return "rejected";
   if (proposal.held_back.not_calibrated) return "not calibrated yet";
-  if (against(proposal)) return "held back by the diagnosis";
+  if (against(proposal)) return proposal.held_back.physics_missing ? "held back by the diagnosis" : "not diagnosed yet";
   if (proposal.approved) return others.length ? "approved, but held back" : "approved";
   if (reasons.length === 0) return "about to be written";
   if (others.length === 0) return "waits for its moment";
@@ -158,8 +158,9 @@ function same(proposal) {
 
 // What the diagnosis has against writing a proposal, empty if nothing.
 function against(proposal) {
-  const name = DIAGNOSIS.find((reason) => reason in (proposal?.held_back ?? {}));
-  return name ? proposal.held_back[name] : "";
+  const held = proposal?.held_back ?? {};
+  const name = DIAGNOSIS.find((reason) => reason in held && !passes(reason, held));
+  return name ? held[name] : "";
 }
 
 function changesTable(changes) {

@@ -58,8 +58,18 @@ const POLICIES = {
   in_flight: "written in flight in bounded steps",
 };
 
-/** Reasons against a push that go away by themselves once the vehicle stands disarmed. */
-export const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
+const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
+
+/** Whether a reason against a push goes away by itself once the vehicle stands disarmed. */
+export function passes(name, heldBack) {
+  // A flight is diagnosed after it has ended.
+  const flying = "armed" in heldBack || "in_air" in heldBack;
+  return SOON.includes(name) || (name === "not_diagnosed" && flying);
+}
+
+/** Why a proposal is not written now, as a sentence. */
+export const whyNot = (name, heldBack) =>
+  name === "not_diagnosed" && passes(name, heldBack) ? "this flight will be diagnosed after the landing" : heldBack[name];
 
 const FIRMWARE = { ardupilot: "ArduPilot", px4: "PX4" };
 
