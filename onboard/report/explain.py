@@ -11,7 +11,7 @@ from onboard.core.result import SIX_NAMES
 from onboard.report import residual_charts, verdict, words
 from onboard.report.chart import pair_bar
 from onboard.report.page import render
-from onboard.report.parameters import changes
+from onboard.report.parameters import changes, to_set
 
 TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
@@ -176,7 +176,7 @@ def _card(e: Effect, autopilot: str, *, ambiguous: bool) -> dict[str, Any]:
         "cure": e.cure,
         "parameters": [
             (n, words.setting(v))
-            for n, v in (e.parameters.items() if autopilot == "ardupilot" else ())
+            for n, v in (to_set(e).items() if autopilot == "ardupilot" else ())
         ],
         "intervals": _intervals(e),
         "more": max(len(e.intervals) - MOST_SPANS, 0),

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from onboard.core.accelerometer import parameter_names
-from onboard.core.findings import Diagnosis, Verdict
+from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.core.result import SIX_NAMES, Calibration, Status
 from onboard.report.words import effect_title
 
@@ -50,6 +50,11 @@ def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
         if math.isfinite(change.value):
             found.setdefault(change.name, change)
     return tuple(found.values())
+
+
+def to_set(effect: Effect) -> dict[str, float]:
+    """Parameters that cure an effect; none where they hold it already."""
+    return {} if effect.cure.startswith("none") else effect.parameters
 
 
 def param_file(diagnosis: Diagnosis, *, qgc: bool = False) -> str:
@@ -134,7 +139,7 @@ def _calibration(calibration: Calibration) -> Iterator[Change]:
 def _cures(diagnosis: Diagnosis, unclear: set[str]) -> Iterator[Change]:
     for effect in diagnosis.effects:
         withheld = "not told apart from another effect" if effect.name in unclear else ""
-        for name, value in effect.parameters.items():
+        for name, value in to_set(effect).items():
             yield Change(name, value, f"{effect.name}: {effect_title(effect.name)}", withheld)
 
 

@@ -75,6 +75,12 @@ def _over(effect: Effect) -> str:
     return f"over {_measured(next(iter(effect.unknowns.values())), 1e3, 'ms')}"
 
 
+def _attitude(effect: Effect) -> str:
+    q = next(iter(effect.unknowns.values()))
+    late = Quantity(abs(q.value), q.sigma, q.unit)
+    return f"attitude {'late' if q.value > 0.0 else 'early'} by {_measured(late, 1e3, 'ms')}"
+
+
 def _degrees(effect: Effect) -> str:
     return f"by {_axes(effect.unknowns, 1.0 / DEGREE, '°')}"
 
@@ -121,7 +127,8 @@ _SAID: dict[str, Callable[[Effect], str]] = {
     "gps_latency": _by(1e3, "ms"),
     "gps_smoothing": _over,
     "gps_lever_arm": _arm,
-    "imu_delay": _by(1e3, "ms"),
+    "imu_delay": _attitude,
+    "cross_axis": lambda effect: _axes(effect.unknowns, 100.0, "%"),
     "mount_tilt": _degrees,
     "heading_error": _by(1.0 / DEGREE, "°"),
     "heading_by_throttle": _degrees_per("at full throttle"),

@@ -8,8 +8,9 @@ import re
 import numpy as np
 
 from onboard.core.findings import Diagnosis, Effect, Verdict
+from onboard.report.parameters import to_set
 from onboard.report.sizes import size_in_words
-from onboard.report.words import capital, effect_title, fixed, listed, number, setting, signed
+from onboard.report.words import capital, effect_title, fixed, number, setting, signed
 
 COLOURS = {
     Verdict.CLEAN: "green",
@@ -45,12 +46,13 @@ def headline(diagnosis: Diagnosis) -> str:
         return "Something is missing, and nothing known explains it"
     titles = [effect_title(e.name) for e in named[:MOST_NAMED]]
     # A name that begins with capitals keeps them in the middle of a sentence.
-    rest = [t if t[:2].isupper() else t[:1].lower() + t[1:] for t in titles[1:]]
+    found = [t if t[:2].isupper() or not k else t[:1].lower() + t[1:] for k, t in enumerate(titles)]
     more = len(named) - len(titles)
-    found = [titles[0], *rest, *([f"{more} more"] if more else [])]
-    if diagnosis.verdict is Verdict.EXPLAINED:
-        return listed(found) if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
-    return ", ".join(found) + ", and something else is missing"
+    if diagnosis.verdict is not Verdict.EXPLAINED:
+        found.append("something else is missing" if not more else "more is missing")
+    elif more:
+        found.append("one more effect" if more == 1 else f"{more} more effects")
+    return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
 
 
 def missing(diagnosis: Diagnosis) -> list[str]:
@@ -59,12 +61,15 @@ def missing(diagnosis: Diagnosis) -> list[str]:
         return ["There is too little motion with trusted GPS to say what is missing."]
     said = [sized(e) + "." for e in diagnosis.effects]
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
-        said.append("That is not all: what is left is more than noise.")
+        more = "what is left is more than noise"
+        if diagnosis.mismatch.held_out_after <= NOISE:
+            more = "parts of this flight still contradict each other"
+        said.append(f"That is not all: {more}.")
     if said:
         return said
     if diagnosis.verdict is Verdict.CLEAN:
         return ["Scale, offset and timing explain this flight down to the noise."]
-    return ["The residual is larger than noise, but no effect of the catalogue fits it."]
+    return ["The residual is not noise, but no effect of the catalogue fits it."]
 
 
 def sized(effect: Effect) -> str:
@@ -96,14 +101,15 @@ def proof(diagnosis: Diagnosis) -> str:
     noise = m.held_out_after
     if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
         return "The residual could not be judged on data not used in the fit."
-    left = "which is noise" if noise <= NOISE else f"{noise:.1f} times what noise would leave"
-    if diagnosis.verdict is Verdict.CLEAN:
-        said = f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s, {left}."
-    else:
-        said = (
-            f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s, {left}; "
-            f"it was {number(before, 2)} m/s with scale and offset only ({fall(before, after)})."
-        )
+    said = f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s"
+    if noise > NOISE:
+        said += f", {noise:.1f} times what noise would leave"
+    elif diagnosis.verdict in (Verdict.CLEAN, Verdict.EXPLAINED):
+        said += ", which is noise"
+    if diagnosis.verdict is not Verdict.CLEAN:
+        said += f"; it was {number(before, 2)} m/s with scale and offset only"
+        said += f" ({fall(before, after)})"
+    said += "."
     if diagnosis.ambiguous:
         said += " Some effects could not be told apart, see below."
     return said
@@ -124,9 +130,7 @@ def cures(diagnosis: Diagnosis, *, parameters: bool = True) -> list[str]:
     out = []
     for e in diagnosis.effects:
         settings = ", ".join(
-            f"{n} = {setting(v)}"
-            for n, v in e.parameters.items()
-            if math.isfinite(v) and parameters
+            f"{n} = {setting(v)}" for n, v in to_set(e).items() if math.isfinite(v) and parameters
         )
         if e.cure or settings:
             out.append(_sentence(e.cure, settings))
@@ -140,7 +144,7 @@ def cures(diagnosis: Diagnosis, *, parameters: bool = True) -> list[str]:
 
 
 def _sentence(cure: str, settings: str) -> str:
-    text = capital(cure.rstrip("."))
+    text = capital(cure.rstrip(".")).replace("None:", "Nothing:")
     if not settings:
         return f"{text}."
     return f"{text}: {settings}." if text else f"Set {settings}."

@@ -99,7 +99,7 @@ def seconds(value: float, sigma: float) -> str:
 
 def setting(value: float) -> str:
     """A parameter's value as one types it; words where it is not finite."""
-    return f"{value + 0.0:.4g}" if math.isfinite(value) else UNKNOWN
+    return f"{round(value, 4) + 0.0:.4g}" if math.isfinite(value) else UNKNOWN
 
 
 def percent(share: float) -> str:

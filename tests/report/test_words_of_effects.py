@@ -6,6 +6,7 @@ import pytest
 from diagnoses_by_hand import NAN, diagnosis, effect
 
 from onboard.core.findings import Quantity, Verdict
+from onboard.report.parameters import changes
 from onboard.report.sizes import size_in_words
 from onboard.report.verdict import cures, headline, missing, proof, remarks, sized, to_fly
 from onboard.report.words import EFFECTS
@@ -26,6 +27,8 @@ def of(name: str, unit: str, /, intervals=(), **values: float):
         (of("gps_lever_arm", "m", x=-0.8, y=0.5, z=0.0), "0.80 m back and 0.50 m right"),
         (of("mount_tilt", "rad", roll=0.0349066, pitch=-0.0523599), "by roll 2.00, pitch −3.00°"),
         (of("heading_error", "rad", yaw=0.0872665), "by 5.00 ± 0.05°"),
+        (of("imu_delay", "s", delay=-0.04), "attitude early by 40.0 ± 0.4 ms"),
+        (of("cross_axis", "1", xy=0.03, zy=0.0), "xy 3.00 %"),
         (of("clock_skew", "1", rate=2e-4), "by 200 ± 2 ppm"),
         (of("scale_nonlinearity", "1/g", x=0.01, y=0.0, z=0.02), "x 1.00, z 2.00 % per g"),
         (of("saturation", "m/s^2", ((1.0, 2.0), (3.0, 4.0)), limit=39.2), "of 39.2 m/s², 2 times"),
@@ -64,7 +67,7 @@ def test_the_headline_names_what_was_found():
     )
     assert headline(diagnosis(verdict=Verdict.PARTLY_EXPLAINED)).endswith("else is missing")
     three = headline(diagnosis(effects=(late, tilt, effect("bias_ramp"))))
-    assert three.endswith("and 1 more")
+    assert three.endswith("and one more effect")
 
 
 def test_a_formula_without_a_name_is_no_finding():
@@ -88,6 +91,21 @@ def test_parameters_are_left_out_where_they_are_not_the_autopilots():
     assert "GPS1_DELAY_MS" in cures(diagnosis())[0]
     other = diagnosis(effects=(effect(cure="tell it the delay"),))
     assert cures(other, parameters=False) == ["Tell it the delay."]
+
+
+def test_what_the_parameters_hold_already_is_not_set_again():
+    held = effect("mount_tilt", cure="none: AHRS_TRIM holds it", parameters={"AHRS_TRIM_X": 0.02})
+    d = diagnosis(effects=(held,))
+    assert cures(d) == ["Nothing: AHRS_TRIM holds it."]
+    assert all(c.name != "AHRS_TRIM_X" for c in changes(d))
+
+
+def test_what_is_not_all_is_never_called_noise():
+    d = diagnosis(verdict=Verdict.PARTLY_EXPLAINED)
+    assert d.mismatch.held_out_after < 1.1
+    assert "which is noise" not in proof(d)
+    assert "contradict each other" in missing(d)[-1]
+    assert "which is noise" in proof(diagnosis())
 
 
 def test_the_note_is_sorted_into_what_to_fly_and_the_rest():
