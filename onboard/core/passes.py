@@ -219,13 +219,14 @@ class Pass:
         self.log_det += rows.log_det
         self.rows += y.shape[1]
         if self.keep_traces:
+            # Copies: views would keep the whole bank's rows of every epoch alive.
             result.traces.append(
                 EpochTrace(
                     rows.t,
-                    rows.raw_innovation,
-                    rows.raw_columns,
-                    y[0],
-                    h[0],
+                    rows.raw_innovation.copy(),
+                    rows.raw_columns.copy(),
+                    y[0].copy(),
+                    h[0].copy(),
                     rows.velocities,
                     rows.height,
                     rows.refused,

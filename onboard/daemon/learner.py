@@ -25,6 +25,7 @@ from onboard.core.samples import ParameterValue, Sample, VehicleState
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
 from onboard.daemon.examiner import Examiner
+from onboard.daemon.heap import trim
 from onboard.daemon.snapshot import TrustView
 from onboard.daemon.store import Kept, Store
 from onboard.daemon.view import trust_view
@@ -139,7 +140,9 @@ class Learner:
 
     def examine(self) -> Learned:
         """Diagnose one accelerometer of those that wait for it; takes seconds."""
+        trim()  # what the refinement of the flight has left
         self._examiner.examine_next(self._calibrator)
+        trim()
         return self._learned()
 
     def reset(self) -> Learned:
@@ -174,6 +177,7 @@ class Learner:
             diagnosed=[*self._kept.values(), *self._to_keep()],
         )
         self._counters["saves"] += 1
+        trim()
 
     def _to_keep(self) -> Iterable[Kept]:
         """The diagnoses that a restart must not lose, by the sensors that they are about."""
