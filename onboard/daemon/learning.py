@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 BATCH_S = 0.25
 WAITING_LIMIT = 200_000
 """Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
+BEHIND_S, CAUGHT_UP_S = 15.0, 2.0
+"""A diagnosis makes what comes in wait for some seconds; more is told, until it has caught up."""
 STEP_LIMIT_S = 120.0
 """A refinement or a diagnosis takes seconds, on a slow companion a minute; longer is a hang."""
 
@@ -63,6 +65,9 @@ class Learning:
         self._save_every_s = save_every_s
         self._next_save = 0.0
         self._samples: list[Sample] = []
+        self._arrived: float | None = None
+        self._taken: float | None = None
+        self._behind = False
         self._worker: Worker | None = None
         self._busy_since: float | None = None
         self._closing = False
@@ -75,6 +80,8 @@ class Learning:
     def take(self, message: Message) -> tuple[Sample, ...]:
         """Decode a message of the autopilot and put its samples into the next batch."""
         samples = self.decoder.decode(message)
+        if samples and self._arrived is None:
+            self._arrived = self._clock()
         self._samples += samples
         if len(self._samples) > WAITING_LIMIT:
             half = WAITING_LIMIT // 2
@@ -93,11 +100,13 @@ class Learning:
     async def step(self) -> None:
         """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
         samples, self._samples = self._samples, []
+        self._taken, self._arrived = self._arrived, None
         now = self._busy_since = self._clock()
         learned = await self._call(
             self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
         )
         self._accept(learned)
+        self._taken = None
         if learned.diagnosing and not self._closing:
             self._busy_since = self._clock()
             self._accept(await self._call(self._learner.examine))
@@ -122,6 +131,23 @@ class Learning:
     def keeps_up(self, now: float) -> bool:
         """Whether the learner is not stuck in a batch."""
         return self._busy_since is None or now - self._busy_since < STEP_LIMIT_S
+
+    def behind(self, now: float) -> float:
+        """How long ago the oldest sample came that is not learned yet, s."""
+        oldest = self._arrived if self._taken is None else self._taken
+        return 0.0 if oldest is None else max(0.0, now - oldest)
+
+    def tell_of_lag(self, now: float) -> None:
+        """Say when the learner falls behind what comes in, and when it has caught up."""
+        lag = self.behind(now)
+        if not self._behind and lag > BEHIND_S:
+            self._behind = True
+            self.counters["fell_behind"] += 1
+            text = f"the learner is {lag:.0f} s behind what comes in: answers come late"
+            self._notices.post("learner_behind", text, warning=True)
+        elif self._behind and lag < CAUGHT_UP_S:
+            self._behind = False
+            self._notices.post("learner_caught_up", "the learner has caught up")
 
     async def close(self, limit_s: float) -> None:
         """Learn what has come, save, and let the thread go; if it is busy, the last save counts."""

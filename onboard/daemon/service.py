@@ -73,6 +73,7 @@ SAVE_S = 5.0
 FINISH_PUSH_S = 8.0
 """A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
 JOURNAL_SHOWN = 50
+BEHIND_WORTH_SAYING_S = 5.0
 
 
 class Service:
@@ -211,6 +212,7 @@ class Service:
         condition = self._observed.condition(now)
         self._traffic.tick(now)
         self._pusher.judge(self._witness.report(condition, now))
+        self.learning.tell_of_lag(now)
         learned = self.learning.learned
         if learned is not None and (self._parameters.complete or self._pusher.busy):
             self._pusher.consider(
@@ -400,7 +402,9 @@ class Service:
             for imu, c in learned.calibrations.items()
         )
         trust = "trusted" if learned.trust.open else "not trusted"
-        return f"{self.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}"
+        lag = self.learning.behind(self._clock())
+        late = f", {lag:.0f} s behind" if lag > BEHIND_WORTH_SAYING_S else ""
+        return f"{self.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}{late}"
 
     def _make_recorder(self, state: Path) -> Recorder | None:
         recording = self.configuration.recording

@@ -2,6 +2,7 @@
 
 import asyncio
 import dataclasses
+import itertools
 import os
 import signal
 import socket
@@ -14,6 +15,7 @@ from standing_vehicle import PX4, Vehicle
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
+from onboard.core.samples import ImuSample
 from onboard.daemon import learning
 from onboard.daemon import service as service_module
 from onboard.daemon.configuration import from_mapping
@@ -444,6 +446,36 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
         assert sent == []
         monkeypatch.setattr(service_module, "SAVE_S", 0.1)
     release.set()
+
+
+async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port, monkeypatch):
+    release = threading.Event()
+    monkeypatch.setattr(learning, "BEHIND_S", 0.3)
+    monkeypatch.setattr(learning, "CAUGHT_UP_S", 0.29)
+    monkeypatch.setattr(service_module, "BEHIND_WORTH_SAYING_S", 0.29)
+
+    def said(service, kind):
+        return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
+
+    async with daemon(document) as service, Vehicle(port):
+        await until(lambda: service.learning.learned is not None)
+        learner = service.learning._learner
+        learn, learned = learner.learn, []
+
+        def slow(samples, **how):
+            release.wait(30.0)
+            learned.extend(samples)
+            return learn(samples, **how)
+
+        learner.learn = slow
+        await until(lambda: said(service, "learner_behind"))
+        assert service.snapshot().counters["fell_behind"] == 1
+        assert "behind" in service._sentence()
+        release.set()
+        await until(lambda: said(service, "learner_caught_up"))
+        times = [s.t for s in learned if isinstance(s, ImuSample)]
+        assert len(times) > 3
+        assert max(b - a for a, b in itertools.pairwise(times)) < 0.1, "nothing was left out"
 
 
 async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
