@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 MARGIN = 25.0
 """Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
 HELD_OUT_GAIN = 12.0
+SECOND_ORDER = 1e-3
+"""Share of the evidence of what was found that its linear columns may have left over."""
 SIGNIFICANT = 5.0
 MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
 MOST_EFFECTS = 5
@@ -71,8 +73,8 @@ class Candidate:
 class Choice:
     """Effects that were taken, in order, and the sums in which they are columns.
 
-    ``jump`` is the portion at whose start the offsets jump, None without; ``close`` are other
-    candidates that nearly did as well in the place of a chosen one.
+    ``jump`` is the portion at whose start the offsets jump, None without; ``nothing`` a fit without
+    the effects that ``base`` holds.
     """
 
     fitter: Fitter
@@ -80,6 +82,13 @@ class Choice:
     candidates: list[Candidate]
     chosen: list[Candidate]
     jump: int | None = None
+    nothing: Fit | None = None
+
+    def least(self, now: Fit) -> float:
+        """Evidence that is more than what is left of second order of what was found already."""
+        if self.nothing is None:
+            return MARGIN
+        return max(MARGIN, SECOND_ORDER * self.fitter.gain(self.nothing, now))
 
     @property
     def free(self) -> list[int]:
@@ -128,9 +137,21 @@ def rivals_of(
     return list(nearest.values())
 
 
-def choose(fitter: Fitter, base: Sequence[int], candidates: Sequence[Candidate]) -> Choice:
-    """Forward selection, each time with a look back."""
-    choice = Choice(fitter, list(base), list(candidates), [])
+def choose(
+    fitter: Fitter,
+    base: Sequence[int],
+    candidates: Sequence[Candidate],
+    nothing: Fit | None = None,
+) -> Choice:
+    """Forward selection, each time with a look back.
+
+    Args:
+        fitter: has the columns of all.
+        base: columns that are in the model anyway.
+        candidates: effects that may be taken.
+        nothing: fit without the effects that ``base`` holds (a late attitude, a tilt).
+    """
+    choice = Choice(fitter, list(base), list(candidates), [], nothing=nothing)
     while len(choice.chosen) < MOST_EFFECTS:
         step, boundary = _best_jump(choice)
         offered = [c for c in choice.candidates if c not in choice.chosen]
@@ -144,7 +165,11 @@ def choose(fitter: Fitter, base: Sequence[int], candidates: Sequence[Candidate])
             after = wide.fit([*choice.free, *c.index])
             scored.append((c.bic(wide, before, after), c, after))
         scored.sort(key=lambda s: -s[0])
-        best = next((c for bic, c, after in scored if accepted(wide, before, after, c, bic)), None)
+        least = choice.least(before)
+        fine = (
+            c for bic, c, after in scored if bic >= least and accepted(wide, before, after, c, bic)
+        )
+        best = next(fine, None)
         if best is None:
             break
         if best is step:
@@ -179,7 +204,7 @@ def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> boo
             continue
         after = fitter.fit([*rest, *other.index], held)
         bic = other.bic(fitter, before, after)
-        if bic > better and accepted(fitter, before, after, other, bic):
+        if bic > max(better, choice.least(before)) and accepted(fitter, before, after, other, bic):
             better, taken = bic, other
     if taken is None:
         return False

@@ -33,11 +33,13 @@ from onboard.core.physics.gains import Gain
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
 from onboard.core.report import timing_of
+from onboard.core.samples import Vector3
 from onboard.core.screening import false_fixes, unclipped
 from onboard.core.search import searched
 from onboard.core.selection import Fitter
 from onboard.core.solution import Solution, solve
 from onboard.core.timing_effects import (
+    ATTITUDE_ERRORS,
     LEAST,
     STANDING,
     Standing,
@@ -87,25 +89,26 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
     fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
-    choice = _chosen(full, testable)
+    full.doubting_attitude()
+    choice = _chosen(full, testable, calibrator.parameters.trim)
     standing, doubts = _second_thoughts(choice, full, calibrator)
     families = _families(full, choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
         families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
-    final = _final(full, choice, families)
+    final = _final(full, choice, families).doubting_attitude()
     kept = _needed(final, families)
     if len(kept) < len(families):
         # A jump may have passed for something slower, or the other way round.
         families = kept
-        final = Examination(full, families, t0=origin.t0, start=final).with_rows()
+        final = _again(full, families, final).with_rows().doubting_attitude()
     found = searched(final, families, choice.fitter.weaken)
     if found != families:
         families = found
-        final = Examination(full, families, t0=origin.t0, start=final).with_noise()
+        final = _again(full, families, final).with_noise().doubting_attitude()
         kept = _needed(final, families)
         if len(kept) < len(families):
             families = kept
-            final = Examination(full, families, t0=origin.t0, start=final).with_rows()
+            final = _again(full, families, final).with_rows().doubting_attitude()
     return Judge(
         calibrator,
         imu,
@@ -125,7 +128,7 @@ def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:
     return list(chunks[first:])
 
 
-def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
+def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3) -> Choice:
     """Selection on the sums of the whole catalogue."""
     solution = full.found()
     fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
@@ -137,7 +140,12 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns]) -> Choice:
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
     candidates = [Candidate(c.effect, tuple(full.indices(c)), c.plausible, c) for c in testable]
-    return choose(fitter, base, candidates)
+    index = full.model.index
+    errors = [c for name in ATTITUDE_ERRORS for c in STANDING[name]]
+    held = without(errors, index, full.point, full.absent, told=0.0, trim=trim)
+    gone = {index[c] for c in errors}
+    nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
+    return choose(fitter, base, candidates, nothing)
 
 
 def _second_thoughts(
@@ -156,7 +164,8 @@ def _second_thoughts(
         solution = Solution(
             fit.theta, fit.covariance, choice.fitter.sums.N, choice.fitter.weaken, 1.0, 1.0
         )
-        standing = standing_effects(timing_of(full, solution), solution, index, told, trim)
+        timing = timing_of(full, solution)
+        standing = standing_effects(timing, solution, index, full.point, told, trim)
         taken = False
         for name in standing:
             target = Candidate(name, tuple(index[c] for c in STANDING[name]), ())
@@ -164,8 +173,8 @@ def _second_thoughts(
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
             break
-    timing = [name for name in standing if name in LEAST]
-    return set(standing), {n: d for n in timing if (d := _doubts(choice, full, n, told))}
+    timed = [name for name in standing if name in LEAST]
+    return set(standing), {n: d for n in timed if (d := _doubts(choice, full, n, told))}
 
 
 def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
@@ -212,6 +221,11 @@ def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns])
     theta[mine] = fit.theta[theirs]
     covariance[np.ix_(mine, mine)] = fit.covariance[np.ix_(theirs, theirs)]
     return final.with_rows(theta, covariance)
+
+
+def _again(full: Examination, families: Sequence[EffectColumns], final: Examination) -> Examination:
+    """Another model than the final one, from where that one has come to."""
+    return Examination(full, families, t0=full.point.skew_from, start=final)
 
 
 def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[EffectColumns]:

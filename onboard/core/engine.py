@@ -25,7 +25,7 @@ from onboard.core.calibration_columns import (
     Six,
 )
 from onboard.core.columns import Family, Model
-from onboard.core.linearisation import Linearisation
+from onboard.core.linearisation import MOVING, Linearisation
 from onboard.core.noise import NoiseLevels, distance, line, star, stepped
 from onboard.core.passes import Pass, PassResult
 from onboard.core.portions import Portion, merged
@@ -50,6 +50,10 @@ LONGEST_WINDOW_S = 0.45
 LONGEST_FIX_GAP_S = 2.5
 """Receivers report at 1 Hz or faster: longer without a fix is an outage, not trusted flight."""
 DELAY_RANGE_S = (-0.1, 0.45)
+ATTITUDE_DELAY_RANGE_S = (-0.15, 0.15)
+HEADING_RANGE_RAD = (-0.8, 0.8)
+STEADY = (5e-4, 2e-3, 5e-3, 0.02)
+"""Moves of :data:`MOVING` that are not worth another pass: s, s^2, s, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +110,10 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         beta=tuple(float(x) for x in theta[3:6]),  # type: ignore[arg-type] # three by construction
         delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
         window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
-        attitude_delay=point.attitude_delay,
+        attitude_delay=float(
+            np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
+        ),
+        heading=float(np.clip(point.heading + theta[i["heading"]], *HEADING_RANGE_RAD)),
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,
     )
@@ -179,10 +186,9 @@ class Engine:
     def _about_point(self, theta: Array) -> Array:
         """``theta`` of an older linearisation as unknowns about the present one."""
         out = theta.copy()
-        out[self.model.index["gps_delay"]] = 0.0
-        out[self.model.index["window_squared"]] = 0.0
-        if "clock_rate" in self.model.index:
-            out[self.model.index["clock_rate"]] = 0.0
+        for name in (*MOVING, "clock_rate"):
+            if name in self.model.index:
+                out[self.model.index[name]] = 0.0
         return out
 
     @property
@@ -248,10 +254,7 @@ class Engine:
             made = self._new_pass(members)
             self._seed = solve(self._over_buffer(made), self.model)
             point = moved(self.point, self.model, self._seed.theta)
-            timed = (
-                abs(point.delay - self.point.delay) < 5e-4
-                and abs(point.window**2 - self.point.window**2) < 2e-3
-            )
+            timed = point.near(self.point, STEADY)
             levels, target = _next_levels(self.noise, target, members, made.log_likelihoods())
             settled = target is None and distance(self.noise, levels) < SETTLED
             self._move(point, levels)
@@ -268,8 +271,8 @@ class Engine:
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = np.zeros(self.model.size)
-        shift[self.model.index["gps_delay"]] = point.delay - self.point.delay
-        shift[self.model.index["window_squared"]] = point.window**2 - self.point.window**2
+        for name, now, before in zip(MOVING, point.moving, self.point.moving, strict=True):
+            shift[self.model.index[name]] = now - before
         self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
         self.point, self.noise = point, levels
         self.model = self._model()

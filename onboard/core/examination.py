@@ -30,8 +30,14 @@ SAMPLE_S = 200.0
 BLOCK = 4
 """Neighbouring chunks of the sample: the filter needs ten seconds to settle in each."""
 NOISE_ROUNDS = 4
-LATE_S, SPREAD_S2 = 2e-3, 4e-3
-"""Moves of delay and squared window that are worth another linearisation."""
+WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
+"""Moves of delay, squared window, attitude delay and heading that are worth another pass."""
+
+
+CONSISTENT = 2.0
+"""Inflation of the variance up to which portions of a flight agree."""
+LESS_BELIEVED = 10.0
+STILL_INCONSISTENT = 0.7
 
 
 class Examination(Engine):
@@ -97,13 +103,31 @@ class Examination(Engine):
             self.once(held)
             self._seed = found = solve(self.portions, self.model)
             point = moved(self.point, self.model, found.theta)
-            late = abs(point.delay - self.point.delay)
-            spread = abs(point.window**2 - self.point.window**2)
-            settled = late < LATE_S and spread < SPREAD_S2
+            settled = point.near(self.point, WORTH_A_PASS)
             if not left or (settled and not blind):
                 break
             self._move(point, self.noise)
             held, blind = None, False
+        return self
+
+    def doubting_attitude(self) -> Examination:
+        """Believe the recorded attitude less while portions of the flight contradict each other.
+
+        An EKF levels with the accelerometer that is examined: what changes the accelerometer's
+        offset in flight (temperature, a jump) tilts the recorded attitude too, for as long as the
+        EKF needs to learn it, and by more than the quiet rest of the flight lets expect.
+        """
+        while self.found().inflation > CONSISTENT:
+            kept = self.noise, self.portions, self.traces, self._seed, self._solution
+            found = self.found()
+            self.noise = self.noise.scaled("attitude", LESS_BELIEVED)
+            if self.noise == kept[0]:
+                break
+            self._seed = found
+            self.once((found.theta, found.covariance))
+            if self.found().inflation > STILL_INCONSISTENT * found.inflation:
+                self.noise, self.portions, self.traces, self._seed, self._solution = kept
+                break
         return self
 
     def once(self, held: tuple[Array, Array] | None = None) -> None:

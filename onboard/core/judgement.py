@@ -106,7 +106,12 @@ class Judge:
         """Everything that is said about the recording."""
         timing = timing_of(self.engine, self.solution)
         standing = standing_effects(
-            timing, self.solution, self.index, self.told, self.calibrator.parameters.trim
+            timing,
+            self.solution,
+            self.index,
+            self.engine.point,
+            self.told,
+            self.calibrator.parameters.trim,
         )
         ladder, fits = self._ladder()
         before, after = fits[0], fits[-1]
@@ -166,9 +171,9 @@ class Judge:
                 )
             )
 
-        climb("six numbers only", self._held(timing))
+        climb("six numbers only", self._held([*timing, "heading"]))
         free = free + late
-        climb("+ timing")
+        climb("+ timing", self._held(["heading"]))
         free = free + turned
         climb("+ attitude")
         for f in self.families:

@@ -151,7 +151,7 @@ class Pass:
         gram = None if noise is None else noise.gram.copy()
         if not self._running:
             first = epochs[0]
-            R0 = stretch.attitude_at(epoch_t[:1])[0][0]
+            R0 = self.point.attitude(stretch, epoch_t[:1])[0][0]
             self.filter.start(first, R0, TILT_START, HEADING_START)
             self._running = True
             self._last_velocity_t = first.t
@@ -172,7 +172,7 @@ class Pass:
             if e < 0:
                 continue
             if self.uses.recorded_attitude:
-                self.filter.R_nb = stretch.attitude_at(epoch_t[e : e + 1])[0][0]
+                self.filter.R_nb = self.point.attitude(stretch, epoch_t[e : e + 1])[0][0]
             rows = self.filter.update(epochs[e], self.theta, self.covariance)
             result.epochs += 1
             if rows is not None:
@@ -263,7 +263,7 @@ class Pass:
         around: Around,
         c: StretchColumns,
     ) -> list[Epoch]:
-        R_att, near = stretch.attitude_at(around.now.t)
+        R_att, near = self.point.attitude(stretch, around.now.t)
         kappa = mean_weights(around.offset, self.point.window)
         known = np.einsum("j,kja->ka", kappa, around.f_epoch)
         known += around.swing @ stretch.lever_arm_b

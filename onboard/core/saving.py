@@ -115,6 +115,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             delay=_finite(point["delay"]),
             window=_finite(point["window"]),
             attitude_delay=_finite(point["attitude_delay"]),
+            heading=_finite(point.get("heading", 0.0)),
         ),
         noise,
         _finite(e["trusted_s"]),

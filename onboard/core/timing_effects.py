@@ -45,6 +45,7 @@ STANDING: dict[str, tuple[str, ...]] = {
     "heading_error": ("heading",),
 }
 """Unknowns that are always in the model and become an effect past a size."""
+ATTITUDE_ERRORS = ("imu_delay", "mount_tilt", "heading_error")
 
 LEAST = {"gps_latency": LATENCY_S, "gps_smoothing": WINDOW_S, "imu_delay": IMU_DELAY_S}
 """Sizes from which timing is an effect, s."""
@@ -56,6 +57,7 @@ def standing_effects(
     timing: Mapping[str, Estimate],
     solution: Solution,
     index: Mapping[str, int],
+    point: Linearisation,
     told: float,
     trim: Vector3,
 ) -> Standing:
@@ -110,7 +112,7 @@ def standing_effects(
             if missing
             else {"AHRS_TRIM_X": trim[0], "AHRS_TRIM_Y": trim[1]},
         )
-    heading = float(solution.theta[yaw])
+    heading = point.heading + float(solution.theta[yaw])
     if abs(heading) > HEADING_RAD and abs(heading) > SURE * sigma[yaw]:
         out["heading_error"] = (
             {"yaw": Quantity(heading, float(sigma[yaw]), "rad")},
@@ -137,6 +139,7 @@ def without(
         "gps_delay": told - point.delay,
         "window_squared": -(point.window**2),
         "attitude_delay": -point.attitude_delay,
+        "heading": -point.heading,
         "tilt_roll": trim[0],
         "tilt_pitch": trim[1],
     }
