@@ -24,7 +24,7 @@ from onboard.core.choice import (
 )
 from onboard.core.engine import Chunk, moved
 from onboard.core.examination import Examination
-from onboard.core.findings import Diagnosis, NotTestable
+from onboard.core.findings import Diagnosis, Effect, NotTestable
 from onboard.core.judgement import Evidence, Judge
 from onboard.core.jumps import boundary_of, candidate_of, jump_near
 from onboard.core.physics.catalogue import catalogue
@@ -86,7 +86,11 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
             chunks = flight
     testable, absent = _testable(catalogue(origin), chunks)
     full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
-    fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
+    clipped = rail is not None and chunks is flight
+    fault: Effect | None = None
+    if not clipped:
+        # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
+        fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     full.doubting_attitude()
@@ -101,7 +105,7 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         # A jump may have passed for something slower, or the other way round.
         families = kept
         final = _again(full, families, final).with_rows().doubting_attitude()
-    found = searched(final, families, choice.fitter.weaken)
+    found = families if clipped else searched(final, families, choice.fitter.weaken)
     if found != families:
         families = found
         final = _again(full, families, final).with_noise().doubting_attitude()

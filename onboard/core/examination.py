@@ -22,6 +22,7 @@ from onboard.core.physics.effect import EffectColumns
 from onboard.core.portions import Portion
 from onboard.core.solution import Solution, solve
 from onboard.core.traces import EpochTrace
+from onboard.core.timing_effects import ATTITUDE_ERRORS, STANDING
 
 Array = NDArray[np.float64]
 
@@ -36,8 +37,10 @@ WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
 
 CONSISTENT = 2.0
 """Inflation of the variance up to which portions of a flight agree."""
-LESS_BELIEVED = 10.0
+LESS_BELIEVED = 3.0
 STILL_INCONSISTENT = 0.7
+AGREE = 1.5
+"""Sigmas within which two answers are the same."""
 
 
 class Examination(Engine):
@@ -68,6 +71,7 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
+        self.doubted = isinstance(start, Examination) and start.doubted
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
@@ -115,20 +119,32 @@ class Examination(Engine):
 
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
         offset in flight (temperature, a jump) tilts the recorded attitude too, for as long as the
-        EKF needs to learn it, and by more than the quiet rest of the flight lets expect.
+        EKF needs to learn it, and by more than the quiet rest of the flight lets expect.  What
+        follows from an attitude that is believed too much moves when it is believed less
+        (Hausman, Econometrica 46, 1978), which ends when it moves no longer.
         """
-        while self.found().inflation > CONSISTENT:
+        while self.found().inflation > CONSISTENT or self.doubted:
             kept = self.noise, self.portions, self.traces, self._seed, self._solution
-            found = self.found()
+            before = self.found()
             self.noise = self.noise.scaled("attitude", LESS_BELIEVED)
             if self.noise == kept[0]:
                 break
-            self._seed = found
-            self.once((found.theta, found.covariance))
-            if self.found().inflation > STILL_INCONSISTENT * found.inflation:
+            self._seed = before
+            self.once((before.theta, before.covariance))
+            after = self.found()
+            worse = after.inflation > max(CONSISTENT, STILL_INCONSISTENT * before.inflation)
+            if worse or (before.inflation <= CONSISTENT and not self._moved(before, after)):
                 self.noise, self.portions, self.traces, self._seed, self._solution = kept
                 break
+            self.doubted = True
         return self
+
+    def _moved(self, before: Solution, after: Solution) -> bool:
+        """Whether the accelerometer's unknowns are others than before, beyond their sigmas."""
+        attitude = {c for name in ATTITUDE_ERRORS for c in STANDING[name]}
+        mine = [i for i, u in enumerate(self.model.unknowns) if u.name not in attitude]
+        sigma = np.sqrt(np.diag(after.covariance))[mine]
+        return bool(np.max(np.abs(after.theta - before.theta)[mine] / sigma) > AGREE)
 
     def once(self, held: tuple[Array, Array] | None = None) -> None:
         """Go through the whole flight as it is linearised; ``held`` are what gates know."""
