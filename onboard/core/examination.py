@@ -35,7 +35,7 @@ WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
 """Moves of delay, squared window, attitude delay and heading that are worth another pass."""
 
 
-CONSISTENT = 2.0
+CONSISTENT = 1.25
 """Inflation of the variance up to which portions of a flight agree."""
 LESS_BELIEVED = 3.0
 STILL_INCONSISTENT = 0.7
@@ -71,7 +71,7 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
-        self.doubted = isinstance(start, Examination) and start.doubted
+        self.doubted: bool = isinstance(start, Examination) and start.doubted
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
