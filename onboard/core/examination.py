@@ -71,7 +71,9 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
-        self.doubted: bool = isinstance(start, Examination) and start.doubted
+        self.doubted = any(getattr(f, "tilts_ekf", False) for f in families) and start is not None
+        if isinstance(start, Examination):
+            self.doubted = self.doubted or start.doubted
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,

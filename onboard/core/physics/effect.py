@@ -35,6 +35,7 @@ class EffectColumns(Family):
         source: where the formula is from.
         cure: what a user does about it.
         apart: the manoeuvre that tells it from what looks alike.
+        tilts_ekf: whether it changes the offset in flight, which an EKF takes for tilt at first.
     """
 
     effect: str = ""
@@ -44,6 +45,7 @@ class EffectColumns(Family):
     cure: str = ""
     apart: str = "fly banked turns both ways, climbs, and hard accelerations"
     keys: tuple[str, ...] = ()
+    tilts_ekf: bool = False
 
     def available(self, nodes: Signals) -> bool:
         """True if every signal it needs is in the recording."""

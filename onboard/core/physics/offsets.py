@@ -16,6 +16,7 @@ class TemperatureDrift(EffectColumns):
     """Offset that follows the sensor's temperature, linear about ArduPilot's 35 degC."""
 
     name = effect = "temperature_drift"
+    tilts_ekf = True
     needs = ("temperature",)
     source = "AP_InertialSensor_tempcal: polynomial about 35 degC; its linear term"
     cure = "calibrate the IMU's temperature drift: INS_TCAL1_ENABLE = 2, cold start, let it warm up"
@@ -42,6 +43,7 @@ class BiasRamp(EffectColumns):
     """Offset that grows with time."""
 
     name = effect = "bias_ramp"
+    tilts_ekf = True
     source = "first-order drift, IEEE Std 1293"
     cure = "recalibrate; look for a cause that grows with time (warming, moisture, a loose mount)"
     apart = "fly longer, once cold and once warm"
@@ -60,6 +62,7 @@ class BiasStep(EffectColumns):
     """Offset that jumps at one moment."""
 
     effect = "bias_step"
+    tilts_ekf = True
     source = "step in the offset: a shock, a mount that gave way"
     cure = "inspect the mount of the autopilot; recalibrate on the ground"
     apart = "fly on: a step stays"
@@ -80,6 +83,7 @@ class VibrationRectification(EffectColumns):
     """Offset that grows with the square of vibration."""
 
     name = effect = "vibration_rectification"
+    tilts_ekf = True
     needs = ("vibration",)
     source = "vibration rectification error, IEEE Std 1293 and MEMS data sheets"
     cure = "damp the autopilot's mount, balance propellers"
@@ -100,6 +104,7 @@ class ThrottleCoupling(EffectColumns):
     """Offset proportional to throttle: supply voltage, airframe twist."""
 
     name = effect = "throttle_coupling"
+    tilts_ekf = True
     needs = ("throttle",)
     source = "linear in the throttle"
     cure = "separate the autopilot's power wiring from the motors', stiffen its mount"
