@@ -94,7 +94,11 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     full.doubting_attitude()
-    choice = _chosen(full, testable, calibrator.parameters.trim)
+    trim = calibrator.parameters.trim
+    choice = _chosen(full, testable, trim)
+    if any(c.effect == STEP or (c.columns and c.columns.tilts_ekf) for c in choice.chosen):
+        # Which of those it is must not be decided by an attitude that it has tilted.
+        choice = _chosen(full.doubting(), testable, trim)
     standing, doubts = _second_thoughts(choice, full, calibrator)
     families = _families(full, choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:

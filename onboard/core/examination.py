@@ -39,6 +39,7 @@ CONSISTENT = 1.25
 """Inflation of the variance up to which portions of a flight agree."""
 LESS_BELIEVED = 3.0
 STILL_INCONSISTENT = 0.7
+HARDLY_BELIEVED = 0.1
 AGREE = 1.5
 """Sigmas within which two answers are the same."""
 
@@ -140,6 +141,15 @@ class Examination(Engine):
                 break
             self.doubted = True
         return self
+
+    def doubting(self) -> Examination:
+        """The same flight and columns with an attitude that is hardly believed."""
+        made = Examination(self, self._more, t0=self.point.skew_from, start=self)
+        made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
+        found = self.found()
+        made._seed = found  # noqa: SLF001 - of the same kind
+        made.once((found.theta, found.covariance))
+        return made
 
     def _moved(self, before: Solution, after: Solution) -> bool:
         """Whether the accelerometer's unknowns are others than before, beyond their sigmas."""
