@@ -197,11 +197,9 @@ def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[s
 def _families(full: Examination, choice: Choice) -> list[EffectColumns]:
     """Columns of what was chosen; those of a gain about its size, a jump at its moment."""
     theta = choice.fitter.fit(choice.free, held_out=False).theta
-    families = [
-        c.columns.about(theta[list(c.index)]) if isinstance(c.columns, Gain) else c.columns
-        for c in choice.chosen
-        if c.columns is not None
-    ]
+    sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
+    offsets = tuple((f, size) for f, size in sized if f.tilts_ekf)
+    families = [f.about(size, offsets) if isinstance(f, Gain) else f for f, size in sized]
     if choice.jump is None or all(c.effect != STEP for c in choice.chosen):
         return families
     near = boundary_of(choice.fitter, choice.jump)

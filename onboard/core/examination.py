@@ -147,7 +147,7 @@ class Examination(Engine):
         made = Examination(self, self._more, t0=self.point.skew_from, start=self)
         made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
         found = self.found()
-        made._seed = found  # noqa: SLF001 - of the same kind
+        made._seed = found
         made.once((found.theta, found.covariance))
         return made
 

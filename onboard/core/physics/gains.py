@@ -25,20 +25,25 @@ class Gain(EffectColumns):
     """
 
     taken: Array | None = None
+    beside: tuple[tuple[EffectColumns, Array], ...] = ()
 
     def __init__(self, origin: Origin) -> None:
         """No reference is needed."""
         del origin
 
-    def about(self, taken: Array) -> Gain:
-        """The same effect, linearised about ``taken`` (k,)."""
+    def about(self, taken: Array, beside: tuple[tuple[EffectColumns, Array], ...] = ()) -> Gain:
+        """The same effect, linearised about ``taken`` (k,) and other effects with their sizes."""
         made = copy(self)
-        made.taken = taken
+        made.taken, made.beside = taken, beside
         return made
 
     def acceleration(self, nodes: Signals) -> Array:
         """(..., 3, k) of the force without the effect."""
         f_b = nodes.f_b
+        for other, size in self.beside:
+            added = other.acceleration(nodes)
+            if added is not None:
+                f_b = f_b + added @ size
         if self.taken is not None:
             f_b = f_b + self.amount(f_b) @ self.taken
         return self.amount(f_b)
