@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 MARGIN = 25.0
 """Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
 HELD_OUT_GAIN = 12.0
-SECOND_ORDER = 1e-3
-"""Share of the evidence of what was found that its linear columns may have left over."""
+SECOND_ORDER = 5e-3
+"""Share of the evidence of what was found that columns linear in it, made of signals that are
+sampled now and then, may have left over."""
 SIGNIFICANT = 5.0
 MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
 MOST_EFFECTS = 5
