@@ -21,8 +21,8 @@ from onboard.core.passes import Pass, PassResult
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.portions import Portion
 from onboard.core.solution import Solution, solve
-from onboard.core.traces import EpochTrace
 from onboard.core.timing_effects import ATTITUDE_ERRORS, STANDING
+from onboard.core.traces import EpochTrace
 
 Array = NDArray[np.float64]
 
