@@ -27,6 +27,10 @@ SECOND_ORDER = 5e-3
 """Share of the evidence of what was found that columns linear in it, made of signals that are
 sampled now and then, may have left over."""
 SIGNIFICANT = 5.0
+CONTRADICTING, RECONCILED = 3.0, 0.35
+"""Inflation of the variance from which portions contradict each other; what share is agreement."""
+FAIR = 10.0
+"""Fall of BIC that is enough for an effect which makes portions agree."""
 MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
 MOST_EFFECTS = 5
 RIVAL_SHARE = 0.15
@@ -170,7 +174,7 @@ def choose(
         fine = (
             c for bic, c, after in scored if bic >= least and accepted(wide, before, after, c, bic)
         )
-        best = next(fine, None)
+        best = next(fine, None) or _reconciling(wide, choice.free, before, scored)
         if best is None:
             break
         if best is step:
@@ -260,6 +264,28 @@ def _reconsider(choice: Choice) -> None:
             whole = fitter.fit(rest), fitter.fit([*rest, *other.index])
             if accepted(fitter, *whole, other, better):
                 choice.chosen[choice.chosen.index(c)] = other
+
+
+def _reconciling(
+    fitter: Fitter,
+    free: Sequence[int],
+    before: Fit,
+    scored: Sequence[tuple[float, Candidate, Fit]],
+) -> Candidate | None:
+    """An effect of fair evidence with which portions agree that contradict each other without."""
+    if fitter.inflation(free) < CONTRADICTING:
+        return None
+    for bic, c, after in scored:
+        fair = bic > FAIR and accepted(fitter, before, after, c, MARGIN)
+        if fair and reconciles(fitter, free, c.index):
+            return c
+    return None
+
+
+def reconciles(fitter: Fitter, rest: Sequence[int], index: Sequence[int]) -> bool:
+    """Whether portions contradict each other without the columns ``index``, and agree with them."""
+    apart = fitter.inflation(rest)
+    return apart > CONTRADICTING and fitter.inflation([*rest, *index]) < RECONCILED * apart
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) -> bool:

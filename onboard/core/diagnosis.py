@@ -14,12 +14,14 @@ import numpy as np
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.choice import (
+    FAIR,
     MARGIN,
     STEP,
     Candidate,
     Choice,
     choose,
     doubtful,
+    reconciles,
     reconsider_standing,
 )
 from onboard.core.engine import Chunk, moved
@@ -241,13 +243,15 @@ def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[Effect
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
     while kept:
         free = base + made.indices_of(kept)
+        # What a needless jump makes of the offsets must not weaken what is said for the others.
+        fitter.weaken = fitter.inflation(free)
         with_all = fitter.fit(free, held_out=False)
         worst, least = None, np.inf
         for family in kept:
             c = candidate_of(made, family)
-            without = fitter.fit([i for i in free if i not in c.index], held_out=False)
-            bic = c.bic(fitter, without, with_all)
-            if bic < least:
+            rest = [i for i in free if i not in c.index]
+            bic = c.bic(fitter, fitter.fit(rest, held_out=False), with_all)
+            if bic < least and not (bic > FAIR and reconciles(fitter, rest, c.index)):
                 worst, least = family, bic
         if least >= MARGIN:
             break

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from onboard.core.columns import Family, Model, Unknown
 from onboard.core.portions import Portion
-from onboard.core.solution import FOLDS, total
+from onboard.core.solution import FOLDS, solve, total
 from onboard.core.sums import NormalSums
 
 Array = NDArray[np.float64]
@@ -108,6 +108,21 @@ class Fitter:
     def gain(self, before: Fit, after: Fit) -> float:
         """Fall of chi-square, weakened."""
         return (before.chi2 - after.chi2) / self.weaken
+
+    def inflation(self, free: Sequence[int]) -> float:
+        """How much portions contradict each other in a model of ``free``, whole families each."""
+        within, slices = set(free), self.model.slices
+        columns = {
+            f.name: range(*slices[f.name].indices(self.model.size)) for f in self.model.families
+        }
+        families = [f for f in self.model.families if within.issuperset(columns[f.name])]
+        index = [i for f in families for i in columns[f.name]]
+        at = self.absent.copy()
+        at[index] = 0.0
+        portions = [
+            Portion(p.start, p.end, p.sums.shifted(at).subset(index)) for p in self.portions
+        ]
+        return solve(portions, Model(families)).inflation
 
     def held_gain(self, before: Fit, after: Fit) -> float:
         """Fall of held-out chi-square, weakened."""
