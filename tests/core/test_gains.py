@@ -7,6 +7,7 @@ import pytest
 
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.gains import CrossAxis, ForceTilt, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.offsets import BiasRamp
 from onboard.core.regimes import axis_of
 
 F = np.array([[1.0, -2.0, -14.0], [3.0, 0.5, -9.0], [-2.0, 4.0, -20.0]])
@@ -27,6 +28,21 @@ def test_about_its_size_the_true_force_comes_back(kind, sizes):
     rough = measured + effect.acceleration(SimpleNamespace(f_b=measured)) @ sizes
     fine = measured + effect.about(sizes).acceleration(SimpleNamespace(f_b=measured)) @ sizes
     assert np.max(np.abs(fine - F)) < 0.35 * np.max(np.abs(rough - F))
+
+
+def test_a_gain_acts_on_the_force_without_the_offsets_beside_it():
+    origin, size = Origin(t0=0.0), np.array([0.0, 0.05, 0.0, 0.0, 0.06, -0.07])
+    beside, rate = BiasRamp(origin), np.array([0.2, -0.15, 0.1])
+    t = np.array([2.0, 8.0, 15.0])
+    offset = t[:, None] * rate
+    cross = CrossAxis(origin)
+    measured = SimpleNamespace(f_b=F - cross.amount(F) @ size + offset, t=t)
+
+    def left(effect):
+        back = measured.f_b - offset + effect.acceleration(measured) @ size
+        return np.max(np.abs(back - F))
+
+    assert left(cross.about(size, ((beside, rate),))) < 0.1 * left(cross.about(size))
 
 
 @pytest.mark.parametrize(

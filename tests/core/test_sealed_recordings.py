@@ -1,5 +1,7 @@
 """Effects concealed in simulated flights of one and a half minutes and more, and their absence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,12 +17,12 @@ from sitl.recording import FlightSpec, fly_messages
 PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 
 
-def diagnosed(vehicle, seed, *effects, duration=150.0):
+def diagnosed(vehicle, seed, *effects, duration=150.0, imus=None):
     spec = FlightSpec(
         vehicle=vehicle,
         seed=seed,
         duration=duration,
-        imus=random_imus(seed),
+        imus=imus or random_imus(seed),
         gps=PROMPT,
         effects=effects,
     )
@@ -51,6 +53,34 @@ def test_a_false_velocity_is_found_from_beginning_to_end():
     assert abs(end - fault.end) < 2.0
     assert effect.unknowns["offset"].value == pytest.approx(2.5, abs=0.4)
     assert effect.where[0].axis == "earth_east"
+
+
+def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jumps_back():
+    fault = concealed.GpsFault(start=60.0, end=98.0, north=2.0, east=2.5)
+    said, first = diagnosed("copter", 46, fault)
+    effect = next(e for e in said.effects if e.name == "gps_fault")
+    assert abs(effect.intervals[0][0] + first - fault.start) < 2.0
+    assert abs(effect.intervals[-1][1] + first - fault.end) < 2.0
+
+
+def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
+    # The EKF levels with the accelerometer: 1.4 m/s^2 in the first minute tilt it by degrees.
+    warm = {"temperature_start": 12.0, "temperature_end": 50.0, "temperature_time": 25.0}
+    imus = tuple(replace(imu, **warm) for imu in random_imus(47))
+    heating = concealed.TemperatureDrift(x=0.04, y=-0.03, z=0.0)
+    said, _ = diagnosed("copter", 47, heating, imus=imus)
+    (effect,) = said.effects
+    assert effect.name == "temperature_drift"
+    for axis, truth in zip("xyz", (heating.x, heating.y, heating.z), strict=True):
+        found = effect.unknowns[axis]
+        assert abs(found.value - truth) < max(0.1 * abs(truth), 3.0 * found.sigma)
+
+
+def test_a_very_late_attitude_leaves_nothing_over_for_other_effects():
+    said, _ = diagnosed("copter", 48, concealed.ImuDelay(delay=0.09))
+    (effect,) = said.effects
+    assert effect.name == "imu_delay"
+    assert effect.unknowns["delay"].value == pytest.approx(0.09, rel=0.04)
 
 
 def test_a_jump_of_one_axis_is_said_to_be_on_that_axis():
