@@ -32,6 +32,7 @@ EKF_FLOOR = {"tilt_roll": 0.003, "tilt_pitch": 0.006, "heading": 0.005}
 was off by up to 0.011 (0.007 RMS) in ten simulated flights, its roll by up to 0.0025."""
 FAULT_S = 1.0
 FAULT_M_S = 0.7
+ONSET_FIXES = 3
 RAIL_SAMPLES, RAIL_RUN = 12, 4
 FEWEST_CLIPPED = 5
 """Clipped samples between two reports that are more than a knock."""
@@ -192,7 +193,8 @@ def fault_effect(
             long = len(run) >= 3 and run[-1] - run[0] >= FAULT_S
             if long and size > least and at_once:
                 spread = float(np.std(sizes_m_s))
-                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size, spread, lost))
+                onset = np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None
+                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size, onset, spread, lost))
             run = []
     spells = [s for s in _paired(spells) if not s.lost]
     spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
@@ -226,14 +228,16 @@ def fault_effect(
 class _Spell:
     """Refused velocities in a row.
 
-    ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length and
-    ``spread`` the scatter of it, m/s; ``lost`` if the filter gave in before the velocities did.
+    ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length,
+    ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``lost`` if the filter gave in
+    before the velocities did.
     """
 
     start: float
     end: float
     off: Array | None
     size: float
+    onset: Array | None = None
     spread: float = 0.0
     lost: bool = False
 
@@ -257,9 +261,9 @@ def _paired(spells: list[_Spell]) -> list[_Spell]:
     out: list[_Spell] = []
     for spell in spells:
         before = out[-1].off if out else None
-        if before is not None and spell.off is not None:
-            sizes = float(np.linalg.norm(before) * np.linalg.norm(spell.off))
-            if float(before @ spell.off) < -0.5 * sizes and spell.start - out[-1].end < 120.0:
+        if before is not None and spell.onset is not None:
+            sizes = float(np.linalg.norm(before) * np.linalg.norm(spell.onset))
+            if float(before @ spell.onset) < -0.5 * sizes and spell.start - out[-1].end < 120.0:
                 out[-1] = replace(out[-1], end=spell.start, lost=False)
                 continue
         out.append(spell)
@@ -362,5 +366,3 @@ def _saturation(
         intervals=intervals,
     )
 
-
-ONSET_FIXES = 3

@@ -56,7 +56,7 @@ def test_a_false_velocity_is_found_from_beginning_to_end():
 
 
 def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jumps_back():
-    fault = concealed.GpsFault(start=60.0, end=98.0, north=2.0, east=2.5)
+    fault = concealed.GpsFault(start=60.0, end=85.0, north=0.0, east=3.3)
     said, first = diagnosed("copter", 46, fault)
     effect = next(e for e in said.effects if e.name == "gps_fault")
     assert abs(effect.intervals[0][0] + first - fault.start) < 2.0
@@ -65,10 +65,10 @@ def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jump
 
 def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
     # The EKF levels with the accelerometer: 1.4 m/s^2 in the first minute tilt it by degrees.
-    warm = {"temperature_start": 12.0, "temperature_end": 50.0, "temperature_time": 25.0}
-    imus = tuple(replace(imu, **warm) for imu in random_imus(47))
-    heating = concealed.TemperatureDrift(x=0.04, y=-0.03, z=0.0)
-    said, _ = diagnosed("copter", 47, heating, imus=imus)
+    warm = {"temperature_start": 15.0, "temperature_end": 50.0, "temperature_time": 25.0}
+    imus = tuple(replace(imu, **warm) for imu in random_imus(20156))
+    heating = concealed.TemperatureDrift(x=0.045, y=0.0, z=0.0)
+    said, _ = diagnosed("copter", 20156, heating, imus=imus)
     (effect,) = said.effects
     assert effect.name == "temperature_drift"
     for axis, truth in zip("xyz", (heating.x, heating.y, heating.z), strict=True):
