@@ -365,4 +365,3 @@ def _saturation(
         where=spans(chunks, t0, intervals, axis),
         intervals=intervals,
     )
-
