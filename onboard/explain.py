@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,8 @@ from onboard.replay import Replay, replay
 
 LONGEST_FLIGHT_S = 7200.0
 """All of a flight is looked at, up to two hours."""
+PAUSE_S = 10.0
+"""Between two recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,18 +97,32 @@ def _read(
 
 
 class _Only:
-    """Feeds a calibrator some accelerometers (none named: all): each costs as much as another."""
+    """Feeds a calibrator some accelerometers (none named: all): each costs as much as another.
+
+    A recording follows on the one before: what happened at a time happened in one of them.
+    """
 
     def __init__(self, calibrator: Calibrator, wanted: frozenset[int]) -> None:
         self._calibrator, self._wanted = calibrator, wanted
-        self.restart, self.finish = calibrator.restart, calibrator.finish
-        self.calibration = calibrator.calibration
+        self.finish, self.calibration = calibrator.finish, calibrator.calibration
+        self._shift, self._newest, self._begins = 0.0, -math.inf, False
 
     @property
     def imus(self) -> tuple[int, ...]:
         return self._calibrator.imus
 
+    def restart(self) -> object:
+        self._begins = math.isfinite(self._newest)
+        return self._calibrator.restart()
+
     def feed(self, sample: Sample) -> object:
+        t = sample.t
+        if t is not None and math.isfinite(t):
+            if self._begins:
+                self._shift, self._begins = self._newest + PAUSE_S - t, False
+            if self._shift:
+                sample = replace(sample, t=t + self._shift)
+            self._newest = max(self._newest, t + self._shift)
         if self._wanted and isinstance(sample, ImuSample) and sample.imu not in self._wanted:
             return ()
         return self._calibrator.feed(sample)

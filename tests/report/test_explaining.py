@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from onboard.core.settings import EstimatorSettings
 from onboard.explain import LONGEST_FLIGHT_S, explain
 from onboard.mavlink.dialect import MESSAGE_IDS
 from onboard.replay import replay
+from sitl.builtin.effects import GpsFault
 from sitl.builtin.truth import random_imus
-from sitl.recording import FlightSpec, fly
+from sitl.recording import FlightSpec, fly, write_tlog
 
 SPEC = FlightSpec(vehicle="copter", duration=60.0, imus=random_imus(4)[:1] * 2, seed=4)
 
@@ -58,3 +60,19 @@ def test_without_the_first_the_second_is_diagnosed(write):
     assert result.imu == 2
     assert np.isfinite(result.diagnosis.calibration.scale).all()
     assert result.document().recording.samples["imu"] > 0
+
+
+def test_a_second_recording_follows_on_the_first(tmp_path):
+    """Both clocks begin at the same time: a fault of the second must not spoil the first."""
+    quiet = FlightSpec(vehicle="plane", duration=100.0, imus=random_imus(4)[:1], seed=4)
+    fault = GpsFault(start=60.0, end=75.0, north=6.0, east=-4.0)
+    paths = [tmp_path / "one.tlog", tmp_path / "two.tlog"]
+    write_tlog(quiet, paths[0])
+    write_tlog(replace(quiet, seed=5, effects=(fault,)), paths[1])
+    d = explain(paths).diagnosis
+    (found,) = (e for e in d.effects if e.name == "gps_fault")
+    begins = d.series.t[np.argmax(np.diff(d.series.t)) + 1]
+    assert begins > 95.0
+    assert np.all(np.diff(d.series.t) > 0.0)
+    assert min(a for a, _ in found.intervals) > begins + 30.0
+    assert max(b for _, b in found.intervals) < begins + 90.0

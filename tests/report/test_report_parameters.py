@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from diagnoses_by_hand import calibration, diagnosis, effect, told_apart_not, unknown
+from pymavlink.mavparm import MAVParmDict
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.findings import Verdict
@@ -96,3 +97,12 @@ def test_a_replay_gives_what_was_observed_of_every_accelerometer():
     assert set(set_now) <= set(parameter_names(1).six)
     assert len(set_now) == sum(c.observable)
     assert "not set, the calibration is insufficient: INS_ACC2" in text
+
+
+def test_mavproxys_own_loader_reads_it(tmp_path, capsys):
+    path = tmp_path / "cure.param"
+    path.write_text(param_file(diagnosis()), encoding="utf-8")
+    station = MAVParmDict()
+    assert station.load(str(path))
+    assert dict(station) == loaded(path.read_text(encoding="utf-8"))
+    assert "Unrecognised" not in capsys.readouterr().out
