@@ -13,36 +13,28 @@ import logging
 import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from onboard import __version__
 from onboard.daemon import settings
 from onboard.daemon.condition import Observed
 from onboard.daemon.configuration import Configuration, read_secret
 from onboard.daemon.diagnoses import Diagnoses
 from onboard.daemon.door import Door
+from onboard.daemon.interrupts import stop_signals
 from onboard.daemon.learner import Learned, Learner
 from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
 from onboard.daemon.notify import Notifier
 from onboard.daemon.outlets import Outlets
 from onboard.daemon.parameters import ParameterWatch
+from onboard.daemon.portrait import Portrait
 from onboard.daemon.proposals import Proposals
 from onboard.daemon.pusher import Pusher
-from onboard.daemon.recording import RollingRecorder
 from onboard.daemon.snapshot import Snapshot
 from onboard.daemon.store import Store
 from onboard.daemon.traffic import Traffic
-from onboard.daemon.view import (
-    NO_TRUST,
-    finite_values,
-    imu_view,
-    journal_view,
-    link_view,
-)
 from onboard.daemon.witness import Witness
 from onboard.errors import OnboardError
 from onboard.mavlink.autopilot import (
@@ -56,7 +48,6 @@ from onboard.mavlink.autopilot import (
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.link import Link
-from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.streams import Streams
 from onboard.mavlink.timesync import TimeSync
 from onboard.push.journal import Journal
@@ -72,8 +63,6 @@ TICK_S = 1.0
 SAVE_S = 5.0
 FINISH_PUSH_S = 8.0
 """A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
-JOURNAL_SHOWN = 50
-BEHIND_WORTH_SAYING_S = 5.0
 
 
 class Service:
@@ -115,7 +104,7 @@ class Service:
         signing = settings.signing(link, wall_clock)
         push = configuration.push
         directory = configuration.state.path()
-        self._recorder = self._make_recorder(directory)
+        self._recorder = settings.recorder(configuration.recording, directory, wall_clock)
         self._witness = Witness()
         self.learning = Learning(
             Learner(
@@ -151,6 +140,24 @@ class Service:
             wall_clock=wall_clock,
         )
         self.server: Door | None = None
+        self._portrait = Portrait(
+            link=self.link,
+            signed=signing is not None,
+            streams=self._streams,
+            timesync=self._timesync,
+            observed=self._observed,
+            traffic=self._traffic,
+            learning=self.learning,
+            parameters=self._parameters,
+            proposals=self._proposals,
+            pusher=self._pusher,
+            journal=self._journal,
+            diagnoses=self._diagnoses,
+            outlets=self._outlets,
+            notices=self.notices,
+            recorder=self._recorder,
+            wall_clock=wall_clock,
+        )
 
     # Life
 
@@ -163,7 +170,7 @@ class Service:
             ConfigurationError: the HTTP port is taken.
         """
         try:
-            with self._signals() if handle_signals else contextlib.nullcontext():
+            with stop_signals(self._signalled) if handle_signals else contextlib.nullcontext():
                 async with asyncio.TaskGroup() as group:
                     await self._startup(group)
                     await self._main_loop()
@@ -179,6 +186,10 @@ class Service:
     def stop(self) -> None:
         """Let :meth:`run` end in good order."""
         self._stopping.set()
+
+    def _signalled(self, number: signal.Signals) -> None:
+        self.stopped_by = number
+        self.stop()
 
     async def _startup(self, group: asyncio.TaskGroup) -> None:
         self.link.subscribe_events(self.on_link_event)
@@ -228,7 +239,7 @@ class Service:
             self.server.publish()
         self._outlets.publish()
         if self.learning.keeps_up(now):
-            self._notifier.send(WATCHDOG="1", STATUS=self._sentence())
+            self._notifier.send(WATCHDOG="1", STATUS=self._portrait.sentence(self._clock()))
 
     def _on_learned(self, learned: Learned) -> None:
         if learned.flown:
@@ -342,81 +353,16 @@ class Service:
 
     def snapshot(self) -> Snapshot:
         """Everything, now."""
-        now = self._clock()
-        learned = self.learning.learned
-        return Snapshot(
-            version=__version__,
-            time=self._wall_clock(),
-            uptime_s=now - self._started,
+        return self._portrait.snapshot(
+            self._clock(),
+            uptime_s=self._clock() - self._started,
             phase=self.phase,
             mode=self.mode,
             mode_reason=self.mode_reason,
-            link=link_view(
-                self.link,
-                condition=self._observed.condition(now),
-                messages=self._traffic.view(self._streams.report()),
-                signed=self.configuration.link.signing_key_file is not None,
-            ),
-            trust=NO_TRUST if learned is None else learned.trust,
-            imus=tuple(imu_view(c) for c in learned.calibrations.values()) if learned else (),
-            push=self._pusher.view(),
-            parameters=finite_values(self._parameters.values),
-            journal=journal_view(self._journal.entries[-JOURNAL_SHOWN:]),
-            notices=self.notices.kept,
-            counters=self._all_counters(),
-            diagnosis=self._diagnoses.document,
+            counters=self.counters,
         )
 
     # How
-
-    def _all_counters(self) -> dict[str, int]:
-        total = Counter(self.counters)
-        for part in (
-            self.learning,
-            self._parameters,
-            self._proposals,
-            self._pusher,
-            self._outlets,
-        ):
-            total.update(part.counters)
-        if self.learning.learned is not None:
-            total.update(self.learning.learned.counters)
-        refused = self.learning.decoder.refused
-        total.update({f"refused {name}": count for name, count in refused.items()})
-        total["timesync_rejected"] = self._timesync.rejected
-        total["journal_damaged"] = self._journal.damaged
-        if self._recorder is not None:
-            total["recorded_frames"] = self._recorder.frames
-            total["recording_dropped"] = self._recorder.dropped
-        return dict(total)
-
-    def _sentence(self) -> str:
-        """One line for systemctl status."""
-        if self.link.autopilot is None:
-            return "waiting for an autopilot's heartbeat"
-        learned = self.learning.learned
-        if learned is None:
-            return f"{self.link.state.value}, nothing learned yet"
-        imus = ", ".join(
-            f"IMU {imu} {c.status.value} {c.coverage.percent:.0f} %"
-            for imu, c in learned.calibrations.items()
-        )
-        trust = "trusted" if learned.trust.open else "not trusted"
-        lag = self.learning.behind(self._clock())
-        late = f", {lag:.0f} s behind" if lag > BEHIND_WORTH_SAYING_S else ""
-        return f"{self.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}{late}"
-
-    def _make_recorder(self, state: Path) -> Recorder | None:
-        recording = self.configuration.recording
-        if not recording.enabled:
-            return None
-        given = recording.directory
-        return RollingRecorder(
-            Path(given).expanduser() if given else state / "recordings",
-            keep=recording.keep_files,
-            file_bytes=int(recording.file_size_mb * 1e6),
-            wall_clock=self._wall_clock,
-        )
 
     def _make_server(self) -> Door:
         http = self.configuration.http
@@ -425,26 +371,6 @@ class Service:
             token = read_secret(http.token_file, key="[http] token_file")
         pages = (status_page, self._outlets.history.page, *self._pages)
         return Door(self, address=http.address, port=http.port, token=token, pages=pages)
-
-    @contextlib.contextmanager
-    def _signals(self) -> Iterator[None]:
-        loop = asyncio.get_running_loop()
-        task = asyncio.current_task()
-
-        def on_signal(number: signal.Signals) -> None:
-            if self.stopped_by is not None and task is not None:
-                task.cancel()  # asked twice: no more stages
-            self.stopped_by = number
-            self.stop()
-
-        handled = (signal.SIGTERM, signal.SIGINT)
-        for number in handled:
-            loop.add_signal_handler(number, on_signal, number)
-        try:
-            yield
-        finally:
-            for number in handled:
-                loop.remove_signal_handler(number)
 
 
 def _first(failures: BaseExceptionGroup[OnboardError]) -> OnboardError:

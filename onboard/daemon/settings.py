@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import TrustLimits
 from onboard.daemon import configuration
+from onboard.daemon.recording import RollingRecorder
 from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.signing import Signing
 from onboard.mavlink.streams import StreamRequest
 from onboard.push.policy import Mode, PolicySettings
@@ -80,3 +83,18 @@ def signing(link: configuration.LinkSettings, wall_clock: Callable[[], float]) -
         return None
     secret = configuration.read_secret(link.signing_key_file, key="[link] signing_key_file")
     return Signing.from_passphrase(secret, wall_clock)
+
+
+def recorder(
+    recording: configuration.RecordingSettings, state: Path, wall_clock: Callable[[], float]
+) -> Recorder | None:
+    """[recording]; beside the state unless it says where."""
+    if not recording.enabled:
+        return None
+    given = recording.directory
+    return RollingRecorder(
+        Path(given).expanduser() if given else state / "recordings",
+        keep=recording.keep_files,
+        file_bytes=int(recording.file_size_mb * 1e6),
+        wall_clock=wall_clock,
+    )

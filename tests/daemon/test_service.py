@@ -16,7 +16,7 @@ from standing_vehicle import PX4, Vehicle
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
 from onboard.core.samples import ImuSample
-from onboard.daemon import learning
+from onboard.daemon import learning, portrait
 from onboard.daemon import service as service_module
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
@@ -452,7 +452,7 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
     release = threading.Event()
     monkeypatch.setattr(learning, "BEHIND_S", 0.3)
     monkeypatch.setattr(learning, "CAUGHT_UP_S", 0.29)
-    monkeypatch.setattr(service_module, "BEHIND_WORTH_SAYING_S", 0.29)
+    monkeypatch.setattr(portrait, "BEHIND_WORTH_SAYING_S", 0.29)
 
     def said(service, kind):
         return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
@@ -470,7 +470,7 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
         learner.learn = slow
         await until(lambda: said(service, "learner_behind"))
         assert service.snapshot().counters["fell_behind"] == 1
-        assert "behind" in service._sentence()
+        assert "behind" in service._portrait.sentence(service._clock())
         release.set()
         await until(lambda: said(service, "learner_caught_up"))
         times = [s.t for s in learned if isinstance(s, ImuSample)]
