@@ -25,6 +25,7 @@ from onboard.errors import RefusedError, StateError
 from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import SendAction, parameter_event, parameter_message
+from onboard.push.course import TransactionSettings
 from onboard.push.entries import (
     Entry,
     Planned,
@@ -53,7 +54,7 @@ from onboard.push.signals import (
     TransactionOutput,
     VehicleReport,
 )
-from onboard.push.transaction import PushTransaction, TransactionSettings
+from onboard.push.transaction import PushTransaction
 
 logger = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from onboard.daemon import learning
 from onboard.daemon import pusher as pusher_module
 from onboard.daemon import service as service_module
 from onboard.mavlink.parameters import ClientSettings
-from onboard.push.transaction import TransactionSettings
+from onboard.push.course import TransactionSettings
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from onboard.daemon import pusher as pusher_module
 from onboard.daemon import service as service_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.mqtt import schema
-from onboard.push.transaction import TransactionSettings
+from onboard.push.course import TransactionSettings
 
 DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
 """The daemon and the vehicle are those of its own tests."""

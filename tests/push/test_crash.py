@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from pushing import NEW, OLD, CrashError, PushWorld, Weather, make_plan
 
 from onboard.mavlink.parameters import ClientSettings
+from onboard.push.course import TransactionSettings
 from onboard.push.plan import UNCHANGED
 from onboard.push.signals import LinkLost, Rebooted, VehicleReport
-from onboard.push.transaction import TransactionSettings
 
 
 def no_fsync(descriptor):
