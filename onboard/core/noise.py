@@ -73,7 +73,7 @@ the filter believe that timing, interpolation and filters are modelled to the la
 
 The recorded attitude's are no such formality.  An EKF errs with the manoeuvre, and smoothly: the
 likelihood sees how smooth its error is, not how large, and runs to whatever end there is.  On
-flights of ArduPilot's SITL with half these ends errors are 2.4 times as large, beyond 5 sigma."""
+flights of ArduPilot's SITL with half the tilt's end errors are 2.4 times as large, beyond 5 sigma."""
 
 ESTIMATED = (
     "velocity",
