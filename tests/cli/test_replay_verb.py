@@ -108,12 +108,22 @@ def test_a_cut_log_is_read_and_the_damage_told(log, capsys):
     assert "cut off" in capsys.readouterr().out
 
 
+@pytest.fixture(scope="module")
+def c01(recordings, tmp_path_factory):
+    """One flight as its two recordings tell it, and its truth."""
+    told = []
+    for name in ("c01.tlog", "c01.BIN"):
+        out = tmp_path_factory.mktemp("c01") / "out.json"
+        assert run(["replay", str(recordings / "sitl" / name), "--json", str(out)]) == 0
+        told.append(json.loads(out.read_text())["imus"])
+    answers = json.loads((recordings / "sitl/answers.json").read_text())
+    return told, answers["recordings"]["c01"]
+
+
 @pytest.mark.recordings
-def test_a_recorded_flight_gives_the_truth_of_its_simulator(recordings, tmp_path):
-    out = tmp_path / "b02.json"
-    assert run(["replay", str(recordings / "sitl/b02.tlog"), "--json", str(out)]) == 0
-    truth = json.loads((recordings / "sitl/answers.json").read_text())["recordings"]["b02"]
-    (imu,) = json.loads(out.read_text())["imus"]
+def test_a_recorded_flight_gives_the_truth_of_its_simulator(c01):
+    (telemetry_imus, _), truth = c01
+    imu = telemetry_imus[0]
     assert imu["status"] == "calibrated"
     assert imu["calibration"]["scale"] == pytest.approx(truth["scale"], abs=0.006)
     assert imu["calibration"]["offset"][:2] == pytest.approx(truth["offset"][:2], abs=0.012)
@@ -123,13 +133,8 @@ def test_a_recorded_flight_gives_the_truth_of_its_simulator(recordings, tmp_path
 
 
 @pytest.mark.recordings
-def test_two_recordings_of_one_flight_agree(recordings, tmp_path):
-    numbers = []
-    for name in ("c01.tlog", "c01.BIN"):
-        out = tmp_path / "c01.json"
-        assert run(["replay", str(recordings / "sitl" / name), "--json", str(out)]) == 0
-        imus = json.loads(out.read_text())["imus"]
-        numbers.append([i["calibration"]["scale"] + i["calibration"]["offset"] for i in imus])
+def test_two_recordings_of_one_flight_agree(c01):
+    numbers = [[i["calibration"]["scale"] + i["calibration"]["offset"] for i in x] for x in c01[0]]
     for imu in range(2):
         for k in range(6):
             limit = 0.003 if k < 3 else 0.03

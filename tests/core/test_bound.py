@@ -13,10 +13,15 @@ def flown(request):
     return path(request.param, duration=160.0)
 
 
-def test_claims_are_what_physics_allows(flown):
+@pytest.fixture(scope="module")
+def whole(flown):
+    return bound(flown)
+
+
+def test_claims_are_what_physics_allows(flown, whole):
     flight = draw(flown, 3)
     scale = flight.truth[1][:3]
-    limit = bound(flown) * np.concatenate([scale, 1.0 / scale])
+    limit = whole * np.concatenate([scale, 1.0 / scale])
     c = fed(flight.samples).calibration(1)
     claimed = np.array(c.scale_sigma + c.offset_sigma) / limit
     # Levels of noise are found from one flight only, and colour may be claimed for chance.
@@ -25,8 +30,7 @@ def test_claims_are_what_physics_allows(flown):
     assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
 
 
-def test_more_noise_or_less_flight_never_sharpens_the_bound(flown):
-    whole = bound(flown)
+def test_more_noise_or_less_flight_never_sharpens_the_bound(flown, whole):
     assert np.all(bound(flown, LEVELS.scaled("velocity", 2.0)) > whole)
     assert np.all(bound(flown, LEVELS.scaled("force_walk", 2.0)) > whole)
     assert np.all(bound(path(flown.vehicle, duration=100.0)) > whole)

@@ -26,7 +26,7 @@ OTHER = 2 | 4 << 3 | 3 << 8
 def flight():
     truth = ImuTruth(scale=(1.01, 0.99, 1.005), offset=(0.1, -0.2, 0.15))
     decoder = Decoder()
-    spec = FlightSpec(vehicle="copter", seed=3, duration=110.0, imus=(truth,))
+    spec = FlightSpec(vehicle="copter", seed=3, duration=75.0, imus=(truth,))
     samples = [s for _, m in fly_messages(spec) for s in decoder.decode(m)]
     # The vehicle's own word on a second IMU that it does not have would contradict the twin.
     others = ("INS_ACC2", "INS_GYR2")

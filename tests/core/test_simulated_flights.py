@@ -251,15 +251,6 @@ def test_saved_sums_go_on_where_they_stopped(halves):
     assert_true(got)
     assert got.trusted_s == pytest.approx(first.calibration(1).trusted_s + alone.trusted_s, rel=0.1)
     assert np.linalg.slogdet(got.covariance)[1] < np.linalg.slogdet(alone.covariance)[1]
-    other = [
-        dataclasses.replace(s, value=s.value + 8.0)
-        if isinstance(s, ParameterValue) and s.name == "INS_ACC_ID"
-        else s
-        for s in rest
-    ]
-    refused = fed(other, Calibrator.from_bytes(first.to_bytes())).calibration(1)
-    assert_same(refused, alone)
-    assert refused.rejected["saved_of_another_sensor"] == 1
 
 
 def test_sums_that_wait_for_their_sensor_are_not_lost(halves):
