@@ -72,8 +72,8 @@ LIMITS: dict[str, tuple[float, float]] = {
 the filter believe that timing, interpolation and filters are modelled to the last digit.
 
 The recorded attitude's are no such formality.  An EKF errs with the manoeuvre, and smoothly: the
-likelihood sees how smooth its error is, not how large, and runs to whatever end there is.  On
-flights of ArduPilot's SITL with half the tilt's end errors are 2.4 times as large, beyond 5 sigma."""
+likelihood sees how smooth its error is, not how large, and runs to whatever end there is.  With
+half the tilt's end, flights of ArduPilot's SITL err 2.4 times as much, beyond 5 sigma."""
 
 ESTIMATED = (
     "velocity",
