@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
-from onboard.core.samples import Sample
+from onboard.core.samples import ParameterValue, Sample
 from onboard.daemon.learner import Learned, Learner
 from onboard.daemon.notices import Notices
 from onboard.daemon.worker import Worker
@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 BATCH_S = 0.25
 WAITING_LIMIT = 200_000
 """Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
+PARAMETERS_S = 30.0
+"""So long is waited for the parameters that say what the messages mean; what comes is kept."""
 BEHIND_S, CAUGHT_UP_S = 15.0, 2.0
 """A diagnosis makes what comes in wait for some seconds; more is told, until it has caught up."""
 STEP_LIMIT_S = 120.0
@@ -37,6 +39,7 @@ class Learning:
         notices: where its news go.
         judging: whether a push waits for the flight that judges it.
         in_flight: whether values may be written in flight.
+        ready: whether the parameters are known that say what the messages mean.
         clock: monotonic time, s.
         wall_clock: Unix time, s.
         save_every_s: how often sums go to disk.
@@ -49,6 +52,7 @@ class Learning:
         *,
         judging: Callable[[], bool],
         in_flight: Callable[[], bool] = lambda: False,
+        ready: Callable[[], bool] = lambda: True,
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
         save_every_s: float,
@@ -60,6 +64,8 @@ class Learning:
         self._notices = notices
         self._judging = judging
         self._in_flight = in_flight
+        self._ready = ready
+        self._begun = False
         self._clock = clock
         self._wall_clock = wall_clock
         self._save_every_s = save_every_s
@@ -99,9 +105,8 @@ class Learning:
 
     async def step(self) -> None:
         """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
-        samples, self._samples = self._samples, []
-        self._taken, self._arrived = self._arrived, None
         now = self._busy_since = self._clock()
+        samples = self._next_batch(now)
         learned = await self._call(
             self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
         )
@@ -115,6 +120,19 @@ class Learning:
             self._next_save = now + self._save_every_s
             await self.save()
         self._busy_since = None
+
+    def _next_batch(self, now: float) -> list[Sample]:
+        """What has come; at first nothing until it is known what it means, that before all else."""
+        if not self._begun:
+            waited = 0.0 if self._arrived is None else now - self._arrived
+            self._begun = self._ready() or waited > PARAMETERS_S or self._closing
+            if not self._begun:
+                return []
+            # A stable order: the latest report of a parameter still comes last.
+            self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
+        samples, self._samples = self._samples, []
+        self._taken, self._arrived = self._arrived, None
+        return samples
 
     async def reset(self) -> None:
         """Forget what was learned."""
@@ -140,6 +158,8 @@ class Learning:
     def tell_of_lag(self, now: float) -> None:
         """Say when the learner falls behind what comes in, and when it has caught up."""
         lag = self.behind(now)
+        if not self._begun:
+            return
         if not self._behind and lag > BEHIND_S:
             self._behind = True
             self.counters["fell_behind"] += 1

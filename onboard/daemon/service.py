@@ -113,6 +113,7 @@ class Service:
             self.notices,
             judging=lambda: self._witness.waiting,
             in_flight=lambda: self._proposals.settings.mode is Mode.IN_FLIGHT,
+            ready=lambda: self._parameters.complete or not self._parameters.enabled,
             clock=clock,
             wall_clock=wall_clock,
             save_every_s=configuration.estimator.save_every_s,
