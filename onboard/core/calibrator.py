@@ -291,9 +291,15 @@ class Calibrator:
             # inertial samples first.
             self._counts["gps_other_clock"] += 1
             return ()
+        before = self._trust.receiver
         events = self._judged(fix)
         if self._trust.receiver not in (None, fix.receiver):
             return events
+        if before not in (None, fix.receiver):
+            # What was saved holds the latency and the antenna of a receiver that is given up.
+            self._counts["another_receiver"] += 1
+            for imu in {*self._engines, *self._waiting}:
+                self.begin_anew(imu)
         if self._ahead(fix.t):
             self._counts["gps_ahead"] += 1
             return events

@@ -87,6 +87,8 @@ EKF_UNINITIALIZED: Final = 1 << 10
 EKF_GPS_GLITCHING: Final = 1 << 15
 
 _LATE_IN_A_ROW: Final = 5
+GIVEN_UP_S: Final = 60.0
+"""Another receiver's fixes, while there is none of the first: longer than a cold start differs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,13 +133,17 @@ WindowEvent: TypeAlias = WindowOpened | WindowClosed
 class TrustWindow:
     """Fed with every sample in order of arrival; says whether the latest fix may be used.
 
-    It watches one receiver: ``receiver``, or the first that is heard from.  A fix belongs to the
-    window if ``is_open`` after it was fed, and it was neither a repeat nor late.
+    It watches one receiver: ``receiver``, or the first that is heard from.  One that has never had
+    a trusted fix is given up for another that has had fixes for :data:`GIVEN_UP_S`; one that has,
+    is not, for sums hold the latency of one receiver.  A fix belongs to the window if ``is_open``
+    after it was fed, and it was neither a repeat nor late.
     """
 
     def __init__(self, limits: TrustLimits = TrustLimits(), *, receiver: int | None = None) -> None:
         self._limits = limits
         self._receiver = receiver
+        self._chosen = receiver is not None
+        self._other: tuple[int, float] | None = None  # another with a fix, and since when
         self._phase = Phase.WAITING
         self._reason: Reason | None = None
         self._held: dict[Reason, float] = {}  # reason -> time from which it may be dropped
@@ -270,7 +276,7 @@ class TrustWindow:
         events: tuple[WindowEvent, ...]
         if self._receiver is None:
             self._receiver = fix.receiver
-        if fix.receiver != self._receiver:
+        if fix.receiver != self._receiver and not self._gives_up_for(fix):
             return ()
         self._now = max(self._now, fix.t)
         self._last_heard = self._now
@@ -304,6 +310,20 @@ class TrustWindow:
                 events += self._end(fix.t, Reason.CONFIGURED_END)
         return events
 
+    def _gives_up_for(self, fix: GpsFix) -> bool:
+        """Whether this fix of another receiver makes it the one that is watched."""
+        if self._chosen or fix.fix_type < self._limits.fix_type:
+            return False
+        if self._other is None or self._other[0] != fix.receiver:
+            self._other = (fix.receiver, fix.t)
+        if not fix.t - self._other[1] >= GIVEN_UP_S:
+            return False
+        self._receiver, self._other = fix.receiver, None
+        self._held.clear()
+        self._plausibility.reset()
+        self._last_fix, self._late = None, 0
+        return True
+
     def _judge(self, fix: GpsFix) -> dict[Reason, bool]:
         """Each reason that a fix by itself and its predecessors can give: True is bad."""
         limits = self._limits
@@ -315,6 +335,7 @@ class TrustWindow:
             # Its other numbers are placeholders, and the way from the last good one is unknown.
             self._plausibility.reset()
             return {Reason.NO_FIX: True}
+        self._other = None
         contradiction = self._plausibility.check(fix)
         accuracy = fix.speed_accuracy or 0.0  # 0: unknown
         return {
@@ -341,6 +362,7 @@ class TrustWindow:
                 self._trusted_s += t - last
             return ()
         self._phase, self._reason = Phase.OPEN, None
+        self._chosen = True
         self._outside = 0
         if self._first_opened is None:
             self._first_opened = t
