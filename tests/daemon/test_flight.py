@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from daemons import until
-from flights import TRUE_SIX, GroundStation, flying, six
+from flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 
 from onboard.core.calibrator import Calibrator
 from onboard.replay import replay
@@ -19,6 +19,10 @@ def in_a_hurry(document, tmp_path):
 
 async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemon, port, tmp_path):
     async with daemon(in_a_hurry) as service, flying(port) as (autopilot, _, station_port):
+        # A list of parameters is read in real time, however fast the rest is.
+        autopilot.parameters.load({"SIM_SPEEDUP": 1.0})
+        await until(lambda: service._parameters.complete)
+        autopilot.parameters.load({"SIM_SPEEDUP": SPEEDUP})
         await until(lambda: autopilot.flying)
         await until(lambda: service.snapshot().imus)
         # A ground station changes a parameter in the middle of the window: sums are raw.

@@ -458,7 +458,7 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
         return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
 
     async with daemon(document) as service, Vehicle(port):
-        await until(lambda: service.learning.learned is not None)
+        await until(lambda: service.learning._begun)
         learner = service.learning._learner
         learn, learned = learner.learn, []
 
