@@ -19,7 +19,7 @@ MANUAL = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
 SECTIONS = dict(
     zip(*[iter(re.split(r"^## (.+)$", MANUAL, flags=re.MULTILINE)[1:])] * 2, strict=True)
 )
-INTERNAL = ("core/", "push/plan.py", "push/transaction.py")
+INTERNAL = ("core/", "push/plan.py", "push/course.py", "push/transaction.py")
 """Never shown by themselves: behind *starting from nothing*, or a fault of ours."""
 
 
