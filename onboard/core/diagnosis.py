@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.choice import (
@@ -24,6 +25,7 @@ from onboard.core.choice import (
     reconciles,
     reconsider_standing,
 )
+from onboard.core.clipping import saturation_effect
 from onboard.core.engine import Chunk, moved
 from onboard.core.examination import Examination
 from onboard.core.findings import Diagnosis, Effect, NotTestable
@@ -45,10 +47,11 @@ from onboard.core.timing_effects import (
     LEAST,
     STANDING,
     Standing,
-    saturation_effect,
     standing_effects,
     without,
 )
+
+Array = NDArray[np.float64]
 
 ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
@@ -106,14 +109,20 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
         families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
     final = _final(full, choice, families).doubting_attitude()
+    if any(isinstance(f, BiasStep) for f in families) and any(
+        isinstance(f, Gain) for f in families
+    ):
+        found = final.found().theta
+        families = _about_sizes([(f, found[final.indices(f)]) for f in families])
+        final = _again(full, families, final).with_rows().doubting_attitude()
     kept = _needed(final, families)
     if len(kept) < len(families):
         # A jump may have passed for something slower, or the other way round.
         families = kept
         final = _again(full, families, final).with_rows().doubting_attitude()
-    found = families if clipped else searched(final, families, choice.fitter.weaken)
-    if found != families:
-        families = found
+    wider = families if clipped else searched(final, families, choice.fitter.weaken)
+    if wider != families:
+        families = wider
         final = _again(full, families, final).with_noise().doubting_attitude()
         kept = _needed(final, families)
         if len(kept) < len(families):
@@ -200,13 +209,23 @@ def _families(full: Examination, choice: Choice) -> list[EffectColumns]:
     """Columns of what was chosen; those of a gain about its size, a jump at its moment."""
     theta = choice.fitter.fit(choice.free, held_out=False).theta
     sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
-    offsets = tuple((f, size) for f, size in sized if f.tilts_ekf)
-    families = [f.about(size, offsets) if isinstance(f, Gain) else f for f, size in sized]
+    families = _about_sizes(sized)
     if choice.jump is None or all(c.effect != STEP for c in choice.chosen):
         return families
     near = boundary_of(choice.fitter, choice.jump)
     step = jump_near(full, families, near, choice.fitter.weaken)
     return families if step is None else [*families, step]
+
+
+def _about_sizes(sized: Sequence[tuple[EffectColumns, Array]]) -> list[EffectColumns]:
+    """Effects of which those in proportion to the force act on the force without the others."""
+    alone = [(f.about(size) if isinstance(f, Gain) else f, size) for f, size in sized]
+    acting = [isinstance(f, Gain) or f.tilts_ekf for f, _ in sized]
+    out: list[EffectColumns] = []
+    for i, (f, size) in enumerate(alone):
+        beside = tuple(a for j, a in enumerate(alone) if j != i and acting[j])
+        out.append(f.about(size, beside) if isinstance(f, Gain) else f)
+    return out
 
 
 def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns]) -> Examination:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from onboard.core.calibrator import Calibrator
 from onboard.core.engine import Chunk, Engine
 from onboard.core.examination import Examination
+from onboard.core.faults import FAULT_M_S, fault_effect
 from onboard.core.findings import Effect
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import Pass
-from onboard.core.timing_effects import FAULT_M_S, fault_effect
 from onboard.core.traces import EpochTrace
 from onboard.core.trust import Reason
 

@@ -1,0 +1,160 @@
+"""False GPS velocities: spells that the innovation gate refused, and whose failure they were."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.engine import Chunk
+from onboard.core.findings import Effect, Quantity
+from onboard.core.regimes import spans
+from onboard.core.traces import EpochTrace
+
+Array = NDArray[np.float64]
+
+FAULT_S = 1.0
+FAULT_M_S = 0.7
+ONSET_FIXES = 3
+LONGEST_FAULT_S = 120.0
+NEIGHBOURS_S = 1.1
+"""Fixes that follow on each other: between them inertia changes by next to nothing."""
+
+
+def fault_effect(
+    traces: Sequence[EpochTrace],
+    chunks: Sequence[Chunk],
+    t0: float,
+    least: float,
+    coast_s: float,
+    distrusted: Sequence[tuple[float, float]] = (),
+) -> Effect | None:
+    """GPS velocities that cannot be true: refused by the innovation gate for a while.
+
+    Args:
+        traces: of every epoch.
+        chunks: the flight.
+        t0: s on the boot clock.
+        least: m/s by which no honest receiver is off.
+        coast_s: how long the filter goes on without a velocity, s.
+        distrusted: s since ``t0`` in which the receiver contradicted itself; they stand for a
+            fault where the inertia, lost itself, cannot tell.
+    """
+    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
+    bad = [(x.t, "velocity" in x.refused) for x in judged]
+    refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
+    spells: list[_Spell] = []
+    run: list[float] = []
+    for t, is_bad in [*bad, (np.inf, False)]:
+        if is_bad:
+            run.append(t)
+        elif run and t - run[-1] > 2.0:
+            off = [refused[u] for u in run if u in refused]
+            mean = np.median(np.array(off), axis=0) if off else None
+            # A noisy receiver errs to all sides: the mean of its errors says nothing.
+            sizes_m_s = np.linalg.norm(off, axis=1) if off else np.zeros(1)
+            size = float(np.median(sizes_m_s))
+            # A receiver fails at once; what grows from the gate on is a filter that drifts.
+            at_once = float(np.median(sizes_m_s[:ONSET_FIXES])) > least
+            # A filter that had to begin anew does not tell its own failure from the receiver's.
+            lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
+            long = len(run) >= 3 and run[-1] - run[0] >= FAULT_S
+            if long and size > least and at_once:
+                spread = float(np.std(sizes_m_s))
+                onset = np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None
+                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size, onset, spread, lost))
+            run = []
+    spells = [s for s in _paired(spells, _jumps(refused, t0)) if not s.lost]
+    spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
+    intervals = [(s.start, s.end) for s in spells]
+    worst = max(spells, key=lambda s: s.size, default=None)
+    if worst is None:
+        return None
+    inside = [x for x in traces if any(a <= x.t - t0 <= b for a, b in intervals)]
+    return Effect(
+        name="gps_fault",
+        unknowns={
+            "offset": Quantity(
+                worst.size,
+                float(np.hypot(least / 8.0, worst.spread)),
+                "m/s",
+            ),
+            "duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s"),
+        },
+        share_of_mismatch=len(inside) / max(len(traces), 1),
+        delta_bic=0.0,
+        held_out_before=float("nan"),
+        held_out_after=float("nan"),
+        parameters={},
+        cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
+        where=spans(chunks, t0, intervals, _earth_axis(spells)),
+        intervals=tuple(intervals),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Spell:
+    """Refused velocities in a row.
+
+    ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length,
+    ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``lost`` if the filter gave in
+    before the velocities did.
+    """
+
+    start: float
+    end: float
+    off: Array | None
+    size: float
+    onset: Array | None = None
+    spread: float = 0.0
+    lost: bool = False
+
+
+def _earth_axis(spells: Sequence[_Spell]) -> str:
+    """The horizontal axis on which the velocity was off most."""
+    known = [s for s in spells if s.off is not None and len(s.off) > 1]
+    if not known:
+        return "earth_north"
+    worst = max((s.off for s in known if s.off is not None), key=lambda x: float(np.linalg.norm(x)))
+    return "earth_north" if abs(worst[0]) >= abs(worst[1]) else "earth_east"
+
+
+def _jumps(refused: Mapping[float, Array], t0: float) -> list[tuple[float, Array]]:
+    """Changes (2,) of the innovation from one refused velocity to the next, and when, s."""
+    t = sorted(refused)
+    return [
+        (b - t0, refused[b] - refused[a])
+        for a, b in pairwise(t)
+        if b - a < NEIGHBOURS_S and len(refused[a]) == len(refused[b]) == 2
+    ]
+
+
+def _paired(spells: list[_Spell], jumps: Sequence[tuple[float, Array]]) -> list[_Spell]:
+    """Join a fault that outlasted the filter's patience with the jump back at its end.
+
+    A constant error that was taken for a new velocity in the middle shows again, with the other
+    sign, when the receiver recovers: the fault ends where the second spell starts, or where the
+    innovation jumps inside it, and whose failure it was is no question any more.
+    """
+    out: list[_Spell] = []
+    for spell in spells:
+        if out and spell.start <= out[-1].end:
+            continue
+        back = [t for t, jump in jumps if t > spell.end and _undoes(jump, spell.off)]
+        back += [s.start for s in spells if s.start > spell.end and _undoes(s.onset, spell.off)]
+        end = min(back, default=np.inf)
+        if end - spell.end < LONGEST_FAULT_S:
+            spell = replace(spell, end=end, lost=False)  # noqa: PLW2901 - the same, longer
+        out.append(spell)
+    return out
+
+
+def _undoes(jump: Array | None, off: Array | None) -> bool:
+    """Whether a jump is about an error taken back."""
+    if jump is None or off is None or len(jump) != len(off):
+        return False
+    size, along = float(off @ off), -float(jump @ off)
+    return 0.5 * size < along < 2.0 * size and along > 0.5 * float(np.linalg.norm(jump)) * size**0.5
