@@ -33,7 +33,7 @@ from onboard.core.judgement import Evidence, Judge
 from onboard.core.jumps import boundary_of, candidate_of, jump_near
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import EffectColumns, Origin
-from onboard.core.physics.gains import Gain
+from onboard.core.physics.gains import Gain, ScaleNonlinearity
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
 from onboard.core.report import timing_of
@@ -90,6 +90,10 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
             # Clipped all the time: what is left would say less than what is spoiled.
             chunks = flight
     testable, absent = _testable(catalogue(origin), chunks)
+    if rail is not None:
+        # A low-pass hides the samples next to the clipped ones: what is left of them is a curve.
+        testable = [f for f in testable if not isinstance(f, ScaleNonlinearity)]
+        absent.append(NotTestable(ScaleNonlinearity.effect, "clipping bends the scale as well"))
     full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     clipped = rail is not None and chunks is flight
     fault: Effect | None = None

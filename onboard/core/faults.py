@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -17,9 +17,13 @@ from onboard.core.traces import EpochTrace
 Array = NDArray[np.float64]
 
 FAULT_S = 1.0
+FEWEST_FIXES = 5
+MOST_SCATTER = 0.5
+"""Of a fault's size; one that is refused until the inertia itself is lost scatters by a third."""
 FAULT_M_S = 0.7
 ONSET_FIXES = 3
 LONGEST_FAULT_S = 120.0
+TIRING_S = 5.0
 NEIGHBOURS_S = 1.1
 """Fixes that follow on each other: between them inertia changes by next to nothing."""
 
@@ -43,31 +47,9 @@ def fault_effect(
         distrusted: s since ``t0`` in which the receiver contradicted itself; they stand for a
             fault where the inertia, lost itself, cannot tell.
     """
-    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
-    bad = [(x.t, "velocity" in x.refused) for x in judged]
     refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
-    spells: list[_Spell] = []
-    run: list[float] = []
-    for t, is_bad in [*bad, (np.inf, False)]:
-        if is_bad:
-            run.append(t)
-        elif run and t - run[-1] > 2.0:
-            off = [refused[u] for u in run if u in refused]
-            mean = np.median(np.array(off), axis=0) if off else None
-            # A noisy receiver errs to all sides: the mean of its errors says nothing.
-            sizes_m_s = np.linalg.norm(off, axis=1) if off else np.zeros(1)
-            size = float(np.median(sizes_m_s))
-            # A receiver fails at once; what grows from the gate on is a filter that drifts.
-            at_once = float(np.median(sizes_m_s[:ONSET_FIXES])) > least
-            # A filter that had to begin anew does not tell its own failure from the receiver's.
-            lost = run[-1] - run[0] >= 0.95 * coast_s and mean is not None
-            long = len(run) >= 3 and run[-1] - run[0] >= FAULT_S
-            if long and size > least and at_once:
-                spread = float(np.std(sizes_m_s))
-                onset = np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None
-                spells.append(_Spell(run[0] - t0, run[-1] - t0, mean, size, onset, spread, lost))
-            run = []
-    spells = [s for s in _paired(spells, _jumps(refused, t0)) if not s.lost]
+    every = [_spell(run, refused, t0, least, coast_s) for run in _runs(traces)]
+    spells = [s for s in _paired(every, _jumps(refused, t0)) if not s.lost]
     spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
     intervals = [(s.start, s.end) for s in spells]
     worst = max(spells, key=lambda s: s.size, default=None)
@@ -100,8 +82,8 @@ class _Spell:
     """Refused velocities in a row.
 
     ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length,
-    ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``lost`` if the filter gave in
-    before the velocities did.
+    ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``failure`` if it looks like a
+    receiver's, ``lost`` if the filter gave in before the velocities did.
     """
 
     start: float
@@ -110,7 +92,45 @@ class _Spell:
     size: float
     onset: Array | None = None
     spread: float = 0.0
+    failure: bool = True
     lost: bool = False
+
+
+def _runs(traces: Sequence[EpochTrace]) -> Iterator[list[float]]:
+    """Times of refused velocities, those together that no two seconds of good ones part."""
+    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
+    run: list[float] = []
+    for t, refused in [*((x.t, "velocity" in x.refused) for x in judged), (np.inf, False)]:
+        if refused:
+            run.append(t)
+        elif run and t - run[-1] > 2.0:
+            yield run
+            run = []
+
+
+def _spell(
+    run: Sequence[float], refused: Mapping[float, Array], t0: float, least: float, coast_s: float
+) -> _Spell:
+    """What one run of refused velocities looks like."""
+    off = [refused[u] for u in run if u in refused]
+    mean = np.median(np.array(off), axis=0) if off else None
+    # A noisy receiver errs to all sides: the mean of its errors says nothing.
+    sizes = np.linalg.norm(off, axis=1) if off else np.zeros(1)
+    size = float(np.median(sizes))
+    long = len(run) >= FEWEST_FIXES and run[-1] - run[0] >= FAULT_S
+    # A receiver fails at once; what grows from the gate on is a filter that drifts.
+    at_once = float(np.median(sizes[:ONSET_FIXES])) > least
+    return _Spell(
+        run[0] - t0,
+        run[-1] - t0,
+        mean,
+        size,
+        np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None,
+        float(np.std(sizes)),
+        failure=long and size > least and at_once and _steady(off, size),
+        # A filter that had to begin anew does not tell its own failure from the receiver's.
+        lost=run[-1] - run[0] >= 0.95 * coast_s and mean is not None,
+    )
 
 
 def _earth_axis(spells: Sequence[_Spell]) -> str:
@@ -120,6 +140,14 @@ def _earth_axis(spells: Sequence[_Spell]) -> str:
         return "earth_north"
     worst = max((s.off for s in known if s.off is not None), key=lambda x: float(np.linalg.norm(x)))
     return "earth_north" if abs(worst[0]) >= abs(worst[1]) else "earth_east"
+
+
+def _steady(off: Sequence[Array], size: float) -> bool:
+    """Whether errors are about one error: what turns with the vehicle is the inertia's own."""
+    if not off:
+        return True
+    scatter = np.sqrt(np.mean(np.sum((np.array(off) - np.mean(off, axis=0)) ** 2, axis=1)))
+    return bool(scatter < MOST_SCATTER * size)
 
 
 def _jumps(refused: Mapping[float, Array], t0: float) -> list[tuple[float, Array]]:
@@ -132,23 +160,26 @@ def _jumps(refused: Mapping[float, Array], t0: float) -> list[tuple[float, Array
     ]
 
 
-def _paired(spells: list[_Spell], jumps: Sequence[tuple[float, Array]]) -> list[_Spell]:
-    """Join a fault that outlasted the filter's patience with the jump back at its end.
+def _paired(spells: Sequence[_Spell], jumps: Sequence[tuple[float, Array]]) -> list[_Spell]:
+    """Failures; one that outlasted the filter's patience is joined with the jump back at its end.
 
     A constant error that was taken for a new velocity in the middle shows again, with the other
     sign, when the receiver recovers: the fault ends where the second spell starts, or where the
-    innovation jumps inside it, and whose failure it was is no question any more.
+    innovation jumps inside it, and whose failure it was is no question any more.  A short spell
+    ended by itself: it takes seconds until the filter is so unsure that it gives in.
     """
     out: list[_Spell] = []
     for spell in spells:
-        if out and spell.start <= out[-1].end:
+        if not spell.failure or (out and spell.start <= out[-1].end):
             continue
         back = [t for t, jump in jumps if t > spell.end and _undoes(jump, spell.off)]
         back += [s.start for s in spells if s.start > spell.end and _undoes(s.onset, spell.off)]
         end = min(back, default=np.inf)
-        if end - spell.end < LONGEST_FAULT_S:
-            spell = replace(spell, end=end, lost=False)  # noqa: PLW2901 - the same, longer
-        out.append(spell)
+        tired = spell.end - spell.start > TIRING_S
+        if tired and end - spell.end < LONGEST_FAULT_S:
+            out.append(replace(spell, end=end, lost=False))
+        else:
+            out.append(spell)
     return out
 
 
