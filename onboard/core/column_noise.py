@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from onboard.core.filter_state import STATES, V
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_EYE = np.eye(STATES)
 
 BLOCK_S = 0.05
 """Vehicles do not manoeuvre faster."""
@@ -39,23 +42,22 @@ class ColumnNoise:
         self._Xi = F @ self._Xi @ F.T
         self._Xi[:, V, V] += duration * R_nb.T[:, :, None] * R_nb.T[:, None, :]
 
-    def update(self, L: Array, back: Array, read: tuple[list[int], list[int]]) -> None:
+    def update(self, whitener: Array, back: Array, read: tuple[Index, Index, Index]) -> None:
         """Through one update.
 
         Args:
-            L: (r, r) Cholesky factor of the innovation's covariance.
-            back: (n, r) gain times ``L``.
-            read: the two states that each row reads.
+            whitener: (r, r) inverse of the Cholesky factor of the innovation's covariance.
+            back: (n, r) gain times that factor.
+            read: the first two say which two states each row reads.
         """
-        first, second = read
+        first, second, _ = read
         picked = self._Xi[:, first] + self._Xi[:, second]
-        W = np.linalg.solve(L, picked)
-        square = W[:, :, first] + W[:, :, second]
-        white = np.linalg.solve(L, np.swapaxes(square, -1, -2))
-        self.gram += np.trace(white, axis1=-2, axis2=-1)
-        # (I - K H) Xi (I - K H)^T with K = back L^-1.
-        gain = np.eye(STATES)
-        K = np.linalg.solve(L.T, back.T).T
+        square = picked[:, :, first] + picked[:, :, second]
+        # The trace of a product of symmetric matrices is the sum of their elements' products.
+        self.gram += (square * (whitener.T @ whitener)).sum(axis=(1, 2))
+        # (I - K H) Xi (I - K H)^T with K = back times the whitener.
+        gain = _EYE.copy()
+        K = back @ whitener
         gain[:, first] -= K
         gain[:, second] -= K
         self._Xi = gain @ self._Xi @ gain.T

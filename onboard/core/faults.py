@@ -55,17 +55,15 @@ def fault_effect(
     worst = max(spells, key=lambda s: s.size, default=None)
     if worst is None:
         return None
+    sizes = {"duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s")}
+    if worst.size > 0.0:
+        # A receiver that contradicts itself while the inertia is lost does not show its error.
+        spread = float(np.hypot(least / 8.0, worst.spread))
+        sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
     inside = [x for x in traces if any(a <= x.t - t0 <= b for a, b in intervals)]
     return Effect(
         name="gps_fault",
-        unknowns={
-            "offset": Quantity(
-                worst.size,
-                float(np.hypot(least / 8.0, worst.spread)),
-                "m/s",
-            ),
-            "duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s"),
-        },
+        unknowns=sizes,
         share_of_mismatch=len(inside) / max(len(traces), 1),
         delta_bic=0.0,
         held_out_before=float("nan"),

@@ -8,15 +8,20 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.choice import Candidate
-from onboard.core.columns import Family
+from onboard.core.columns import Family, Model
 from onboard.core.engine import Engine
 from onboard.core.examination import Examination
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.physics.offsets import BiasStep
-from onboard.core.selection import Fitter
+from onboard.core.portions import Portion
+from onboard.core.selection import OFFSETS, Fitter
+from onboard.core.sums import NormalSums
 
 REACH_S = 16.0
 """How far from the boundary of a portion a jump may have been that shows there."""
+SETTLING_S = 90.0
+"""What a jump does to the filter's state is forgotten after that long (tilt takes longest; with a
+third of it, jumps beside a heading error were found seconds late)."""
 SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
 
 
@@ -39,19 +44,29 @@ def jump_near(
 def _scored(
     full: Examination, chosen: Sequence[EffectColumns], steps: Sequence[BiasStep], weaken: float
 ) -> list[tuple[float, BiasStep]]:
-    """Gain of each jump alone beside the chosen effects, from one pass with all of them."""
+    """Gain of each jump alone beside the chosen effects, from one pass with all of them.
+
+    Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
+    the offsets' own columns after it, of which ``full`` has the sums.
+    """
     families: tuple[Family, ...] = (*chosen, *steps)
     made = Engine(
         replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
     )
-    for chunk in full.chunks:
-        made.add(chunk)
-    if not made.all_portions:
+    first, last = steps[0].at - SETTLING_S, steps[-1].at + SETTLING_S
+    far: list[Portion] = []
+    for chunk, portion in zip(full.chunks, full.portions, strict=True):
+        if chunk.fixes.t[-1] < first or chunk.fixes.t[0] > last:
+            after = bool(chunk.fixes.t[0] > last)
+            far.append(_with_jumps(portion, full, made.model, steps, after=after))
+        else:
+            made.add(chunk)
+    if not made.portions:
         return []
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter(made.all_portions, made.model, weaken, absent)
+    fitter = Fitter([*far, *made.portions], made.model, weaken, absent)
     slices = made.model.slices
     stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
     free = [i for i in range(made.model.size) if i not in stepped]
@@ -61,6 +76,28 @@ def _scored(
         index = [*free, *range(slices[s.name].start, slices[s.name].stop)]
         out.append((fitter.gain(before, fitter.fit(index, held_out=False)), s))
     return out
+
+
+def _with_jumps(
+    portion: Portion, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
+) -> Portion:
+    """Sums of ``model`` over a portion that lies before or after every jump."""
+    source = np.full(model.size, -1)
+    for i, unknown in enumerate(model.unknowns):
+        source[i] = full.model.index.get(unknown.name, -1)
+    if after:
+        for step in steps:
+            source[model.slices[step.name]] = OFFSETS
+    mine = np.flatnonzero(source >= 0)
+    to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
+    sums = NormalSums.zeros(model.size)
+    sums.N[to], sums.G[to], sums.b[mine] = (
+        portion.sums.N[of],
+        portion.sums.G[of],
+        portion.sums.b[source[mine]],
+    )
+    sums.s, sums.rows, sums.log_det = portion.sums.s, portion.sums.rows, portion.sums.log_det
+    return Portion(portion.start, portion.end, sums)
 
 
 def boundary_of(fitter: Fitter, portion: int) -> float:

@@ -5,6 +5,8 @@ The filter turns one vector an epoch, where the overhead of array functions woul
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,15 +21,21 @@ def skew_of(a: Array) -> Array:
 
 def turn_by(phi: Array) -> Array:
     """(3, 3) rotation by one rotation vector (3,), rad (Rodrigues)."""
-    angle2 = float(phi @ phi)
-    K = skew_of(phi)
+    x, y, z = phi.tolist()
+    angle2 = x * x + y * y + z * z
     if angle2 < 1e-8:
-        return np.eye(3) + K + 0.5 * (K @ K)
-    angle = np.sqrt(angle2)
-    out: Array = (
-        np.eye(3) + (np.sin(angle) / angle) * K + ((1.0 - np.cos(angle)) / angle2) * (K @ K)
+        s, c = 1.0, 0.5
+    else:
+        angle = math.sqrt(angle2)
+        s, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle2
+    sx, sy, sz, cx, cy, cz = s * x, s * y, s * z, c * x, c * y, c * z
+    return np.array(
+        [
+            [1.0 - cy * y - cz * z, cx * y - sz, cx * z + sy],
+            [cx * y + sz, 1.0 - cx * x - cz * z, cy * z - sx],
+            [cx * z - sy, cy * z + sx, 1.0 - cx * x - cy * y],
+        ]
     )
-    return out
 
 
 def angle_of(R: Array) -> Array:

@@ -16,8 +16,10 @@ linearisation, those of member 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +35,30 @@ from onboard.core.small_turns import angle_of, skew_of, turn_by
 Array = NDArray[np.float64]
 
 _EYE = np.eye(STATES)
-_DIAGONAL = np.arange(STATES)
 _DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
+
+
+Index = NDArray[np.intp]
+Read = tuple[Index, Index, Index]
+"""The two states whose sum each row reads, and which of the noise variances is its own."""
+
+
+@cache
+def _read(kinds: str) -> Read:
+    """For rows of these kinds: ``v`` velocities, ``h`` height, ``aaa`` attitude."""
+    n, h, a = kinds.count("v"), kinds.count("h"), kinds.count("a")
+    state = [*range(STATES)]
+    return (
+        np.array([*state[V][:n], *[H] * h, *state[PSI][:a]]),
+        np.array([*state[CV][:n], *[CH] * h, *state[ATT][:a]]),
+        np.array([*[0, 1, 2][:n], *[3] * h, *[4, 5, 6][:a]]),
+    )
+
+
+def _diagonal(matrices: Array) -> Array:
+    """The diagonals of matrices (..., n, n), to be written to: (..., n)."""
+    view: Array = np.einsum("...ii->...i", matrices)
+    return view
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +175,9 @@ class WhiteningFilter:
         F[V, BIAS] = lever @ A
         F[H, 2] = -T
         F[H, PSI] = skew_of(S2)[2]
-        keep_att, keep_cv = np.exp(-T / ATTITUDE_TIME_S), np.exp(-T / COLOUR_TIME_S)
-        F[range(10, 13), range(10, 13)] = keep_att
-        F[range(14, 17), range(14, 17)] = keep_cv
+        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
+        keep = _diagonal(F)
+        keep[ATT], keep[CV] = keep_att, keep_cv
 
         down = _DOWN
         turn_n = None
@@ -182,11 +206,10 @@ class WhiteningFilter:
         before = 0.5 * Q
         before[:, ATT] = before[:, CV] = 0.0
         Q -= before
-        P, diagonal = self._P, _DIAGONAL
-        P[:, diagonal, diagonal] += before
-        Ft = F.T
-        P = F @ P @ Ft
-        P[:, diagonal, diagonal] += Q
+        P = self._P
+        _diagonal(P)[:] += before
+        P = F @ P @ F.T
+        _diagonal(P)[:] += Q
         self._P = P
         if self.column_noise is not None:
             self.column_noise.predict(F, R, T)
@@ -212,8 +235,11 @@ class WhiteningFilter:
             if rows is None:
                 break
             kinds, E, HP, index = rows
-            L = np.linalg.cholesky(HP[:, :, index[0]] + HP[:, :, index[1]] + self._noise(kinds))
-            W = np.linalg.solve(L, np.concatenate([E, HP], axis=2))
+            S = HP[:, :, index[0]] + HP[:, :, index[1]]
+            _diagonal(S)[:] += self._row_var[:, index[2]]
+            L = np.linalg.cholesky(S)
+            whitener = np.linalg.inv(L)
+            W = whitener @ np.concatenate([E, HP], axis=2)
             y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
             verdict = None
             if self._gates is not None:
@@ -246,7 +272,7 @@ class WhiteningFilter:
             P = (P + np.swapaxes(P, -1, -2)) / 2
         self._P = P
         if self.column_noise is not None:
-            self.column_noise.update(L[0], back[0], index)
+            self.column_noise.update(whitener[0], back[0], index)
         self._correct(theta)
         log_det = 2.0 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         return Rows(
@@ -282,25 +308,19 @@ class WhiteningFilter:
 
     def _rows(
         self, epoch: Epoch, theta: Array, *, use_v: bool, use_h: bool, use_a: bool
-    ) -> tuple[str, Array, Array, tuple[list[int], list[int]]] | None:
-        """Innovations with their columns, ``H P``, and the two states that each row reads."""
+    ) -> tuple[str, Array, Array, Read] | None:
+        """Innovations with their columns, ``H P``, and what each row reads."""
         X, R = self._X, self.R_nb
-        kinds, first, second = "", [], []
+        kinds = ""
         if use_v:
-            n = 3 if np.isfinite(epoch.velocity[2]) else 2
-            kinds += "v" * n
-            first += [0, 1, 2][:n]
-            second += [14, 15, 16][:n]
+            kinds += "vvv" if np.isfinite(epoch.velocity[2]) else "vv"
         if use_h:
             kinds += "h"
-            first.append(H)
-            second.append(CH)
         if use_a:
             kinds += "aaa"
-            first += [4, 5, 6]
-            second += [10, 11, 12]
         if not kinds:
             return None
+        read = first, second, _ = _read(kinds)
         E = X[:, first] + X[:, second]
         E[:, :, 0] *= -1.0
         at = 0
@@ -320,13 +340,7 @@ class WhiteningFilter:
             E[:, at:, 0] += angle_of(epoch.R_attitude @ R.T)
             E[:, at:, 1:] += R @ epoch.attitude_body + epoch.attitude_ned
         HP = self._P[:, first] + self._P[:, second]
-        return kinds, E, HP, (first, second)
-
-    def _noise(self, kinds: str) -> Array:
-        columns = [0, 1, 2][: kinds.count("v")] + [3] * kinds.count("h")
-        columns += [4, 5, 6] * (kinds.count("a") // 3)
-        out: Array = self._row_var[:, columns, None] * np.eye(len(columns))
-        return out
+        return kinds, E, HP, read
 
     def _renew(self, reference: str) -> None:
         """What it differs by is unknown from here on."""

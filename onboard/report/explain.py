@@ -158,11 +158,7 @@ def _card(e: Effect, autopilot: str, *, ambiguous: bool) -> dict[str, Any]:
     return {
         "title": verdict.sized(e),
         "name": e.name,
-        "unknowns": [
-            (n.replace("_", " "), words.quantity(q))
-            for n, q in e.unknowns.items()
-            if verdict.is_known(e, n)
-        ],
+        "unknowns": [(n.replace("_", " "), words.quantity(q)) for n, q in e.unknowns.items()],
         "formula": e.formula,
         "share": words.percent(e.share_of_mismatch),
         "sure": verdict.surely(e, ambiguous=ambiguous),

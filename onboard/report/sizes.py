@@ -114,8 +114,7 @@ def _fault(effect: Effect) -> str:
     whole = sum(b - a for a, b in effect.intervals)
     said = f"{fixed(whole, 0)} s in all{_times(effect)}"
     off = effect.unknowns.get("offset")
-    # Zero stands for a receiver that contradicted itself while nothing else could tell by how much.
-    return f"by {fixed(off.value, 1)} m/s, {said}" if off and off.value > 0.0 else said
+    return said if off is None else f"by {fixed(off.value, 1)} m/s, {said}"
 
 
 def _times(effect: Effect) -> str:

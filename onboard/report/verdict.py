@@ -83,15 +83,6 @@ def sized(effect: Effect) -> str:
     return f"{effect_title(effect.name)}{joint}{size}"
 
 
-def is_known(effect: Effect, unknown: str) -> bool:
-    """Whether there is anything to say of an unknown.
-
-    A receiver that contradicts itself while the inertia is lost shows a fault without its size.
-    """
-    q = effect.unknowns[unknown]
-    return not (effect.name == "gps_fault" and unknown == "offset" and q.value == 0.0)
-
-
 def proof(diagnosis: Diagnosis) -> str:
     """How sure: the residual on data that were not fitted, before and after."""
     m = diagnosis.mismatch

@@ -33,7 +33,7 @@ def of(name: str, unit: str, /, intervals=(), **values: float):
         (of("scale_nonlinearity", "1/g", x=0.01, y=0.0, z=0.02), "x 1.00, z 2.00 % per g"),
         (of("saturation", "m/s^2", ((1.0, 2.0), (3.0, 4.0)), limit=39.2), "of 39.2 m/s², 2 times"),
         (of("gps_fault", "m/s", ((10.0, 25.0),), offset=4.0), "by 4.0 m/s, 15 s in all"),
-        (of("gps_fault", "m/s", ((10.0, 25.0),), offset=0.0), "15 s in all"),
+        (of("gps_fault", "s", ((10.0, 25.0),), duration=15.0), "15 s in all"),
     ],
 )  # fmt: skip
 def test_sizes_are_said_as_people_say_them(made, said):

@@ -40,9 +40,7 @@ function proof(mismatch, found) {
 
 function effect(found) {
   const share = typeof found.share_of_mismatch === "number" ? `${Math.round(100 * found.share_of_mismatch)} % of the mismatch` : "";
-  const facts = Object.entries(found.unknowns ?? {})
-    .filter(([name, u]) => !(found.name === "gps_fault" && name === "offset" && u.value === 0)) // its size is not known
-    .map(([name, u]) => [plain(name), `${measured(u.value, u.sigma)} ± ${brief(u.sigma, 2)}\u00a0${unitInWords(u.unit)}`]);
+  const facts = Object.entries(found.unknowns ?? {}).map(([name, u]) => [plain(name), `${measured(u.value, u.sigma)} ± ${brief(u.sigma, 2)}\u00a0${unitInWords(u.unit)}`]);
   if (found.formula) facts.push(["formula", found.formula]);
   if (found.cure) facts.push(["to do", found.cure]);
   // As it is typed into a ground station: a plain minus sign.
