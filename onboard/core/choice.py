@@ -24,8 +24,7 @@ MARGIN = 25.0
 """Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
 HELD_OUT_GAIN = 12.0
 SECOND_ORDER = 5e-3
-"""Share of the evidence of what was found that columns linear in it, made of signals that are
-sampled now and then, may have left over."""
+"""Share of the evidence of what was found that columns linear in it may have left over."""
 SIGNIFICANT = 5.0
 CONTRADICTING, RECONCILED = 3.0, 0.35
 """Inflation of the variance from which portions contradict each other; what share is agreement."""
@@ -51,7 +50,8 @@ STEP_PLAUSIBLE = 3.0
 class Candidate:
     """Columns that stand for one effect; ``columns`` is None for a jump at a portion's start.
 
-    ``spent`` are unknowns that were chosen outside the fit (a jump's moment).
+    ``spent`` are unknowns that were chosen outside the fit (a jump's moment), ``unseen`` the share
+    of the columns' own variance that happens between the samples they are made of.
     """
 
     effect: str
@@ -59,6 +59,7 @@ class Candidate:
     plausible: tuple[float, ...]
     columns: EffectColumns | None = None
     spent: int = 0
+    unseen: float = 0.0
 
     def bic(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """Fall of BIC from ``before`` to ``after``, the fit with the effect in.
@@ -90,10 +91,23 @@ class Choice:
     nothing: Fit | None = None
 
     def least(self, now: Fit) -> float:
-        """Evidence that is more than what is left of second order of what was found already."""
+        """Evidence that is more than what was found already may have left over.
+
+        Columns are linear in it, and those that follow a signal which is sampled now and then
+        miss what that does in between.
+
+        Args:
+            now: fit of what was chosen.
+        """
         if self.nothing is None:
             return MARGIN
-        return max(MARGIN, SECOND_ORDER * self.fitter.gain(self.nothing, now))
+        left = SECOND_ORDER * self.fitter.gain(self.nothing, now)
+        for c in self.chosen:
+            if c.unseen > 0.0:
+                rest = [i for i in self.free if i not in c.index]
+                without = self.fitter.fit(rest, held_out=False)
+                left += c.unseen * self.fitter.gain(without, now)
+        return max(MARGIN, left)
 
     @property
     def free(self) -> list[int]:

@@ -57,6 +57,7 @@ ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals below which what follows them is not to be seen."""
+MOST_UNSEEN = 0.02
 BY_NATURE = (
     NotTestable("rotor_drag", "needs a model of the vehicle; sensors alone do not show it"),
 )
@@ -162,7 +163,17 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3)
         fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    candidates = [Candidate(c.effect, tuple(full.indices(c)), c.plausible, c) for c in testable]
+    unseen = {name: _unseen(full.chunks, name) for c in testable for name in c.needs}
+    candidates = [
+        Candidate(
+            c.effect,
+            tuple(full.indices(c)),
+            c.plausible,
+            c,
+            unseen=max((unseen[name] for name in c.needs), default=0.0),
+        )
+        for c in testable
+    ]
     index = full.model.index
     errors = [c for name in ATTITUDE_ERRORS for c in STANDING[name]]
     held = without(errors, index, full.point, full.absent, told=0.0, trim=trim)
@@ -307,3 +318,19 @@ def _spread(chunks: Sequence[Chunk], name: str) -> float:
     values = [np.atleast_2d(c.stretch.slow[name][1].T) for c in chunks]
     joined = np.concatenate(values, axis=1)
     return float(np.max(np.percentile(joined, 98, axis=1) - np.percentile(joined, 2, axis=1)))
+
+
+def _unseen(chunks: Sequence[Chunk], name: str) -> float:
+    """Share of a slow signal's variance that straight lines between its samples may miss.
+
+    Of a signal that wanders they miss a third of what lines between every other sample miss at
+    those left out.  What changes faster than that averages out in an integral.
+    """
+    missed, values = [], []
+    for chunk in chunks:
+        x = chunk.stretch.slow[name][1].T
+        values.append(np.atleast_2d(x))
+        missed.append(np.atleast_2d(x[..., 1:-1] - (x[..., 2:] + x[..., :-2]) / 2.0))
+    whole = np.var(np.concatenate(values, axis=1), axis=1).sum()
+    between = (np.concatenate(missed, axis=1) ** 2).mean(axis=1).sum() / 3.0
+    return min(float(between / max(whole, 1e-12)), MOST_UNSEEN)

@@ -23,13 +23,13 @@ MOST_SCATTER = 0.5
 FAULT_M_S = 0.7
 ONSET_FIXES = 3
 LONGEST_FAULT_S = 120.0
-TIRING_S = 5.0
 NEIGHBOURS_S = 1.1
 """Fixes that follow on each other: between them inertia changes by next to nothing."""
 
 
 def fault_effect(
     traces: Sequence[EpochTrace],
+    theta: Array,
     chunks: Sequence[Chunk],
     t0: float,
     least: float,
@@ -40,6 +40,7 @@ def fault_effect(
 
     Args:
         traces: of every epoch.
+        theta: (m,) what their columns are multiplied with.
         chunks: the flight.
         t0: s on the boot clock.
         least: m/s by which no honest receiver is off.
@@ -48,8 +49,10 @@ def fault_effect(
             fault where the inertia, lost itself, cannot tell.
     """
     refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
-    every = [_spell(run, refused, t0, least, coast_s) for run in _runs(traces)]
-    spells = [s for s in _paired(every, _jumps(refused, t0)) if not s.lost]
+    heard = {x.t: (x.innovation - x.columns @ theta)[:2] for x in traces if x.velocities}
+    seen = {**heard, **refused}
+    every = [_spell(run, seen, t0, least, coast_s) for run in _runs(traces, refused)]
+    spells = [s for s in _paired(every, _jumps(seen, refused, t0)) if not s.lost]
     spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
     intervals = [(s.start, s.end) for s in spells]
     worst = max(spells, key=lambda s: s.size, default=None)
@@ -81,7 +84,8 @@ class _Spell:
 
     ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length,
     ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``failure`` if it looks like a
-    receiver's, ``lost`` if the filter gave in before the velocities did.
+    receiver's, ``outlasted`` if the velocities were as far off right after it, ``lost`` if the
+    filter began anew before they were right.
     """
 
     start: float
@@ -91,27 +95,48 @@ class _Spell:
     onset: Array | None = None
     spread: float = 0.0
     failure: bool = True
+    outlasted: bool = False
     lost: bool = False
 
 
-def _runs(traces: Sequence[EpochTrace]) -> Iterator[list[float]]:
-    """Times of refused velocities, those together that no two seconds of good ones part."""
+def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
+    """Times of refused velocities, those together that no two seconds of good ones part.
+
+    Nor does a run go on when the filter has taken the error for a velocity and is off by another.
+    """
     judged = [x for x in traces if x.velocities or "velocity" in x.refused]
     run: list[float] = []
-    for t, refused in [*((x.t, "velocity" in x.refused) for x in judged), (np.inf, False)]:
-        if refused:
+    taken = False
+    for t, bad in [*((x.t, "velocity" in x.refused) for x in judged), (np.inf, False)]:
+        if bad:
+            if taken and _another(refused.get(t), refused.get(run[-1])):
+                yield run
+                run = []
             run.append(t)
+            taken = False
         elif run and t - run[-1] > 2.0:
             yield run
             run = []
+            taken = False
+        else:
+            taken = bool(run)
+
+
+def _another(now: Array | None, before: Array | None) -> bool:
+    """Whether an error is far from what it was."""
+    if now is None or before is None or len(now) != len(before):
+        return False
+    return float(np.linalg.norm(now - before)) > 0.5 * float(np.linalg.norm(before))
 
 
 def _spell(
-    run: Sequence[float], refused: Mapping[float, Array], t0: float, least: float, coast_s: float
+    run: Sequence[float], seen: Mapping[float, Array], t0: float, least: float, coast_s: float
 ) -> _Spell:
-    """What one run of refused velocities looks like."""
-    off = [refused[u] for u in run if u in refused]
+    """What one run of refused velocities looks like, and what came next."""
+    off = [seen[u] for u in run if u in seen]
     mean = np.median(np.array(off), axis=0) if off else None
+    after = min((u for u in seen if u > run[-1]), default=None)
+    still = after is not None and mean is not None and _along(seen[after], mean) > 0.5
     # A noisy receiver errs to all sides: the mean of its errors says nothing.
     sizes = np.linalg.norm(off, axis=1) if off else np.zeros(1)
     size = float(np.median(sizes))
@@ -126,6 +151,7 @@ def _spell(
         np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None,
         float(np.std(sizes)),
         failure=long and size > least and at_once and _steady(off, size),
+        outlasted=still,
         # A filter that had to begin anew does not tell its own failure from the receiver's.
         lost=run[-1] - run[0] >= 0.95 * coast_s and mean is not None,
     )
@@ -148,12 +174,17 @@ def _steady(off: Sequence[Array], size: float) -> bool:
     return bool(scatter < MOST_SCATTER * size)
 
 
-def _jumps(refused: Mapping[float, Array], t0: float) -> list[tuple[float, Array]]:
-    """Changes (2,) of the innovation from one refused velocity to the next, and when, s."""
-    t = sorted(refused)
+def _jumps(
+    seen: Mapping[float, Array], refused: Mapping[float, Array], t0: float
+) -> list[tuple[float, Array]]:
+    """Changes (2,) of the innovation from one refused velocity to the next, and when, s.
+
+    After one that was taken the innovation has jumped because the filter has.
+    """
     return [
         (b - t0, refused[b] - refused[a])
-        for a, b in pairwise(t)
+        for a, b in pairwise(sorted(seen))
+        if a in refused and b in refused
         if b - a < NEIGHBOURS_S and len(refused[a]) == len(refused[b]) == 2
     ]
 
@@ -163,8 +194,7 @@ def _paired(spells: Sequence[_Spell], jumps: Sequence[tuple[float, Array]]) -> l
 
     A constant error that was taken for a new velocity in the middle shows again, with the other
     sign, when the receiver recovers: the fault ends where the second spell starts, or where the
-    innovation jumps inside it, and whose failure it was is no question any more.  A short spell
-    ended by itself: it takes seconds until the filter is so unsure that it gives in.
+    innovation jumps inside it, and whose failure it was is no question any more.
     """
     out: list[_Spell] = []
     for spell in spells:
@@ -173,12 +203,16 @@ def _paired(spells: Sequence[_Spell], jumps: Sequence[tuple[float, Array]]) -> l
         back = [t for t, jump in jumps if t > spell.end and _undoes(jump, spell.off)]
         back += [s.start for s in spells if s.start > spell.end and _undoes(s.onset, spell.off)]
         end = min(back, default=np.inf)
-        tired = spell.end - spell.start > TIRING_S
-        if tired and end - spell.end < LONGEST_FAULT_S:
+        if spell.outlasted and end - spell.end < LONGEST_FAULT_S:
             out.append(replace(spell, end=end, lost=False))
         else:
             out.append(spell)
     return out
+
+
+def _along(a: Array, b: Array) -> float:
+    """The share of ``b`` that is in ``a``."""
+    return float(a @ b) / max(float(b @ b), 1e-12) if len(a) == len(b) else 0.0
 
 
 def _undoes(jump: Array | None, off: Array | None) -> bool:

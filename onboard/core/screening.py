@@ -111,7 +111,13 @@ def false_fixes(
             asked = replace(chunk, trusted=heard)
         traces.extend(Engine.through(full, made, asked).traces)
     fault = fault_effect(
-        traces, full.chunks, t0, least, full.settings.coast_s, _distrusted(calibrator, full, t0)
+        traces,
+        solution.theta,
+        full.chunks,
+        t0,
+        least,
+        full.settings.coast_s,
+        _distrusted(calibrator, full, t0),
     )
     if fault is None:
         return None, list(full.chunks)
