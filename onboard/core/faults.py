@@ -142,7 +142,7 @@ def _spell(
     size = float(np.median(sizes))
     long = len(run) >= FEWEST_FIXES and run[-1] - run[0] >= FAULT_S
     # A receiver fails at once; what grows from the gate on is a filter that drifts.
-    at_once = float(np.median(sizes[:ONSET_FIXES])) > least
+    at_once = float(np.median(sizes[:ONSET_FIXES])) > max(least, 0.5 * size)
     return _Spell(
         run[0] - t0,
         run[-1] - t0,

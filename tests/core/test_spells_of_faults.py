@@ -92,7 +92,8 @@ def test_what_the_filter_jumps_by_when_it_gives_in_is_not_the_end(chunks):
     assert interval(stages, chunks) == pytest.approx((20.0, 44.0), abs=0.01)
 
 
-def test_slow_drift_of_the_inertia_is_no_fault(chunks):
-    growing = [(20 + k * STEP_S, (0.1 + 0.05 * k, 0.0), V) for k in range(1, 60)]
+@pytest.mark.parametrize("first", [0.1, 2.0])
+def test_drift_of_the_inertia_is_no_fault(chunks, first):
+    growing = [(20 + k * STEP_S, (first * (1.0 + 0.1 * k), 0.0), V) for k in range(1, 60)]
     found = fault_effect(flight((20, NONE, ()), *growing), np.zeros(1), chunks, 0.0, LEAST, COAST_S)
     assert found is None
