@@ -20,12 +20,12 @@ V, H, PSI, BIAS = slice(0, 3), 3, slice(4, 7), slice(7, 10)
 ATT, WANDER, COLOUR = slice(10, 13), 13, slice(14, 17)
 SCALE, BETA = slice(17, 20), slice(20, 23)
 DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
-GYRO_SCALE, ROLL, PITCH, YAW, SIZE = slice(29, 32), 32, 33, 34, 35
+GYRO_SCALE, ROLL, PITCH, YAW, ARM, SIZE = slice(29, 32), 32, 33, 34, slice(35, 38), 38
 
 PRIOR = (
     (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
     (H_DELAY, 0.1), (GYRO_LATE, 0.005), (GYRO_SCALE, 0.01), (ROLL, 0.03), (PITCH, 0.03),
-    (YAW, 0.1), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
+    (YAW, 0.1), (ARM, 0.05), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
 )  # fmt: skip
 """Standard deviations before the flight, of constants and of what moves; SI."""
 
@@ -112,6 +112,7 @@ def _updated(
     M[2, [H, WANDER]] = 1.0
     M[2, [DELAY, H_DELAY]] = v[2]
     M[2, SPAN] = -a[2] / 24.0
+    M[:2, ARM], M[2, ARM] = (R @ cross_matrix(path.w_b[row]))[:2], -R[2]
     M[3:, PSI] = M[3:, ATT] = np.eye(3)
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0

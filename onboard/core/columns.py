@@ -55,9 +55,16 @@ NOTHING = Direct()
 
 
 class Family:
-    """A piece of physics: unknowns and their columns.  Subclasses override what applies."""
+    """A piece of physics: unknowns and their columns.  Subclasses override what applies.
+
+    Attributes:
+        name: of the family, unique in a model.
+        unknowns: in the order of their columns.
+        instead_of: name of a nuisance that has the same columns and gives way to this family.
+    """
 
     name: str = ""
+    instead_of: str = ""
     unknowns: tuple[Unknown, ...] = ()
 
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.calibration_columns import (
+    AntennaPlace,
     AttitudeOffset,
     GpsLatency,
     GpsSmoothing,
@@ -83,22 +84,25 @@ def calibration_model(
     settings: EstimatorSettings | None = None,
     more: tuple[Family, ...] = (),
 ) -> Model:
-    """The six, timing and nuisances about ``point``; ``prior`` is (6,) scale, beta."""
+    """The six, timing and nuisances about ``point``; ``prior`` is (6,) scale, beta.
+
+    ``more`` is other physics; a nuisance gives way to what is there instead of it.
+    """
     needs = (settings or EstimatorSettings()).needs
     centre = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) if prior is None else prior
-    return Model(
-        [
-            Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
-            GpsLatency(point.delay),
-            GpsSmoothing(point.window),
-            ImuDelay(point.attitude_delay),
-            HeightLatency(),
-            GyroTiming(),
-            GyroScale(),
-            AttitudeOffset(),
-            *more,
-        ]
+    always: tuple[Family, ...] = (
+        Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
+        GpsLatency(point.delay),
+        GpsSmoothing(point.window),
+        ImuDelay(point.attitude_delay),
+        HeightLatency(),
+        GyroTiming(),
+        GyroScale(),
+        AttitudeOffset(),
+        AntennaPlace(),
     )
+    gone = {f.instead_of for f in more}
+    return Model([*(f for f in always if f.name not in gone), *more])
 
 
 def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:

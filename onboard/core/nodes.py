@@ -105,6 +105,16 @@ class Around:
     swing: Array
 
 
+def lever_velocity(w_b: Array) -> Array:
+    """(K, 3, 3) columns ``w x e_i``, 1/s: a rigid body's velocity per m of lever arm.
+
+    Args:
+        w_b: (K, 3) rate, rad/s.
+    """
+    out: Array = np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
+    return out
+
+
 def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
     """Mean of ``d P / dt`` over the span: ``(P(window/2) - P(-window/2)) / window``.
 
@@ -116,7 +126,7 @@ def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
     """
     step = float(offset[1] - offset[0])
     if window < 2.0 * step:
-        return np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
+        return lever_velocity(w_b)
     at = (min(window / 2.0, float(offset[-1])) - offset[0]) / step
     low = min(int(at), len(offset) - 2)
     share = at - low

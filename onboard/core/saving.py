@@ -20,7 +20,8 @@ from onboard.core.samples import Vector3
 from onboard.core.sums import NormalSums
 from onboard.errors import StateError
 
-VERSION = 1
+VERSION = 2
+"""1: sums without the antenna's place among the unknowns."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from onboard.core.calibration_columns import (
+    AntennaPlace,
     AttitudeOffset,
     GpsLatency,
     GpsSmoothing,
@@ -201,8 +202,9 @@ def test_a_receiver_that_averages(window):
     np.testing.assert_allclose(got, numeric, atol=0.05 * np.abs(numeric).max())
 
 
-def test_an_antenna_away_from_the_imu_swings():
-    got = columns_of(LeverArm(ORIGIN))
+@pytest.mark.parametrize("family", [LeverArm(ORIGIN), AntennaPlace()])
+def test_an_antenna_away_from_the_imu_swings(family):
+    got = columns_of(family)
     e = 1e-3
     for k in range(3):
         there = [rotation(EPOCHS + s) @ small(k, 1.0) for s in (e, -e)]

@@ -245,8 +245,9 @@ def test_damaged_state_is_refused(identified):
     damages = [
         text[:-40],
         "[]",
-        '{"version": 1}',
-        text.replace('"version": 1', '"version": 99'),
+        '{"version": 2}',
+        text.replace('"version": 2', '"version": 1'),
+        text.replace('"version": 2', '"version": 99'),
         text.replace('"velocity": ', '"velocity": -'),
         text.replace('"delay": ', '"delay": NaN, "was": '),
         text.replace('"prior": [', '"prior": [1.0, '),

@@ -6,6 +6,8 @@ import pytest
 from onboard.core.engine import calibration_model, moved
 from onboard.core.frames import rotation_from_euler
 from onboard.core.linearisation import MOVING, Linearisation
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.receiver import LeverArm
 from onboard.core.stretch import Stretch
 
 T = np.linspace(0.0, 4.0, 201)
@@ -29,6 +31,18 @@ def test_delay_and_heading_are_taken_out_exactly(delay, heading):
     assert near.all()
     # Interpolated between samples 20 ms apart, to well below a tenth of a milliradian.
     assert np.max(np.abs(R - attitude(at))) < 1e-4
+
+
+def test_a_nuisance_gives_way_to_the_effect_with_its_columns():
+    arm = LeverArm(Origin(t0=0.0))
+    without, with_it = (calibration_model(Linearisation(), more=more) for more in ((), (arm,)))
+    assert [u.name for u in without.unknowns if "antenna" in u.name] == [
+        "antenna_x",
+        "antenna_y",
+        "antenna_z",
+    ]
+    assert not {"antenna_x", "antenna_y", "antenna_z"} & set(with_it.index)
+    assert with_it.size == without.size
 
 
 def test_the_linearisation_follows_its_unknowns():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from onboard.core.columns import Direct, Unknown
 from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.nodes import Around
+from onboard.core.nodes import Around, lever_velocity
 from onboard.core.physics.effect import AXES, EffectColumns, Origin
 
 Array = NDArray[np.float64]
@@ -19,6 +19,7 @@ class LeverArm(EffectColumns):
     """Antenna away from where it was told to be: its velocity has a part of the rotation."""
 
     name = effect = "gps_lever_arm"
+    instead_of = "antenna_place"
     source = "rigid body: v_antenna = v + R (w x r)"
     cure = "measure the antenna's place and set GPS1_POS_*"
     apart = "pitch, roll and yaw quickly while GPS is good"
@@ -44,7 +45,7 @@ class LeverArm(EffectColumns):
         """``R (w x e_i)``."""
         if self._mean:
             return Direct(body=around.swing)
-        return Direct(body=np.cross(around.now.w_b[:, None, :], np.eye(3)).swapaxes(-1, -2))
+        return Direct(body=lever_velocity(around.now.w_b))
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
