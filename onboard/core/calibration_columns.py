@@ -16,8 +16,8 @@ AXIS = "xyz"
 THIRD_MOMENT = 1e-3
 """Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
 ANTENNA_SIGMA = 0.05
-"""Prior sigma of the antenna's place, m.  A person with a ruler knows neither where in its housing an
-antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where nothing was
+"""Prior sigma of the antenna's place, m.  A person with a ruler knows neither where in its housing
+an antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where nothing was
 told, the two are a hand's breadth apart even on a small vehicle.  What is more is an effect.  On
 flights with turns 2 cm and 15 cm give the six the same sigmas within a few per cent."""
 

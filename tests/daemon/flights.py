@@ -22,12 +22,14 @@ IMU = ImuTruth(scale=tuple(TRUE_SCALE), offset=tuple(TRUE_OFFSET))
 
 
 @asynccontextmanager
-async def flying(port, *, flights=1, flight_s=120.0, antenna=(0.0, 0.0, 0.0), speedup=SPEEDUP):
+async def flying(
+    port, *, flights=1, flight_s=120.0, antenna=(0.0, 0.0, 0.0), effects=(), speedup=SPEEDUP
+):
     """A copter that flies by itself, at many times the pace of real life.
 
-    ``antenna`` is where the GPS antenna really is; nobody is told.
+    ``antenna`` is where the GPS antenna really is, ``effects`` what else is; nobody is told.
     """
-    truth = Truth(imus=(IMU,), gps=GpsTruth(antenna=antenna), seed=5)
+    truth = Truth(imus=(IMU,), gps=GpsTruth(antenna=antenna), effects=effects, seed=5)
     autopilot = Autopilot("copter", truth)
     mission = Mission(flights=flights, duration=flight_s, ground=GROUND_S)
     server = Server(autopilot, speedup=speedup, driver=mission)
