@@ -118,7 +118,13 @@ class Choice:
         """What else could stand in the place of a chosen effect, nearest first."""
         rest = self.base + [i for c in self.chosen if c is not target for i in c.index]
         others = [c for c in self.candidates if c not in self.chosen and c.effect != target.effect]
-        return rivals_of(self.fitter, rest, target, others)
+        step, boundary = _best_jump(self, rest)
+        if step is None or boundary is None or target.columns is None:
+            return rivals_of(self.fitter, rest, target, others)
+        if not target.columns.tilts_ekf:
+            return rivals_of(self.fitter, rest, target, others)
+        # What wanders, on one flight, may have jumped.
+        return rivals_of(self.fitter.stepped(boundary), rest, target, [*others, step])
 
 
 def rivals_of(
@@ -172,7 +178,7 @@ def choose(
     """
     choice = Choice(fitter, list(base), list(candidates), [], nothing=nothing)
     while len(choice.chosen) < MOST_EFFECTS:
-        step, boundary = _best_jump(choice)
+        step, boundary = _best_jump(choice, choice.free)
         offered = [c for c in choice.candidates if c not in choice.chosen]
         wide = choice.fitter
         if step is not None and boundary is not None:
@@ -249,11 +255,11 @@ def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> lis
     return out
 
 
-def _best_jump(choice: Choice) -> tuple[Candidate | None, int | None]:
-    """The jump that would help most, if there is none yet."""
+def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, int | None]:
+    """The jump that would help most beside some columns, if there is none yet."""
     if choice.jump is not None or len(choice.fitter.portions) < 4:
         return None, None
-    boundary = max(choice.fitter.jumps(choice.free), key=lambda x: x[1])[0]
+    boundary = max(choice.fitter.jumps(list(beside)), key=lambda x: x[1])[0]
     m = choice.fitter.model.size
     return Candidate(STEP, (m, m + 1, m + 2), (STEP_PLAUSIBLE,) * 3, spent=1), boundary
 
@@ -313,6 +319,9 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) 
         return False
     if np.any(np.abs(value) - sigma > np.array(c.plausible)):
         return False
+    if c.effect == STEP and np.max(np.abs(value)) > MATTERS_OFFSET:
+        # What is learned over the whole flight lies in between, and nearer to both.
+        return True
     return _matters(fitter, before, after)
 
 

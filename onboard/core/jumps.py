@@ -19,9 +19,8 @@ from onboard.core.sums import NormalSums
 
 REACH_S = 16.0
 """How far from the boundary of a portion a jump may have been that shows there."""
-SETTLING_S = 90.0
-"""What a jump does to the filter's state is forgotten after that long (tilt takes longest; with a
-third of it, jumps beside a heading error were found seconds late)."""
+SETTLING_S = 40.0
+"""What a jump does to the filter's state is forgotten after that long."""
 SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
 
 
@@ -82,20 +81,19 @@ def _with_jumps(
     portion: Portion, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
 ) -> Portion:
     """Sums of ``model`` over a portion that lies before or after every jump."""
-    source = np.full(model.size, -1)
+    source, sign = np.full(model.size, -1), np.ones(model.size)
     for i, unknown in enumerate(model.unknowns):
         source[i] = full.model.index.get(unknown.name, -1)
     if after:
         for step in steps:
-            source[model.slices[step.name]] = OFFSETS
+            # What the sensor reads too much; the offsets' columns are what is added to it.
+            source[model.slices[step.name]], sign[model.slices[step.name]] = OFFSETS, -1.0
     mine = np.flatnonzero(source >= 0)
     to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
+    signs = np.outer(sign[mine], sign[mine])
     sums = NormalSums.zeros(model.size)
-    sums.N[to], sums.G[to], sums.b[mine] = (
-        portion.sums.N[of],
-        portion.sums.G[of],
-        portion.sums.b[source[mine]],
-    )
+    sums.N[to], sums.G[to] = signs * portion.sums.N[of], signs * portion.sums.G[of]
+    sums.b[mine] = sign[mine] * portion.sums.b[source[mine]]
     sums.s, sums.rows, sums.log_det = portion.sums.s, portion.sums.rows, portion.sums.log_det
     return Portion(portion.start, portion.end, sums)
 
