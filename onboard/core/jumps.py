@@ -84,6 +84,10 @@ def _with_jumps(
     source, sign = np.full(model.size, -1), np.ones(model.size)
     for i, unknown in enumerate(model.unknowns):
         source[i] = full.model.index.get(unknown.name, -1)
+    for family in full.model.families:
+        if family.instead_of in model.slices:
+            theirs = full.model.slices[family.name]
+            source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
     if after:
         for step in steps:
             # What the sensor reads too much; the offsets' columns are what is added to it.
