@@ -32,6 +32,8 @@ FAIR = 10.0
 """Fall of BIC that is enough for an effect which makes portions agree."""
 MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
 MOST_EFFECTS = 5
+LEAST_PORTIONS = 4
+"""Portions of a flight among which a jump can be looked for."""
 RIVAL_SHARE = 0.15
 """Least share of an effect's evidence that makes another one its rival."""
 LEFT_BESIDE = 0.5
@@ -257,7 +259,8 @@ def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> lis
 
 def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, int | None]:
     """The jump that would help most beside some columns, if there is none yet."""
-    if choice.jump is not None or len(choice.fitter.portions) < 4:
+    located = any(c.effect == STEP for c in choice.candidates)
+    if located or len(choice.fitter.portions) < LEAST_PORTIONS:
         return None, None
     boundary = max(choice.fitter.jumps(list(beside)), key=lambda x: x[1])[0]
     m = choice.fitter.model.size

@@ -9,14 +9,18 @@ timing and residuals.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.choice import (
+    CONTRADICTING,
     FAIR,
+    LEAST_PORTIONS,
     MARGIN,
+    RECONCILED,
     STEP,
     Candidate,
     Choice,
@@ -103,7 +107,7 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
-    full.doubting_attitude()
+    full, testable = _jumped(full.doubting_attitude(), testable)
     trim = calibrator.parameters.trim
     choice = _chosen(full, testable, trim)
     if any(c.effect == STEP or (c.columns and c.columns.tilts_ekf) for c in choice.chosen):
@@ -152,26 +156,43 @@ def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:
     return list(chunks[first:])
 
 
+def _jumped(
+    full: Examination, testable: list[EffectColumns]
+) -> tuple[Examination, list[EffectColumns]]:
+    """The same with a jump among the columns, if portions agree with it that did not without.
+
+    Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
+    for noise; a jump is no column until its moment is known, and at a portion's start, seconds
+    away, it explains little of what it does.
+    """
+    fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
+    apart = full.found().inflation
+    if apart < CONTRADICTING or len(fitter.portions) < LEAST_PORTIONS:
+        return full, testable
+    boundary = max(fitter.jumps(list(range(full.model.size))), key=lambda x: x[1])[0]
+    step = jump_near(full, testable, boundary_of(fitter, boundary), 1.0)
+    if step is None:
+        return full, testable
+    everything = [*testable, step]
+    made = Examination(full, everything, t0=full.point.skew_from, start=full).with_noise()
+    return (made, everything) if made.found().inflation < RECONCILED * apart else (full, testable)
+
+
 def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3) -> Choice:
     """Selection on the sums of the whole catalogue."""
     solution = full.found()
     fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
-    jumps = fitter.jumps(list(range(full.model.size))) if len(fitter.portions) > 3 else []
-    if jumps:
+    located = any(isinstance(c, BiasStep) for c in testable)
+    if not located and len(fitter.portions) >= LEAST_PORTIONS:
         # Portions that contradict each other because of a jump are no reason to doubt the jump.
+        jumps = fitter.jumps(list(range(full.model.size)))
         wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
         fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
     unseen = {name: _unseen(full.chunks, name) for c in testable for name in c.needs}
     candidates = [
-        Candidate(
-            c.effect,
-            tuple(full.indices(c)),
-            c.plausible,
-            c,
-            unseen=max((unseen[name] for name in c.needs), default=0.0),
-        )
+        replace(candidate_of(full, c), unseen=max((unseen[name] for name in c.needs), default=0.0))
         for c in testable
     ]
     index = full.model.index
@@ -254,7 +275,7 @@ def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns])
         start=full,
         point=moved(full.point, model, fit.theta),
     )
-    if any(isinstance(f, BiasStep) for f in families):
+    if choice.jump is not None and any(isinstance(f, BiasStep) for f in families):
         # Without the jump its mismatch was noise, and no estimate is fit to refuse anything.
         return final.with_noise()
     theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)

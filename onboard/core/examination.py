@@ -144,8 +144,13 @@ class Examination(Engine):
 
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is hardly believed."""
+        attitude = max(self.noise.attitude, HARDLY_BELIEVED)
+        return self.whitened_with(replace(self.noise, attitude=attitude))
+
+    def whitened_with(self, noise: NoiseLevels) -> Examination:
+        """The same flight and columns with other noise levels."""
         made = Examination(self, self._more, t0=self.point.skew_from, start=self)
-        made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
+        made.noise = noise
         found = self.found()
         made._seed = found
         made.once((found.theta, found.covariance))
