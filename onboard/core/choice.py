@@ -2,8 +2,8 @@
 
 An effect is taken when the fall of the misfit pays for its unknowns (BIC) by a wide margin, when it
 holds on portions of the flight that were not fitted, when its size is sure and believable, and
-when it matters.  A jump of the offsets competes like the rest, at the boundaries of portions; its
-moment is looked for afterwards.
+when it matters.  A jump of the offsets competes like the rest: at the starts of portions as long
+as its moment is not known.
 """
 
 from __future__ import annotations
@@ -81,15 +81,13 @@ class Candidate:
 class Choice:
     """Effects that were taken, in order, and the sums in which they are columns.
 
-    ``jump`` is the portion at whose start the offsets jump, None without; ``nothing`` a fit without
-    the effects that ``base`` holds.
+    ``nothing`` is a fit without the effects that ``base`` holds.
     """
 
     fitter: Fitter
     base: list[int]
     candidates: list[Candidate]
     chosen: list[Candidate]
-    jump: int | None = None
     nothing: Fit | None = None
 
     def least(self, now: Fit) -> float:
@@ -200,7 +198,7 @@ def choose(
         if best is None:
             break
         if best is step:
-            choice.fitter, choice.jump = wide, boundary
+            choice.fitter = wide
             choice.candidates.append(best)
         choice.chosen.append(best)
         _reconsider(choice)

@@ -21,7 +21,6 @@ from onboard.core.choice import (
     LEAST_PORTIONS,
     MARGIN,
     RECONCILED,
-    STEP,
     Candidate,
     Choice,
     choose,
@@ -107,14 +106,16 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
-    full, testable = _jumped(full.doubting_attitude(), testable)
+    full.doubting_attitude()
     trim = calibrator.parameters.trim
     choice = _chosen(full, testable, trim)
-    if any(c.effect == STEP or (c.columns and c.columns.tilts_ekf) for c in choice.chosen):
-        # Which of those it is must not be decided by an attitude that it has tilted.
+    jumped = _with_jump(full, testable, choice)
+    if jumped is not None:
+        # Which change of the offset it is must not be decided by an attitude that it has tilted.
+        full, testable = jumped
         choice = _chosen(full.doubting(), testable, trim)
     standing, doubts = _second_thoughts(choice, full, calibrator)
-    families = _families(full, choice)
+    families = _families(choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
         families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
     final = _final(full, choice, families).doubting_attitude()
@@ -156,26 +157,29 @@ def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:
     return list(chunks[first:])
 
 
-def _jumped(
-    full: Examination, testable: list[EffectColumns]
-) -> tuple[Examination, list[EffectColumns]]:
-    """The same with a jump among the columns, if portions agree with it that did not without.
+def _with_jump(
+    full: Examination, testable: Sequence[EffectColumns], choice: Choice
+) -> tuple[Examination, list[EffectColumns]] | None:
+    """The same with a jump among the columns; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
     for noise; a jump is no column until its moment is known, and at a portion's start, seconds
     away, it explains little of what it does.
     """
+    steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
+    wanders = len(steady) < len(choice.chosen)
     fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
+    if len(fitter.portions) < LEAST_PORTIONS:
+        return None
+    boundary, gain = max(fitter.jumps([*choice.base, *full.indices_of(steady)]), key=lambda x: x[1])
     apart = full.found().inflation
-    if apart < CONTRADICTING or len(fitter.portions) < LEAST_PORTIONS:
-        return full, testable
-    boundary = max(fitter.jumps(list(range(full.model.size))), key=lambda x: x[1])[0]
-    step = jump_near(full, testable, boundary_of(fitter, boundary), 1.0)
-    if step is None:
-        return full, testable
-    everything = [*testable, step]
+    likely = wanders or gain > MARGIN
+    if not likely and apart < CONTRADICTING:
+        return None
+    everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
     made = Examination(full, everything, t0=full.point.skew_from, start=full).with_noise()
-    return (made, everything) if made.found().inflation < RECONCILED * apart else (full, testable)
+    agrees = made.found().inflation < RECONCILED * apart
+    return (made, everything) if likely or agrees else None
 
 
 def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3) -> Choice:
@@ -241,16 +245,11 @@ def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[s
     return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
 
 
-def _families(full: Examination, choice: Choice) -> list[EffectColumns]:
-    """Columns of what was chosen; those of a gain about its size, a jump at its moment."""
+def _families(choice: Choice) -> list[EffectColumns]:
+    """Columns of what was chosen; those of a gain about its size."""
     theta = choice.fitter.fit(choice.free, held_out=False).theta
     sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
-    families = _about_sizes(sized)
-    if choice.jump is None or all(c.effect != STEP for c in choice.chosen):
-        return families
-    near = boundary_of(choice.fitter, choice.jump)
-    step = jump_near(full, families, near, choice.fitter.weaken)
-    return families if step is None else [*families, step]
+    return _about_sizes(sized)
 
 
 def _about_sizes(sized: Sequence[tuple[EffectColumns, Array]]) -> list[EffectColumns]:
@@ -275,9 +274,6 @@ def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns])
         start=full,
         point=moved(full.point, model, fit.theta),
     )
-    if choice.jump is not None and any(isinstance(f, BiasStep) for f in families):
-        # Without the jump its mismatch was noise, and no estimate is fit to refuse anything.
-        return final.with_noise()
     theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
     mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
     theirs = [model.index[final.model.unknowns[i].name] for i in mine]

@@ -21,27 +21,38 @@ REACH_S = 16.0
 """How far from the boundary of a portion a jump may have been that shows there."""
 SETTLING_S = 40.0
 """What a jump does to the filter's state is forgotten after that long."""
+FURTHEST = 3
 SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
 
 
-def jump_near(
-    full: Examination, chosen: Sequence[EffectColumns], centre: float, weaken: float
-) -> BiasStep | None:
-    """The jump near ``centre`` (s) that explains most beside ``chosen``; None without a flight."""
-    best: BiasStep | None = None
-    for spacing, width in SPACINGS:
-        times = np.arange(centre - width, centre + width + 1e-6, spacing)
-        steps = [BiasStep(float(t)) for t in times]
-        scored = _scored(full, chosen, steps, weaken)
-        if not scored:
-            return None
-        best = max(scored, key=lambda x: x[0])[1]
+def jump_near(full: Examination, chosen: Sequence[EffectColumns], centre: float) -> BiasStep:
+    """The jump near ``centre`` (s) that explains most beside ``chosen``.
+
+    One that is found at the edge of where it was looked for is looked for further there.
+    """
+    for _ in range(FURTHEST):
+        best = _best(full, chosen, centre, *SPACINGS[0])
+        at_edge = abs(best.at - centre) > REACH_S - 2.0 * SPACINGS[0][0]
         centre = best.at
-    return best
+        if not at_edge:
+            break
+    return _best(full, chosen, centre, *SPACINGS[1])
+
+
+def _best(
+    full: Examination,
+    chosen: Sequence[EffectColumns],
+    centre: float,
+    spacing: float,
+    width: float,
+) -> BiasStep:
+    times = np.arange(centre - width, centre + width + 1e-6, spacing)
+    scored = _scored(full, chosen, [BiasStep(float(t)) for t in times])
+    return max(scored, key=lambda x: x[0])[1]
 
 
 def _scored(
-    full: Examination, chosen: Sequence[EffectColumns], steps: Sequence[BiasStep], weaken: float
+    full: Examination, chosen: Sequence[EffectColumns], steps: Sequence[BiasStep]
 ) -> list[tuple[float, BiasStep]]:
     """Gain of each jump alone beside the chosen effects, from one pass with all of them.
 
@@ -60,12 +71,10 @@ def _scored(
             far.append(_with_jumps(portion, full, made.model, steps, after=after))
         else:
             made.add(chunk)
-    if not made.portions:
-        return []
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter([*far, *made.portions], made.model, weaken, absent)
+    fitter = Fitter([*far, *made.portions], made.model, 1.0, absent)
     slices = made.model.slices
     stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
     free = [i for i in range(made.model.size) if i not in stepped]

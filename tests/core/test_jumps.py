@@ -33,7 +33,7 @@ def full(request):
 
 
 def gains(full, times):
-    scored = jumps._scored(full, (), [BiasStep(float(t)) for t in times], 1.0)
+    scored = jumps._scored(full, (), [BiasStep(float(t)) for t in times])
     return np.array([g for g, _ in scored])
 
 
@@ -48,6 +48,5 @@ def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeyp
 
 def test_it_is_found_to_the_second(full):
     begun = float(full.chunks[0].stretch.t[0])
-    found = jumps.jump_near(full, (), begun + AT + 6.0, 1.0)
-    assert found is not None
+    found = jumps.jump_near(full, (), begun + AT + 30.0)
     assert found.at - begun == pytest.approx(AT, abs=1.5)
