@@ -173,13 +173,15 @@ def _with_jump(
         return None
     boundary, gain = max(fitter.jumps([*choice.base, *full.indices_of(steady)]), key=lambda x: x[1])
     apart = full.found().inflation
-    likely = wanders or gain > MARGIN
+    likely = wanders or gain > 2.0 * MARGIN
     if not likely and apart < CONTRADICTING:
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
-    made = Examination(full, everything, t0=full.point.skew_from, start=full).with_noise()
-    agrees = made.found().inflation < RECONCILED * apart
-    return (made, everything) if likely or agrees else None
+    made = Examination(full, everything, t0=full.point.skew_from, start=full)
+    if likely:
+        return made.tuned(), everything
+    agrees = made.with_noise().found().inflation < RECONCILED * apart
+    return (made, everything) if agrees else None
 
 
 def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3) -> Choice:

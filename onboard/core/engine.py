@@ -248,6 +248,18 @@ class Engine:
         """
         if not self.chunks or self._frozen:
             return
+        self.tune(rounds, noise_rounds)
+        self._pass = self._new_pass()
+        self.refused.clear()
+        self.states.clear()
+        self.portions = []
+        for chunk in self.chunks:
+            self._run(chunk)
+        self._pass.release()
+        self._refined_s = self.trusted_s
+
+    def tune(self, rounds: int, noise_rounds: int) -> None:
+        """Estimate timing and noise; what sums there are belong to others from then on."""
         target: NoiseLevels | None = None
         for turn in range(rounds):
             members = None
@@ -264,14 +276,6 @@ class Engine:
             self._move(point, levels)
             if timed and settled:
                 break
-        self._pass = self._new_pass()
-        self.refused.clear()
-        self.states.clear()
-        self.portions = []
-        for chunk in self.chunks:
-            self._run(chunk)
-        self._pass.release()
-        self._refined_s = self.trusted_s
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = np.zeros(self.model.size)

@@ -91,6 +91,11 @@ class Examination(Engine):
         self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
         return self
 
+    def tuned(self) -> Examination:
+        """Find noise and timing; no sums."""
+        self.tune(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        return self
+
     def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
         made = super()._new_pass(members)
         made.keep_traces = members is None
@@ -144,16 +149,10 @@ class Examination(Engine):
 
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is hardly believed."""
-        attitude = max(self.noise.attitude, HARDLY_BELIEVED)
-        return self.whitened_with(replace(self.noise, attitude=attitude))
-
-    def whitened_with(self, noise: NoiseLevels) -> Examination:
-        """The same flight and columns with other noise levels."""
         made = Examination(self, self._more, t0=self.point.skew_from, start=self)
-        made.noise = noise
-        found = self.found()
-        made._seed = found
-        made.once((found.theta, found.covariance))
+        made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
+        made._seed = self._seed
+        made.once()
         return made
 
     def _moved(self, before: Solution, after: Solution) -> bool:
