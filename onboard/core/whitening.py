@@ -234,12 +234,13 @@ class WhiteningFilter:
             rows = self._rows(epoch, theta, use_v=use_v, use_h=use_h, use_a=use_a)
             if rows is None:
                 break
-            kinds, E, HP, index = rows
-            S = HP[:, :, index[0]] + HP[:, :, index[1]]
+            kinds, both, index = rows
+            E, HP = both[:, :, : self.m + 1], both[:, :, self.m + 1 :]
+            S = HP.take(index[0], axis=2) + HP.take(index[1], axis=2)
             _diagonal(S)[:] += self._row_var[:, index[2]]
             L = np.linalg.cholesky(S)
             whitener = np.linalg.inv(L)
-            W = whitener @ np.concatenate([E, HP], axis=2)
+            W = whitener @ both
             y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
             verdict = None
             if self._gates is not None:
@@ -308,9 +309,9 @@ class WhiteningFilter:
 
     def _rows(
         self, epoch: Epoch, theta: Array, *, use_v: bool, use_h: bool, use_a: bool
-    ) -> tuple[str, Array, Array, Read] | None:
-        """Innovations with their columns, ``H P``, and what each row reads."""
-        X, R = self._X, self.R_nb
+    ) -> tuple[str, Array, Read] | None:
+        """Innovations with their columns and ``H P``, side by side, and what each row reads."""
+        X, P, R = self._X, self._P, self.R_nb
         kinds = ""
         if use_v:
             kinds += "vvv" if np.isfinite(epoch.velocity[2]) else "vv"
@@ -321,7 +322,10 @@ class WhiteningFilter:
         if not kinds:
             return None
         read = first, second, _ = _read(kinds)
-        E = X[:, first] + X[:, second]
+        both = np.empty((len(X), len(first), self.m + 1 + STATES))
+        E = both[:, :, : self.m + 1]
+        np.add(X.take(first, axis=1), X.take(second, axis=1), out=E)
+        np.add(P.take(first, axis=1), P.take(second, axis=1), out=both[:, :, self.m + 1 :])
         E[:, :, 0] *= -1.0
         at = 0
         if use_v:
@@ -339,8 +343,7 @@ class WhiteningFilter:
         if use_a and epoch.R_attitude is not None:
             E[:, at:, 0] += angle_of(epoch.R_attitude @ R.T)
             E[:, at:, 1:] += R @ epoch.attitude_body + epoch.attitude_ned
-        HP = self._P[:, first] + self._P[:, second]
-        return kinds, E, HP, read
+        return kinds, both, read
 
     def _renew(self, reference: str) -> None:
         """What it differs by is unknown from here on."""
