@@ -61,6 +61,10 @@ ENOUGH = 0.3
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals below which what follows them is not to be seen."""
 MOST_UNSEEN = 0.02
+SUSPECT = 18.0
+"""Fall of chi-square by a jump at any portion's start that one flight of thirty shows by chance."""
+SETTLED_S = 25.0
+"""While an EKF that has just begun converges, jumps of its tilt are no news."""
 BY_NATURE = (
     NotTestable("rotor_drag", "needs a model of the vehicle; sensors alone do not show it"),
 )
@@ -171,9 +175,12 @@ def _with_jump(
     fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
     if len(fitter.portions) < LEAST_PORTIONS:
         return None
-    boundary, gain = max(fitter.jumps([*choice.base, *full.indices_of(steady)]), key=lambda x: x[1])
+    jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
+    boundary = max(jumps, key=lambda x: x[1])[0]
+    begun = full.portions[0].start + SETTLED_S
+    settled = [gain for i, gain in jumps if boundary_of(fitter, i) > begun]
     apart = full.found().inflation
-    likely = wanders or gain > 2.0 * MARGIN
+    likely = wanders or max(settled, default=0.0) > SUSPECT
     if not likely and apart < CONTRADICTING:
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
