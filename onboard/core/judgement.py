@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.calibration_columns import AntennaPlace
 from onboard.core.calibrator import Calibrator
 from onboard.core.choice import HELD_OUT_GAIN, MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
 from onboard.core.epochs import Epochs, rms
@@ -29,6 +30,7 @@ from onboard.core.laws import law_of
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
 from onboard.core.physics.offsets import BiasStep
+from onboard.core.physics.receiver import LeverArm
 from onboard.core.regimes import Residuals, axis_of, located, main_axis, regime_residuals, spans
 from onboard.core.report import timing_of
 from onboard.core.result import Calibration
@@ -185,6 +187,14 @@ class Judge:
         rest = [i for i in self.all if i not in index]
         return self.fitter.fit(rest, held), self.fitter.fit(self.all)
 
+    def _evidence(self, name: str, among: Sequence[int]) -> tuple[float, float]:
+        """Fall of BIC, and of held-out chi-square, by timing or a constant attitude error."""
+        columns = STANDING[name]
+        target = Candidate(name, tuple(self.index[c] for c in columns), ())
+        rest = [i for i in among if i not in target.index]
+        absent, with_it = self.fitter.fit(rest, self._held(columns)), self.fitter.fit(among)
+        return target.bic(self.fitter, absent, with_it), self.fitter.held_gain(absent, with_it)
+
     def _share(self, without: Fit, with_it: Fit) -> float:
         left = max(without.chi2, 1e-12)
         return float(np.clip((without.chi2 - with_it.chi2) / left, 0.0, 1.0))
@@ -199,15 +209,20 @@ class Judge:
         return replace(made, rivals=self._standing_rivals(name, columns))
 
     def _holds(self, name: str) -> bool:
-        """Whether timing or a constant attitude error is needed, also on data not fitted."""
-        columns = STANDING[name]
-        target = Candidate(name, tuple(self.index[c] for c in columns), ())
-        absent, with_it = self._without(target.index, self._held(columns))
+        """Whether timing or a constant attitude error is needed, also on data not fitted.
+
+        That is asked with the antenna where it was told to be: whatever a few centimetres could do
+        instead is said besides.
+        """
+        bic, held_gain = self._evidence(name, self._told_antenna())
         trim = self.calibrator.parameters.trim
         # Whoever levelled the autopilot has seen the tilt, too: it needs no margin beyond BIC's.
         levelled = name == "mount_tilt" and float(np.hypot(*trim[:2])) > TRIM_RAD
-        enough = target.bic(self.fitter, absent, with_it) >= (0.0 if levelled else MARGIN)
-        return enough and self.fitter.held_gain(absent, with_it) >= HELD_OUT_GAIN
+        return bic >= (0.0 if levelled else MARGIN) and held_gain >= HELD_OUT_GAIN
+
+    def _told_antenna(self) -> list[int]:
+        place = self.engine.model.slices.get(AntennaPlace.name, slice(0, 0))
+        return [i for i in self.all if not place.start <= i < place.stop]
 
     def _standing_rivals(self, name: str, columns: Sequence[str]) -> tuple[Rival, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""
@@ -354,6 +369,9 @@ class Judge:
             close = [r.name for r in e.rivals if r.delta_bic < AMBIGUOUS and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
+            if e.name == "gps_smoothing" and self._evidence(e.name, self.all)[0] < MARGIN:
+                # Below a hover's force, an antenna some centimetres off looks the same.
+                out.append(Ambiguity((e.name, LeverArm.effect), LeverArm.apart))
         out += [
             Ambiguity((name, *others), APART.get(name, "fly harder: turns, climbs, accelerations"))
             for name, others in self.doubts.items()
