@@ -107,3 +107,15 @@ def test_what_has_no_name_gets_none_but_its_formula():
     (effect,) = said.effects
     assert effect.name == "empirical"
     assert "speed" in effect.formula
+
+
+@pytest.mark.parametrize(("seed", "axis", "size"), [(50, "x", -0.33), (51, "y", 0.37)])
+def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
+    # Sideways it looks like a tilt that wanders: noise found without it would be made of it.
+    sizes = {a: size if a == axis else 0.0 for a in "xyz"}
+    step = concealed.BiasStep(time=110.0, **sizes)
+    said, first = diagnosed("copter", seed, step, duration=190.0)
+    (effect,) = said.effects
+    assert effect.name == "bias_step"
+    assert abs(effect.unknowns["time"].value + first - step.time) < 2.0
+    assert effect.unknowns[axis].value == pytest.approx(size, rel=0.1)
