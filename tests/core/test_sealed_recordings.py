@@ -17,13 +17,13 @@ from sitl.recording import FlightSpec, fly_messages
 PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 
 
-def diagnosed(vehicle, seed, *effects, duration=150.0, imus=None):
+def diagnosed(vehicle, seed, *effects, duration=150.0, imus=None, gps=PROMPT):
     spec = FlightSpec(
         vehicle=vehicle,
         seed=seed,
         duration=duration,
         imus=imus or random_imus(seed),
-        gps=PROMPT,
+        gps=gps,
         effects=effects,
     )
     calibrator, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
@@ -119,3 +119,14 @@ def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
     assert effect.name == "bias_step"
     assert abs(effect.unknowns["time"].value + first - step.time) < 2.0
     assert effect.unknowns[axis].value == pytest.approx(size, rel=0.1)
+
+
+def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_rival():
+    # In a hover's force, 24 r / g of a squared window is an antenna r higher.
+    averaging = replace(PROMPT, smoothing=0.3)
+    said, _ = diagnosed("copter", 60, gps=averaging)
+    (effect,) = said.effects
+    assert effect.name == "gps_smoothing"
+    window = effect.unknowns["window"]
+    assert abs(window.value - 0.3) < max(0.03, 3.0 * window.sigma)
+    assert ("gps_smoothing", "gps_lever_arm") in [a.names for a in said.ambiguous]
