@@ -45,6 +45,7 @@ from onboard.core.screening import false_fixes, unclipped
 from onboard.core.search import searched
 from onboard.core.selection import Fitter
 from onboard.core.solution import Solution, solve
+from onboard.core.testability import testable_of, unseen_share
 from onboard.core.timing_effects import (
     ATTITUDE_ERRORS,
     LEAST,
@@ -58,16 +59,10 @@ Array = NDArray[np.float64]
 
 ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
-LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
-"""Changes of slow signals below which what follows them is not to be seen."""
-MOST_UNSEEN = 0.02
 SUSPECT = 18.0
 """Fall of chi-square by a jump at any portion's start that one flight of thirty shows by chance."""
 SETTLED_S = 25.0
 """While an EKF that has just begun converges, jumps of its tilt are no news."""
-BY_NATURE = (
-    NotTestable("rotor_drag", "needs a model of the vehicle; sensors alone do not show it"),
-)
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -97,7 +92,7 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         if sum(c.trusted_s for c in chunks) < ENOUGH * sum(c.trusted_s for c in flight):
             # Clipped all the time: what is left would say less than what is spoiled.
             chunks = flight
-    testable, absent = _testable(catalogue(origin), chunks)
+    testable, absent = testable_of(catalogue(origin), chunks)
     if rail is not None:
         # A low-pass hides the samples next to the clipped ones: what is left of them is a curve.
         testable = [f for f in testable if not isinstance(f, ScaleNonlinearity)]
@@ -203,7 +198,7 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3)
         fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    unseen = {name: _unseen(full.chunks, name) for c in testable for name in c.needs}
+    unseen = {name: unseen_share(full.chunks, name) for c in testable for name in c.needs}
     candidates = [
         replace(candidate_of(full, c), unseen=max((unseen[name] for name in c.needs), default=0.0))
         for c in testable
@@ -317,46 +312,3 @@ def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[Effect
             break
         kept = [f for f in kept if f is not worst]
     return kept
-
-
-def _testable(
-    everything: Sequence[EffectColumns], chunks: Sequence[Chunk]
-) -> tuple[list[EffectColumns], list[NotTestable]]:
-    present: list[EffectColumns] = []
-    absent = list(BY_NATURE)
-    names = set.intersection(*(set(c.stretch.slow) for c in chunks)) if chunks else set()
-    for effect in everything:
-        missing = [n for n in effect.needs if n not in names]
-        if missing:
-            absent.append(
-                NotTestable(effect.effect, f"no {' and '.join(missing)} in the recording")
-            )
-            continue
-        still = [n for n in effect.needs if _spread(chunks, n) < LEAST_SPREAD.get(n, 0.0)]
-        if still:
-            absent.append(NotTestable(effect.effect, f"{' and '.join(still)} did not change"))
-            continue
-        present.append(effect)
-    return present, absent
-
-
-def _spread(chunks: Sequence[Chunk], name: str) -> float:
-    values = [np.atleast_2d(c.stretch.slow[name][1].T) for c in chunks]
-    joined = np.concatenate(values, axis=1)
-    return float(np.max(np.percentile(joined, 98, axis=1) - np.percentile(joined, 2, axis=1)))
-
-
-def _unseen(chunks: Sequence[Chunk], name: str) -> float:
-    """Share of a slow signal's variance that straight lines between its samples may miss.
-
-    Of a signal that wanders they miss a third of what lines between every other sample miss at
-    those left out.  What changes faster than that averages out in an integral.
-    """
-    missed, values = [], []
-    for chunk in chunks:
-        x = chunk.stretch.slow[name][1].T
-        values.append(np.atleast_2d(x))
-        missed.append(np.atleast_2d(x[..., 1:-1] - (x[..., 2:] + x[..., :-2]) / 2.0))
-    whole = np.var(np.concatenate(values, axis=1), axis=1).sum()
-    between = (np.concatenate(missed, axis=1) ** 2).mean(axis=1).sum() / 3.0
-    return min(float(between / max(whole, 1e-12)), MOST_UNSEEN)
