@@ -260,7 +260,10 @@ def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None,
     located = any(c.effect == STEP for c in choice.candidates)
     if located or len(choice.fitter.portions) < LEAST_PORTIONS:
         return None, None
-    boundary = max(choice.fitter.jumps(list(beside)), key=lambda x: x[1])[0]
+    jumps = choice.fitter.jumps(list(beside))
+    if not jumps:
+        return None, None
+    boundary = max(jumps, key=lambda x: x[1])[0]
     m = choice.fitter.model.size
     return Candidate(STEP, (m, m + 1, m + 2), (STEP_PLAUSIBLE,) * 3, spent=1), boundary
 

@@ -61,8 +61,6 @@ ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
 SUSPECT = 18.0
 """Fall of chi-square by a jump at any portion's start that one flight of thirty shows by chance."""
-SETTLED_S = 25.0
-"""While an EKF that has just begun converges, jumps of its tilt are no news."""
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -168,14 +166,12 @@ def _with_jump(
     steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
     wanders = len(steady) < len(choice.chosen)
     fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
-    if len(fitter.portions) < LEAST_PORTIONS:
-        return None
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
-    boundary = max(jumps, key=lambda x: x[1])[0]
-    begun = full.portions[0].start + SETTLED_S
-    settled = [gain for i, gain in jumps if boundary_of(fitter, i) > begun]
+    if len(fitter.portions) < LEAST_PORTIONS or not jumps:
+        return None
+    boundary, gain = max(jumps, key=lambda x: x[1])
     apart = full.found().inflation
-    likely = wanders or max(settled, default=0.0) > SUSPECT
+    likely = wanders or gain > SUSPECT
     if not likely and apart < CONTRADICTING:
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
@@ -191,9 +187,9 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3)
     solution = full.found()
     fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
     located = any(isinstance(c, BiasStep) for c in testable)
-    if not located and len(fitter.portions) >= LEAST_PORTIONS:
+    jumps = [] if located else fitter.jumps(list(range(full.model.size)))
+    if jumps and len(fitter.portions) >= LEAST_PORTIONS:
         # Portions that contradict each other because of a jump are no reason to doubt the jump.
-        jumps = fitter.jumps(list(range(full.model.size)))
         wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
         fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
     effects = set(full.indices_of(testable))

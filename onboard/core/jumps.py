@@ -14,7 +14,7 @@ from onboard.core.examination import Examination
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.portions import Portion
-from onboard.core.selection import OFFSETS, Fitter
+from onboard.core.selection import OFFSETS, SETTLED_S, Fitter
 from onboard.core.sums import NormalSums
 
 REACH_S = 16.0
@@ -47,6 +47,8 @@ def _best(
     width: float,
 ) -> BiasStep:
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
+    times = np.maximum(times, float(full.portions[0].start) + SETTLED_S)
+    times = np.unique(times)
     scored = _scored(full, chosen, [BiasStep(float(t)) for t in times])
     return max(scored, key=lambda x: x[0])[1]
 

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 OFFSETS = (3, 4, 5)
 """Columns of the offsets among the six."""
 JUMP_SIGMA = 3.0
+SETTLED_S = 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +166,10 @@ class Fitter:
         return Fitter(portions, model, self.weaken, np.concatenate([self.absent, np.zeros(3)]))
 
     def jumps(self, free: Sequence[int]) -> list[tuple[int, float]]:
-        """Portions at whose start a jump of the offsets would help: (portion, gain)."""
+        """Portions at whose start a jump of the offsets would help: (portion, gain).
+
+        Not while an EKF that has just begun converges: its attitude jumps then.
+        """
         index, offsets = list(free), list(OFFSETS)
         information = np.concatenate([self._prior[index], np.full(3, JUMP_SIGMA**-2)])
         prior = np.diag(information)
@@ -174,10 +178,13 @@ class Fitter:
         at[index] = 0.0
         base = self.fit(index, held_out=False)
         shifted, after = self.sums.shifted(at), None
+        settled = self.portions[0].start + SETTLED_S
         out = []
         for i in range(len(self.portions) - 1, 0, -1):
             p = self.portions[i].sums.shifted(at)
             after = p if after is None else after + p
+            if self.portions[i].start < settled:
+                continue
             N = np.block(
                 [
                     [
