@@ -167,6 +167,7 @@ def choose(
     base: Sequence[int],
     candidates: Sequence[Candidate],
     nothing: Fit | None = None,
+    kept: Sequence[Candidate] = (),
 ) -> Choice:
     """Forward selection, each time with a look back.
 
@@ -175,8 +176,9 @@ def choose(
         base: columns that are in the model anyway.
         candidates: effects that may be taken.
         nothing: fit without the effects that ``base`` holds (a late attitude, a tilt).
+        kept: candidates that are in the model to begin with.
     """
-    choice = Choice(fitter, list(base), list(candidates), [], nothing=nothing)
+    choice = Choice(fitter, list(base), list(candidates), list(kept), nothing=nothing)
     while len(choice.chosen) < MOST_EFFECTS:
         step, boundary = _best_jump(choice, choice.free)
         offered = [c for c in choice.candidates if c not in choice.chosen]

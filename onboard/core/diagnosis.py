@@ -21,6 +21,7 @@ from onboard.core.choice import (
     LEAST_PORTIONS,
     MARGIN,
     RECONCILED,
+    STEP,
     Candidate,
     Choice,
     choose,
@@ -109,8 +110,10 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
     jumped = _with_jump(full, testable, choice)
     if jumped is not None:
         # Which change of the offset it is must not be decided by an attitude that it has tilted.
-        full, testable = jumped
-        choice = _chosen(full.doubting(), testable, trim)
+        kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
+        other = _chosen(jumped[0].doubting(), jumped[1], trim, kept)
+        if _wanders(choice) or _wanders(other):
+            full, testable, choice = *jumped, other
     standing, doubts = _second_thoughts(choice, full, calibrator)
     families = _families(choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
@@ -164,14 +167,13 @@ def _with_jump(
     away, it explains little of what it does.
     """
     steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
-    wanders = len(steady) < len(choice.chosen)
     fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
     if len(fitter.portions) < LEAST_PORTIONS or not jumps:
         return None
     boundary, gain = max(jumps, key=lambda x: x[1])
     apart = full.found().inflation
-    likely = wanders or gain > SUSPECT
+    likely = _wanders(choice) or gain > SUSPECT
     if not likely and apart < CONTRADICTING:
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
@@ -182,8 +184,18 @@ def _with_jump(
     return (made, everything) if agrees else None
 
 
-def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3) -> Choice:
-    """Selection on the sums of the whole catalogue."""
+def _wanders(choice: Choice) -> bool:
+    """Whether the offset changes in flight."""
+    return any(c.effect == STEP or (c.columns and c.columns.tilts_ekf) for c in choice.chosen)
+
+
+def _chosen(
+    full: Examination,
+    testable: Sequence[EffectColumns],
+    trim: Vector3,
+    kept: Sequence[EffectColumns] = (),
+) -> Choice:
+    """Selection on the sums of the whole catalogue; ``kept`` are in it to begin with."""
     solution = full.found()
     fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
     located = any(isinstance(c, BiasStep) for c in testable)
@@ -204,7 +216,7 @@ def _chosen(full: Examination, testable: Sequence[EffectColumns], trim: Vector3)
     held = without(errors, index, full.point, full.absent, told=0.0, trim=trim)
     gone = {index[c] for c in errors}
     nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
-    return choose(fitter, base, candidates, nothing)
+    return choose(fitter, base, candidates, nothing, [c for c in candidates if c.columns in kept])
 
 
 def _second_thoughts(

@@ -17,6 +17,7 @@ class HeadingByThrottle(EffectColumns):
 
     name = effect = "heading_by_throttle"
     needs = ("throttle",)
+    of_attitude = True
     source = "linear in the throttle, as COMPASS_MOT_* assumes"
     cure = (
         "compass-motor calibration (COMPASS_MOT_*), or move the compass away from the power wires"

@@ -36,6 +36,7 @@ class EffectColumns(Family):
         cure: what a user does about it.
         apart: the manoeuvre that tells it from what looks alike.
         tilts_ekf: whether it changes the offset in flight, which an EKF takes for tilt at first.
+        of_attitude: whether it is the recorded attitude that is wrong.
     """
 
     effect: str = ""
@@ -46,6 +47,7 @@ class EffectColumns(Family):
     apart: str = "fly banked turns both ways, climbs, and hard accelerations"
     keys: tuple[str, ...] = ()
     tilts_ekf: bool = False
+    of_attitude: bool = False
 
     def available(self, nodes: Signals) -> bool:
         """True if every signal it needs is in the recording."""
