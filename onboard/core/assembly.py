@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.airborne import still
 from onboard.core.engine import Chunk
 from onboard.core.frames import untrimmed_rotation, untrimmed_rotation_dcm
 from onboard.core.gyroscopes import rates_at
@@ -111,9 +112,20 @@ class Assembly:
         self._fresh.clear()
 
     def take(
-        self, parameters: ParametersInForce, *, everything: bool = False
+        self,
+        parameters: ParametersInForce,
+        *,
+        everything: bool = False,
+        grounded: bool | None = False,
     ) -> dict[int, list[Chunk]]:
-        """Chunks that are complete, by accelerometer; empty most of the time."""
+        """Chunks of flight that are complete, by accelerometer; empty most of the time.
+
+        Args:
+            parameters: in force.
+            everything: do not wait for a whole chunk.
+            grounded: whether the vehicle stands (then nothing is handed out); None: not told, the
+                motion decides.
+        """
         newest = max((track.last for track in self._imus.values()), default=-np.inf)
         live = {i: x for i, x in self._imus.items() if newest - x.last < 2.0}
         ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
@@ -132,16 +144,25 @@ class Assembly:
             np.array([f.latitude for f in fixes]),
         )
         out: dict[int, list[Chunk]] = {}
-        for imu in live:
-            chunks = self._cut(imu, live, even, trusted, parameters)
-            if chunks:
-                out[imu] = chunks
+        if grounded or (grounded is None and self._still(live, even)):
+            self._fresh.clear()  # what flies after it begins anew
+        else:
+            for imu in live:
+                chunks = self._cut(imu, live, even, trusted, parameters)
+                if chunks:
+                    out[imu] = chunks
         keep = float(t[-1]) - REACH_S - 0.3
         for track in self._imus.values():
             track.drop_before(keep)
         for slow in (self._attitude, *self._slow.values()):
             slow.drop_before(keep - 1.0)
         return out
+
+    def _still(self, live: dict[int, ImuTrack], fixes: Fixes) -> bool:
+        """Whether the vehicle stands, as far as one of its gyroscopes and GPS can tell."""
+        stamps, rows = live[min(live)].arrays()
+        during = (stamps >= fixes.t[0]) & (stamps <= fixes.t[-1])
+        return still(fixes.v_n, rows[during, :3])
 
     def _cut(
         self,

@@ -8,6 +8,7 @@ stream and of its recording are the same numbers.
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from dataclasses import dataclass
 
@@ -15,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.agreement import agrees
+from onboard.core.airborne import Ground
 from onboard.core.assembly import Assembly
 from onboard.core.engine import Chunk, Engine
 from onboard.core.impossible import impossible
 from onboard.core.parameters import ParametersInForce
-from onboard.core.portions import merged
+from onboard.core.portions import Seconds, merged
 from onboard.core.report import calibration_of
 from onboard.core.result import Calibration
 from onboard.core.samples import (
@@ -47,6 +50,8 @@ AHEAD_OF_IMU_S = 5.0
 """Nor is one further ahead: taken in, a single such stamp would make all that follow late."""
 MOST_SAVED = 16
 """Portions that are saved: enough for folds and clusters."""
+MOST_WAITING = 4
+"""Sums of earlier starts that wait for a flight that agrees with them, the latest."""
 BACKWARDS_S = 1.0
 """A clock that goes back by more is a reboot; by less, a message that was overtaken."""
 
@@ -86,11 +91,11 @@ class Calibrator:
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings)
         self._engines: dict[int, Engine] = {}
-        self._waiting: dict[int, SavedEngine] = {}
+        self._waiting: dict[int, list[SavedEngine]] = {}
         self._counts: Counter[str] = Counter()
         self._newest = -np.inf
         self._first = np.inf
-        self._armed: bool | None = None
+        self._ground = Ground()
         self._finished = False
         self.ekf_bias: dict[int, EkfBias] = {}
 
@@ -162,7 +167,7 @@ class Calibrator:
         """The clock begins anew: forget the inertial states, keep the sums."""
         events = self._advance(everything=True)
         ended, self._newest = float(self._newest), -np.inf
-        self._armed = None
+        self._ground.forget()
         self._assembly.clear()
         return (*events, *self._trust.restart(ended), Restarted(ended, reason))
 
@@ -176,10 +181,16 @@ class Calibrator:
     def finish(self) -> tuple[Event, ...]:
         """End of the recording or of the window: process what is pending, refine."""
         events = self._advance(everything=True)
-        for engine in self._engines.values():
-            engine.finish()
+        self._refine()
         self._finished = True
         return (*events, *self._trust.finish())
+
+    def frozen(self) -> Calibrator:
+        """A copy that keeps the flight as it is now, whatever this one is fed afterwards.
+
+        The samples themselves are shared with this one: they do not change.
+        """
+        return copy.deepcopy(self)
 
     def calibration(self, imu: int) -> Calibration:
         """What is known of accelerometer ``imu`` now.
@@ -216,43 +227,66 @@ class Calibrator:
                         tuple(float(x) for x in prior),
                         engine.point,
                         engine.noise,
-                        engine.trusted_s,
+                        Seconds(engine.trusted_s, engine.brisk_s),
                         tuple(portions),
                     )
                 )
-        # Those that wait for their accelerometer to show up are not lost by a short run.
-        saved.extend(x for imu, x in self._waiting.items() if imu not in self._engines)
+        # What waits for a flight that agrees with it is not lost by one that says too little.
+        saved.extend(e for waiting in self._waiting.values() for e in waiting)
         return dump(saved)
 
     @classmethod
     def from_bytes(cls, data: bytes, settings: EstimatorSettings | None = None) -> Calibrator:
-        """A calibrator that goes on where another stopped.
+        """A calibrator beside which lies what another one had learned.
+
+        It is taken in when a flight agrees with it (:mod:`onboard.core.agreement`), accelerometer
+        by accelerometer: whether it is of the sensor that is there now, identifiers do not tell,
+        for they are the same on every board of one model.
 
         Raises:
             StateError: damaged, or of another version.
         """
         made = cls(settings)
-        made._waiting = {e.imu: e for e in load(data)}
+        for engine in load(data):
+            made._waiting.setdefault(engine.imu, []).append(engine)
         return made
 
+    @property
+    def waiting(self) -> tuple[int, ...]:
+        """Accelerometers of which something learned before waits for a flight that agrees."""
+        return tuple(sorted(self._waiting))
+
     def _engine_of(self, imu: int) -> Engine:
-        """The engine, new or with the sums that were saved for this very sensor."""
-        if imu in self._engines:
-            return self._engines[imu]
-        saved = self._waiting.pop(imu, None)
-        identity = self.parameters.device_id(imu)
-        if saved is not None and saved.device_id == identity:
-            engine = Engine(self.settings, np.array(saved.prior), saved.point, saved.noise)
-            sizes = {p.sums.size for p in saved.portions}
-            if sizes == {engine.model.size}:
-                engine.restore(list(saved.portions), saved.trusted_s)
-                self._counts["restored"] += 1
-                self._engines[imu] = engine
-                return engine
-        if saved is not None:
-            self._counts["saved_of_another_sensor"] += 1
-        self._engines[imu] = Engine(self.settings, self._prior(imu))
+        """The engine of one accelerometer, made when it is first needed."""
+        if imu not in self._engines:
+            self._engines[imu] = Engine(self.settings, self._prior(imu))
         return self._engines[imu]
+
+    def _refine(self) -> None:
+        """A flight is over: refine, and take in of before what the flight agrees with."""
+        for imu, engine in self._engines.items():
+            engine.finish()
+            waiting = self._waiting.pop(imu, [])
+            for saved in waiting:
+                self._judge_saved(engine, saved)
+
+    def _judge_saved(self, engine: Engine, saved: SavedEngine) -> None:
+        """Take sums of before in, drop them, or let them wait on."""
+        identity = self.parameters.device_id(saved.imu)
+        if None not in (identity, saved.device_id) and identity != saved.device_id:
+            self._counts["saved_of_another_sensor"] += 1
+            return
+        # Sums of a sensor that said who it is wait until this one has said it, too.
+        opinion = agrees(engine, saved) if identity == saved.device_id else None
+        if opinion is None:
+            waiting = self._waiting.setdefault(saved.imu, [])
+            waiting.append(saved)
+            del waiting[:-MOST_WAITING]
+        elif opinion:
+            self._counts["restored"] += 1
+            engine.restore(saved.portions, saved.point, saved.seconds)
+        else:
+            self._counts["saved_contradicted"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Take a report; what was taken for raw before the six were known, was not raw."""
@@ -309,24 +343,23 @@ class Calibrator:
         return events
 
     def _vehicle(self, state: VehicleState) -> tuple[Event, ...]:
-        if state.armed is None:
-            return ()
-        before, self._armed = self._armed, state.armed
-        if not (before and not state.armed):
-            return ()
-        events = self._advance(everything=True)
-        for engine in self._engines.values():
-            engine.finish()
+        """Cut what comes where the vehicle takes off, lands, is armed or disarmed."""
+        following = self._ground.after(state)
+        ended = bool(self._ground.armed) and following.armed is False
+        changed = following.grounded is not self._ground.grounded
+        events = self._advance(everything=True) if ended or changed else ()
+        self._ground = following
+        if not ended:
+            return events
+        self._refine()
         return (*events, FlightEnded(state.t))
 
     def _advance(self, *, everything: bool = False) -> tuple[Event, ...]:
-        made: dict[int, list[Chunk]] = self._assembly.take(self.parameters, everything=everything)
+        made: dict[int, list[Chunk]] = self._assembly.take(
+            self.parameters, everything=everything, grounded=self._ground.grounded
+        )
         newest = -np.inf
         for imu, chunks in made.items():
-            saved = self._waiting.get(imu)
-            if saved is not None and saved.device_id is not None and not self.parameters.known(imu):
-                self._counts["before_parameters"] += len(chunks)
-                continue  # whether this is the sensor of the saved sums is not known yet
             for chunk in chunks:
                 self._engine_of(imu).add(chunk)
                 newest = max(newest, float(chunk.fixes.t[-1]))

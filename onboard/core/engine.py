@@ -9,6 +9,7 @@ made anew from it.  Flight that has left the buffer stays in the sums as it was 
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,7 @@ from onboard.core.columns import Family, Model
 from onboard.core.linearisation import MOVING, Linearisation
 from onboard.core.noise import NoiseLevels, distance, line, star, stepped
 from onboard.core.passes import Pass, PassResult
-from onboard.core.portions import Portion, merged
+from onboard.core.portions import Portion, Seconds, merged
 from onboard.core.settings import EstimatorSettings
 from onboard.core.solution import Solution, solve, total
 from onboard.core.stretch import Fixes, Stretch
@@ -75,7 +76,21 @@ class Chunk:
     def trusted_s(self) -> float:
         """Time between neighbouring fixes that are both to be believed, s."""
         step = np.diff(self.fixes.t)
-        return float(step[self.trusted[1:] & self.trusted[:-1] & (step < LONGEST_FIX_GAP_S)].sum())
+        return float(step[self._between(step)].sum())
+
+    def __deepcopy__(self, memo: object) -> Chunk:
+        return self  # it never changes, and is most of what an engine keeps
+
+    def seconds_above(self, speed: float) -> float:
+        """Of :attr:`trusted_s`, the time that begins with a speed over ground above ``speed``."""
+        step = np.diff(self.fixes.t)
+        over = np.hypot(self.fixes.v_n[:-1, 0], self.fixes.v_n[:-1, 1]) > speed
+        return float(step[self._between(step) & over].sum())
+
+    def _between(self, step: Array) -> NDArray[np.bool_]:
+        """(n - 1,) steps between fixes that are both to be believed and no outage apart."""
+        out: NDArray[np.bool_] = self.trusted[1:] & self.trusted[:-1] & (step < LONGEST_FIX_GAP_S)
+        return out
 
 
 def calibration_model(
@@ -163,7 +178,8 @@ class Engine:
         self.refused: Counter[str] = Counter()
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
-        self._brisk = 0.0
+        self.left_brisk_s = 0.0
+        """Of :attr:`brisk_s` what has left the buffer."""
         self._buffered_s = 0.0
         self._refined_s = 0.0
         self._frozen = False
@@ -232,6 +248,7 @@ class Engine:
                 self._frozen = True
             gone = self.chunks.pop(0)
             self._buffered_s -= gone.duration
+            self.left_brisk_s += gone.seconds_above(self.settings.brisk_speed)
             self.aged.append(self.portions.pop(0))
             keep = float(np.exp(-gone.duration / self.settings.memory_s))
             self.aged = [Portion(p.start, p.end, p.sums.scaled(keep)) for p in self.aged]
@@ -278,9 +295,7 @@ class Engine:
                 break
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
-        shift = np.zeros(self.model.size)
-        for name, now, before in zip(MOVING, point.moving, self.point.moving, strict=True):
-            shift[self.model.index[name]] = now - before
+        shift = self.shift(self.point, point)
         self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
         self.point, self.noise = point, levels
         self.model = self._model()
@@ -289,28 +304,38 @@ class Engine:
         return [self.through(made, chunk).portion for chunk in self.chunks]
 
     @property
-    def brisk_speed(self) -> float:
-        """Most speed over ground that a tenth of the buffered flight ever exceeded, m/s."""
-        speeds = [np.hypot(*c.fixes.v_n[c.trusted, :2].T) for c in self.chunks]
-        every = np.concatenate(speeds) if speeds else np.zeros(0)
-        every = every[np.isfinite(every)]
-        if len(every):
-            self._brisk = max(self._brisk, float(np.percentile(every, 90)))
-        return self._brisk
+    def brisk_s(self) -> float:
+        """Trusted flight faster than :attr:`EstimatorSettings.brisk_speed`, s."""
+        fast = self.settings.brisk_speed
+        return self.left_brisk_s + sum(c.seconds_above(fast) for c in self.chunks)
 
     @property
     def moving(self) -> bool:
-        """True if the flight went anywhere: hovering and standing excite nothing."""
-        return self.brisk_speed >= self.settings.brisk_speed
+        """True if the flight went anywhere: hovering excites nothing."""
+        enough = min(self.settings.brisk_s, self.settings.brisk_share * self.trusted_s)
+        return self.brisk_s >= enough and self.brisk_s > 0.0
 
-    def restore(self, portions: list[Portion], trusted_s: float) -> None:
-        """Take sums of earlier flights, made about this engine's point."""
-        self.aged = [*portions, *self.aged]
-        self.trusted_s += trusted_s
-        self._refined_s += trusted_s
+    def shift(self, before: Linearisation, now: Linearisation) -> Array:
+        """(m,) by how much unknowns counted from ``now`` are less than from ``before``."""
+        shift = np.zeros(self.model.size)
+        for name, to, origin in zip(MOVING, now.moving, before.moving, strict=True):
+            shift[self.model.index[name]] = to - origin
+        return shift
+
+    def restore(self, earlier: Sequence[Portion], about: Linearisation, seconds: Seconds) -> None:
+        """Take the sums of earlier flights.
+
+        Args:
+            earlier: with the unknowns of this engine's model.
+            about: the linearisation that they were made about.
+            seconds: how much flight is behind them.
+        """
+        shift = self.shift(about, self.point)
+        self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in earlier] + self.aged
+        self.trusted_s += seconds.trusted
+        self._refined_s += seconds.trusted
+        self.left_brisk_s += seconds.brisk
         self._seed = self._solution = solve(self.all_portions, self.model)
-        self._pass = self._new_pass()
-        self._pass.release()
 
     def finish(self) -> None:
         """End of a recording or a flight: refine once more if there is something new."""

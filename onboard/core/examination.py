@@ -83,7 +83,7 @@ class Examination(Engine):
             more=tuple(families),
         )
         self.chunks = list(like.chunks if chunks is None else chunks)
-        self.trusted_s = like.trusted_s
+        self.trusted_s, self.left_brisk_s = like.trusted_s, like.left_brisk_s
         self._blocks = _blocks(self.chunks)
 
     def with_noise(self) -> Examination:

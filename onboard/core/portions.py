@@ -16,6 +16,14 @@ class Portion:
     sums: NormalSums
 
 
+@dataclass(frozen=True, slots=True)
+class Seconds:
+    """How much flight is behind some sums: ``trusted``, and of that ``brisk``, s."""
+
+    trusted: float
+    brisk: float
+
+
 def merged(portions: list[Portion], most: int) -> list[Portion]:
     """At most ``most`` portions, neighbours added up."""
     while len(portions) > most:

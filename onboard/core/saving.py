@@ -15,13 +15,13 @@ from typing import Any
 
 from onboard.core.linearisation import Linearisation
 from onboard.core.noise import NoiseLevels
-from onboard.core.portions import Portion
+from onboard.core.portions import Portion, Seconds
 from onboard.core.samples import Vector3
 from onboard.core.sums import NormalSums
 from onboard.errors import StateError
 
-VERSION = 2
-"""1: sums without the antenna's place among the unknowns."""
+VERSION = 3
+"""1: sums without the antenna's place among the unknowns.  2: with time on the ground in them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class SavedEngine:
     prior: tuple[float, ...]
     point: Linearisation
     noise: NoiseLevels
-    trusted_s: float
+    seconds: Seconds
     portions: tuple[Portion, ...]
 
 
@@ -50,7 +50,7 @@ def dump(engines: list[SavedEngine]) -> bytes:
             "prior": list(e.prior),
             "point": asdict(e.point),
             "noise": asdict(e.noise),
-            "trusted_s": e.trusted_s,
+            "seconds": asdict(e.seconds),
             "portions": [
                 {
                     "start": p.start,
@@ -119,7 +119,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             heading=_finite(point.get("heading", 0.0)),
         ),
         noise,
-        _finite(e["trusted_s"]),
+        Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
         portions,
     )
 

@@ -21,7 +21,9 @@ class EstimatorSettings:
         refine: estimate timing and noise at all; False where a diagnosis will do it itself.
         minimum_s: trusted seconds below which nothing is called calibrated.
         coast_s: longest stretch without an accepted fix that is bridged inertially, s.
-        brisk_speed: speed (m/s) that a tenth of the flight must exceed; a hover wanders slower.
+        brisk_speed: m/s; a hover wanders slower.
+        brisk_s: seconds faster than that which are enough however long the vehicle hovered.
+        brisk_share: share of a shorter flight that is enough.
         slowest_imu_hz: inertial streams below this rate cannot be integrated.
         needs: what was known before and what is needed.
         trust: limits of the trust window.
@@ -35,6 +37,8 @@ class EstimatorSettings:
     minimum_s: float = 45.0
     coast_s: float = 30.0
     brisk_speed: float = 1.5
+    brisk_s: float = 30.0
+    brisk_share: float = 0.1
     slowest_imu_hz: float = 9.0
     needs: Needs = field(default_factory=Needs)
     trust: TrustLimits = field(default_factory=TrustLimits)

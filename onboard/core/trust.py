@@ -111,6 +111,9 @@ class TrustLimits:
     plausibility: PlausibilityLimits = field(default_factory=PlausibilityLimits)
     recovery: Mapping[Reason, float] = field(default_factory=lambda: RECOVERY)
 
+    def __deepcopy__(self, memo: object) -> TrustLimits:
+        return self  # limits do not change
+
 
 @dataclass(frozen=True, slots=True)
 class WindowOpened:
