@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mav
@@ -26,7 +26,7 @@ from sitl.builtin.params import Notice, ParameterStore, Value
 from sitl.builtin.sensors import Barometer
 from sitl.builtin.smoothing import DT, Array
 from sitl.builtin.trajectory import Start
-from sitl.builtin.truth import Truth
+from sitl.builtin.truth import ImuTruth, Truth
 from sitl.builtin.world import Filters, Piece, Vehicle, World
 
 SENDING = 4e-4
@@ -95,18 +95,17 @@ class Autopilot:
         self.vehicle: Vehicle = vehicle
         self.truth = truth
         self._dull = dull
+        self._loop_rate = loop_rate
         self._dirty_world = False
-        self.parameters = ParameterStore(
-            initial_parameters(vehicle, truth, loop_rate), self._changed
-        )
+        self.parameters = self._stored(parameters or {})
         self.links: list[Link] = []
         self.clock = 0.0
-        """Seconds that this simulation has run, over all reboots."""
-        self.parameters.load(parameters or {})
+        """Seconds that this simulation has run, over all reboots and times without power."""
         self._boot(Start())
 
     def _boot(self, start: Start) -> None:
         """Power on: clock at zero, filters fresh, intervals from the stream rates."""
+        self._unpowered: tuple[float, Start] | None = None
         self._orders: deque[Callable[[], object]] = deque()
         self._launching = False
         self.now = 0.0
@@ -184,14 +183,18 @@ class Autopilot:
     # -- time ------------------------------------------------------------------------------
 
     def receive(self, link: Link, message: Message) -> None:
-        """Takes a message that a client has sent."""
-        commands.receive(self, link, message)
+        """Takes a message that a client has sent; without power nothing is heard."""
+        if self._unpowered is None:
+            commands.receive(self, link, message)
 
     def advance(self, seconds: float) -> None:
         """Runs the main loop for so long; messages appear in the links' outboxes."""
         end = self.clock + seconds - 1e-9
         while self.clock < end:
-            self._loop()
+            if self._unpowered is None:
+                self._loop()
+            else:
+                self._wait_for_power(*self._unpowered, end + 1e-9)
 
     def _loop(self) -> None:
         while self._orders:
@@ -376,14 +379,74 @@ class Autopilot:
         """Reboots in the next loop, so that the answer still goes out; refused while armed."""
         if self.armed:
             return False
-        self._orders.append(self._reboot)
+        self._orders.append(self.power_cycle)
         return True
 
-    def _reboot(self) -> None:
-        """Starts afresh: parameters stay, everything else goes."""
-        start = self.world.at(self.now).trajectory.end
+    # -- power -----------------------------------------------------------------------------
+
+    def power_cycle(self, off: float = 0.0) -> bool:
+        """Power off, and on again after so many seconds; refused while armed.
+
+        Parameters stay, everything else goes.
+        """
+        if self.armed:
+            return False
         self.parameters.count_boot()
-        self._boot(start)
+        self._cut_power(off)
+        return True
+
+    def swap_board(
+        self,
+        board: str,
+        imus: tuple[ImuTruth, ...],
+        parameters: Mapping[str, float] | None = None,
+        *,
+        off: float = 0.0,
+    ) -> bool:
+        """Puts another board of the same model into the vehicle; refused while armed.
+
+        What names a sensor is the same, INS_ACC_ID and all; the board's unique id, what its
+        sensors are like and the parameters that it has stored are its own.
+
+        Args:
+            board: its unique id, as in :class:`~sitl.builtin.truth.Truth`.
+            imus: its sensors, as many as before.
+            parameters: what it has stored that differs from the defaults.
+            off: seconds without power.
+
+        Raises:
+            ValueError: another number of sensors, which is another model.
+        """
+        if len(imus) != len(self.truth.imus):
+            raise ValueError(f"a board of this model has {len(self.truth.imus)} inertial sensors")
+        if self.armed:
+            return False
+        speedup = self.parameters["SIM_SPEEDUP"]
+        self.truth = replace(self.truth, board=board, imus=imus)
+        self.parameters = self._stored({"SIM_SPEEDUP": speedup, **(parameters or {})})
+        self._cut_power(off)
+        return True
+
+    def _stored(self, parameters: Mapping[str, float]) -> ParameterStore:
+        """What a board has stored: defaults, but for these."""
+        store = ParameterStore(
+            initial_parameters(self.vehicle, self.truth, self._loop_rate), self._changed
+        )
+        store.load(parameters)
+        return store
+
+    def _cut_power(self, seconds: float) -> None:
+        start = self.world.at(self.now).trajectory.end
+        if seconds > 0.0:
+            self._unpowered = (self.clock + seconds, start)
+        else:
+            self._boot(start)
+
+    def _wait_for_power(self, until: float, start: Start, end: float) -> None:
+        """Lets time pass without power until ``until``, or until ``end`` if that is earlier."""
+        self.clock = min(until, end)
+        if self.clock == until:
+            self._boot(start)
 
     # -- parameters ------------------------------------------------------------------------
 

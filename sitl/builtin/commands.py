@@ -158,6 +158,14 @@ def _request_message(autopilot: Autopilot, link: Link, command: Command) -> int:
     return ACCEPTED
 
 
+def _request_capabilities(autopilot: Autopilot, link: Link, command: Command) -> int:
+    """What AUTOPILOT_VERSION was asked for with before there was MAV_CMD_REQUEST_MESSAGE."""
+    if command.p1 != 1.0:
+        return FAILED
+    autopilot.send(link, messages.autopilot_version(autopilot.instant()))
+    return ACCEPTED
+
+
 def _arm_disarm(autopilot: Autopilot, link: Link, command: Command) -> int:
     del link
     force = command.p2 == FORCE
@@ -205,6 +213,7 @@ COMMANDS: dict[int, Callable[[Autopilot, Link, Command], int]] = {
     int(mav.MAV_CMD_SET_MESSAGE_INTERVAL): _set_message_interval,
     int(mav.MAV_CMD_GET_MESSAGE_INTERVAL): _get_message_interval,
     int(mav.MAV_CMD_REQUEST_MESSAGE): _request_message,
+    int(mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES): _request_capabilities,
     int(mav.MAV_CMD_COMPONENT_ARM_DISARM): _arm_disarm,
     int(mav.MAV_CMD_NAV_TAKEOFF): _take_off,
     int(mav.MAV_CMD_NAV_LAND): _land,

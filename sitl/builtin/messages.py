@@ -26,6 +26,7 @@ EARTH_FIELD_MG = (240.0, 30.0, -510.0)
 UNKNOWN_16 = 65535
 AUTOPILOT_CUSTOM = 1
 ARMED = 128
+UID2_BYTES = 18
 
 
 def packed(message: Message, packer: Message) -> bytes:
@@ -298,16 +299,17 @@ def home_position(now: Instant) -> Message:
 
 
 def autopilot_version(now: Instant) -> Message:
-    """AUTOPILOT_VERSION: the features that this simulator has."""
-    del now
+    """AUTOPILOT_VERSION: the features that this simulator has, and which board it is."""
     capabilities = (
         mav.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
         | mav.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
         | mav.MAV_PROTOCOL_CAPABILITY_MAVLINK2
     )
     version = (4 << 24) | (7 << 16)
+    # ArduPilot fills in the long id only.
+    uid2 = list(bytes.fromhex(now.world.truth.board).ljust(UID2_BYTES, b"\0"))
     return mav.MAVLink_autopilot_version_message(
-        capabilities, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 1
+        capabilities, version, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0, uid2
     )
 
 

@@ -9,6 +9,9 @@ import numpy as np
 from sitl.builtin.effects import Effect, Vector3
 from sitl.builtin.trajectory import Environment
 
+BOARD = "2a0045000b51383437363138000000000000"
+"""Unique id of the simulated board, hex: 96 bits as an STM32 has them, in a field of 144."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuTruth:
@@ -83,7 +86,11 @@ class CompassTruth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """Everything that is true; ``attitude_errors=False`` reports the true attitude."""
+    """Everything that is true; ``attitude_errors=False`` reports the true attitude.
+
+    ``board`` is the unique id that AUTOPILOT_VERSION tells, in hex of 18 bytes at most; empty
+    for a board that tells none.
+    """
 
     imus: tuple[ImuTruth, ...] = (ImuTruth(),)
     gps: GpsTruth = field(default_factory=GpsTruth)
@@ -92,6 +99,7 @@ class Truth:
     effects: tuple[Effect, ...] = ()
     attitude_errors: bool = True
     orientation: int = 0
+    board: str = BOARD
     seed: int = 0
 
 
