@@ -97,6 +97,8 @@ class Calibrator:
         self._first = np.inf
         self._ground = Ground()
         self._finished = False
+        self.flown_s = 0.0
+        """Trusted flight that was taken in, s; it only grows."""
         self.ekf_bias: dict[int, EkfBias] = {}
 
     @property
@@ -239,17 +241,24 @@ class Calibrator:
     def from_bytes(cls, data: bytes, settings: EstimatorSettings | None = None) -> Calibrator:
         """A calibrator beside which lies what another one had learned.
 
-        It is taken in when a flight agrees with it (:mod:`onboard.core.agreement`), accelerometer
-        by accelerometer: whether it is of the sensor that is there now, identifiers do not tell,
-        for they are the same on every board of one model.
-
         Raises:
             StateError: damaged, or of another version.
         """
         made = cls(settings)
-        for engine in load(data):
-            made._waiting.setdefault(engine.imu, []).append(engine)
+        made.lay_aside(data)
         return made
+
+    def lay_aside(self, data: bytes) -> None:
+        """Keep what was learned before (:meth:`to_bytes`) until a flight agrees with it.
+
+        Accelerometer by accelerometer (:mod:`onboard.core.agreement`): whether it is of the sensor
+        that is there now, identifiers do not tell, for they are the same on every board of a model.
+
+        Raises:
+            StateError: damaged, or of another version.
+        """
+        for engine in load(data):
+            self._waiting.setdefault(engine.imu, []).append(engine)
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -363,6 +372,9 @@ class Calibrator:
             for chunk in chunks:
                 self._engine_of(imu).add(chunk)
                 newest = max(newest, float(chunk.fixes.t[-1]))
+        self.flown_s += max(
+            (sum(c.trusted_s for c in chunks) for chunks in made.values()), default=0.0
+        )
         return (Advanced(float(newest)),) if np.isfinite(newest) else ()
 
     def _prior(self, imu: int) -> Array:

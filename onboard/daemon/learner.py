@@ -2,42 +2,57 @@
 
 It lives on the worker's thread and is only called there; what it gives back is frozen.  It
 knows no link.  While a push waits for the flight that judges it, a second, fresh estimator
-learns from what is flown between arming and disarming, and from nothing else: standing on
-the ground after a push is no flight.
+learns from what is flown between arming and disarming.
+
+**Gaps.**  While the service is off, or the autopilot reboots or is silent, somebody can change the
+board for another one or calibrate it on a bench.  After each gap :meth:`Learner.identify` is told
+who answers.  The same board (by its own word) with the same values in force goes on as if nothing
+had been; of everything else what was learned is laid aside until a flight agrees with it, and what
+was proposed waits for a flight or a person.
 
 What a flight has taught is diagnosed after the landing (:mod:`onboard.daemon.examiner`).  Where
-physics was missing that moves the numbers, they are forgotten when the next flight begins:
-sums that are known to be wrong must not be added to those of a flight that is right.
+physics was missing that moves the numbers, the sums are forgotten at once: they are known to be
+wrong and must not be added to those of a flight that is right.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 
-import numpy as np
+import msgspec
 
 from onboard import __version__
-from onboard.core.calibrator import Calibrator, FlightEnded, Restarted
-from onboard.core.result import Calibration, Status
+from onboard.core.calibrator import Advanced, Calibrator, FlightEnded, Restarted
+from onboard.core.findings import Verdict
+from onboard.core.parameters import ParametersInForce
+from onboard.core.result import Calibration, Six, Status
 from onboard.core.samples import ParameterValue, Sample, VehicleState
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
 from onboard.daemon.examiner import Examiner
+from onboard.daemon.flight import JudgedFlight, compared_now, decode, encode, in_force
 from onboard.daemon.heap import trim
 from onboard.daemon.snapshot import TrustView
-from onboard.daemon.store import Kept, Store
+from onboard.daemon.store import Store
 from onboard.daemon.view import trust_view
 from onboard.errors import StateError
-from onboard.push.physics import Diagnosed
 
 SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
-SAME = 1e-6
-"""Parameters are float32."""
 KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
 """Beginnings of the names that change what an estimator makes of the messages."""
+IMUS = range(1, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who answers on the link; ``board`` is its unique id in hex, empty if it tells none."""
+
+    system_id: int
+    autopilot: str = "ardupilot"
+    board: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +68,10 @@ class News:
 class Learned:
     """Where the learner stands after a batch.
 
-    ``flown`` is the answer of the flight that has just ended, if a push waits for it;
-    ``diagnosed`` what the diagnosis of the last flight said, ``diagnosing`` those that wait for
-    theirs.
+    ``calibrations`` are of the last flight as it was judged, while flying of what was flown so
+    far; ``flown`` is the answer of the flight that has just ended, if a push waits for it;
+    ``flight`` the last one that was judged, ``diagnosing`` the accelerometers of one that is being
+    judged.
     """
 
     calibrations: dict[int, Calibration]
@@ -63,27 +79,41 @@ class Learned:
     counters: dict[str, int]
     news: tuple[News, ...] = ()
     flown: dict[int, Calibration] = field(default_factory=dict)
-    diagnosed: dict[int, Diagnosed] = field(default_factory=dict)
+    flight: JudgedFlight | None = None
     diagnosing: tuple[int, ...] = ()
 
 
 class Learner:
-    """Feeds the calibrator and keeps its sums on disk, by vehicle; ``clock`` is monotonic, s."""
+    """Feeds the calibrator and keeps its sums on disk, by board.
+
+    Args:
+        store: the disk.
+        settings: of the estimator.
+        clock: monotonic, s.
+        wall_clock: Unix time, s.
+    """
 
     def __init__(
-        self, store: Store, settings: EstimatorSettings, *, clock: Callable[[], float]
+        self,
+        store: Store,
+        settings: EstimatorSettings,
+        *,
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
     ) -> None:
         self._store = store
         self._settings = settings
         self._clock = clock
-        self._system_id: int | None = None
+        self._wall_clock = wall_clock
+        self._identity: Identity | None = None
+        self._before_gap: dict[int, Six | None] = {}
         self._calibrator = Calibrator(settings)
-        self._flight: Calibrator | None = None
+        self._judging: Calibrator | None = None
         self._flown: dict[int, Calibration] = {}
-        self._armed = False
-        self._in_flight: bool | None = None
-        self._examiner = Examiner(clock)
-        self._kept: dict[int, Kept] = {}
+        self._judging_armed = False
+        self._examiner = Examiner(clock, wall_clock)
+        self._flight: JudgedFlight | None = None
+        self._in_air = False
         self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
         self._answers: dict[int, Calibration] = {}
@@ -93,22 +123,77 @@ class Learner:
         self._counters: Counter[str] = Counter()
         self._news: list[News] = []
 
-    def adopt(self, system_id: int, autopilot: str = "ardupilot") -> None:
-        """An autopilot was found: go on from what was saved for this vehicle."""
-        self._system_id = system_id
-        self._examiner.autopilot = autopilot
+    # Who is there
+
+    def identify(self, there: Identity, told: Sequence[ParameterValue] = ()) -> None:
+        """An autopilot is there, for the first time or after a gap.
+
+        Args:
+            there: who it is.
+            told: the parameters that it has told since.
+        """
+        before, self._identity = self._identity, there
+        self._examiner.autopilot, self._examiner.board = there.autopilot, there.board
+        same = before is not None and bool(there.board) and there == before
+        if not same and before is not None:
+            self._parameters.clear()  # of another board, for all that is known
+        for parameter in told:
+            self._parameter(parameter)
+        if same and self._values_in_force() == self._before_gap:
+            return
+        calibrator = Calibrator(self._settings)
+        kept = None
+        if before is not None and not _surely_another(before, there):
+            calibrator.lay_aside(self._calibrator.to_bytes())
+            kept = self._flight
+        if before != there:
+            if before is not None:
+                self._save_quietly(before)
+            loaded = self._load(calibrator)
+            kept = kept or loaded
+        self._begin(calibrator)
+        self._flight = None if kept is None else kept.outdated()
+        if calibrator.waiting:
+            text = "what was learned before is added when a flight agrees with it"
+            self._tell("state_resumed", text)
+
+    def gap(self) -> None:
+        """The autopilot rebooted or was silent: from here on it may be another board."""
+        self._before_gap = self._values_in_force()
+
+    def _values_in_force(self) -> dict[int, Six | None]:
+        values = {p.name: p.value for p in self._parameters.values()}
+        return {imu: in_force(ParametersInForce(values), imu) for imu in IMUS}
+
+    def _load(self, calibrator: Calibrator) -> JudgedFlight | None:
+        """Lay what is on the disk beside this calibrator; the last flight that was judged."""
+        if self._identity is None:
+            return None
         try:
-            saved = self._store.load(system_id)
+            saved = self._store.load(self._identity.system_id, self._identity.board)
             if saved is None:
-                return
-            self._calibrator = Calibrator.from_bytes(saved.sums, self._settings)
-            self._kept = self._store.diagnoses(saved)
+                return None
+            calibrator.lay_aside(saved.sums)
         except StateError as error:
             self._counters["state_refused"] += 1
             self._tell("state_refused", f"starting from nothing: {error}", warning=True)
-            return
+            return None
         self._counters["state_resumed"] += 1
-        self._tell("state_resumed", f"resumed what was learned of system {system_id} before")
+        return decode(saved.flight) if saved.flight else None
+
+    def _begin(self, calibrator: Calibrator) -> None:
+        """Go on with another calibrator; what the messages mean stays known."""
+        self._calibrator = calibrator
+        for parameter in self._parameters.values():
+            calibrator.feed(parameter)
+        self._examiner.begin_anew(calibrator)
+        self._calibrated.clear()
+        self._answers = {}
+        self._judging = None
+        self._in_air = False
+        self._stale = self._urgent = True
+
+    # What comes in
 
     def learn(
         self, samples: Iterable[Sample], *, judging: bool, in_flight: bool = False
@@ -123,42 +208,37 @@ class Learner:
         for sample in samples:
             if type(sample) is ParameterValue:
                 self._parameter(sample)
-            elif type(sample) is VehicleState and sample.armed is not None:
-                self._arming(armed=sample.armed)
             for event in self._calibrator.feed(sample):
                 self._note(event)
             if judging:
                 self._fly(sample)
         if not judging:
-            self._flight = None
-        self._take_back()
+            self._judging = None
+        self._of_these_sensors()
         learned = self._learned()
-        if in_flight and self._in_flight:
-            ready = (i for i, c in self._answers.items() if c.status is Status.CALIBRATED)
-            self._examiner.flying(self._calibrator, ready)
+        if in_flight and self._in_air:
+            ready = (c.status is Status.CALIBRATED for c in self._answers.values())
+            if any(ready):
+                self._examiner.flying(self._calibrator)
         return learned
 
     def examine(self) -> Learned:
         """Diagnose one accelerometer of those that wait for it; takes seconds."""
         trim()  # what the refinement of the flight has left
-        self._examiner.examine_next(self._calibrator)
+        flight = self._examiner.examine_next()
+        if flight is not None:
+            self._judged(flight)
         trim()
         return self._learned()
 
     def reset(self) -> Learned:
         """Forget everything that was learned, on disk too; the parameters in force stay known."""
-        self._calibrator = Calibrator(self._settings)
-        for parameter in self._parameters.values():
-            self._calibrator.feed(parameter)
-        self._calibrated.clear()
-        self._answers = {}
+        self._begin(Calibrator(self._settings))
         self._windows = 0
         self._flight = None
-        self._examiner.took_off()
-        self._kept.clear()
-        self._stale = self._urgent = True
-        if self._system_id is not None:
-            self._store.path(self._system_id).unlink(missing_ok=True)
+        if self._identity is not None:
+            place = self._store.path(self._identity.system_id, self._identity.board)
+            place.unlink(missing_ok=True)
         return self._learned()
 
     def save(self, saved_at: float) -> None:
@@ -167,60 +247,83 @@ class Learner:
         Raises:
             StateError: the disk does not take them.
         """
-        if self._system_id is None:
-            return
+        if self._identity is not None:
+            self._save(self._identity, saved_at)
+            trim()
+
+    def _save(self, whose: Identity, saved_at: float) -> None:
         self._store.save(
-            self._system_id,
+            whose.system_id,
             self._calibrator.to_bytes(),
             version=__version__,
             saved_at=saved_at,
-            diagnosed=[*self._kept.values(), *self._to_keep()],
+            board=whose.board,
+            flight=b"" if self._flight is None else encode(self._flight),
         )
         self._counters["saves"] += 1
-        trim()
 
-    def _to_keep(self) -> Iterable[Kept]:
-        """The diagnoses that a restart must not lose, by the sensors that they are about."""
-        for imu, found in self._examiner.diagnosed.items():
-            device_id = self._calibrator.parameters.device_id(imu)
-            if device_id is not None:
-                yield Kept(device_id, found)
+    def _save_quietly(self, whose: Identity) -> None:
+        """Before another board takes over; a disk that does not take it costs that board's sums."""
+        try:
+            self._save(whose, self._wall_clock())
+        except StateError as error:
+            self._tell("save_failed", str(error), warning=True)
 
-    def _take_back(self) -> None:
-        """The diagnoses of before the restart, once it is known that the sensors are those."""
-        for imu, kept in tuple(self._kept.items()):
-            device_id = self._calibrator.parameters.device_id(imu)
-            if device_id is None or not self._calibrator.parameters.known(imu):
-                continue
-            del self._kept[imu]
-            if device_id == kept.device_id:
-                self._examiner.diagnosed[imu] = replace(kept.diagnosed, resumed=True)
-                self._tell("diagnosis_resumed", f"IMU {imu}: the last flight is diagnosed already")
+    def _judged(self, flight: JudgedFlight) -> None:
+        """Take what the diagnosis said; a flight that says nothing takes nothing away."""
+        silent = all(
+            d.verdict == Verdict.INSUFFICIENT.value
+            and d.calibration.status is not Status.CALIBRATED
+            for d in flight.diagnosed.values()
+        )
+        if silent and self._flight is not None:
+            self._tell(
+                "flight_too_short", "the flight says too little: what was known before stays"
+            )
+            return
+        self._flight = flight
+        for imu, found in flight.diagnosed.items():
+            if found.missing:
+                self._calibrator.begin_anew(imu)
+                self._calibrated.discard(imu)
+                self._stale = self._urgent = True
+                self._tell("begun_anew", f"IMU {imu}: learning anew, physics was missing")
 
-    def _resumed(self) -> dict[int, Calibration]:
-        """Calibrations of before the restart, where nothing has changed since."""
-        found = {}
-        for imu, diagnosed in self._examiner.diagnosed.items():
-            then = diagnosed.calibration
-            now = self._calibrator.parameters.six(imu).as_vector()
-            in_force = np.array(then.in_force_scale + then.in_force_offset)
-            if diagnosed.resumed and np.allclose(now, in_force, rtol=0.0, atol=SAME):
-                found[imu] = then
-        return found
+    def _of_these_sensors(self) -> None:
+        """A flight of before the restart is forgotten where other sensors say who they are."""
+        flight = self._flight
+        if flight is None or flight.current:
+            return
+        parameters = self._calibrator.parameters
+        if all(parameters.device_id(imu) is not None for imu in flight.imus):
+            self._flight = flight.of_these_sensors(parameters)
+
+    # What goes out
 
     def _learned(self) -> Learned:
         self._solve()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
+        trust = trust_view(self._calibrator.trust, windows=self._windows)
         return Learned(
-            calibrations=self._resumed() | self._answers,
-            trust=trust_view(self._calibrator.trust, windows=self._windows),
+            calibrations=self._calibrations(),
+            trust=msgspec.structs.replace(trust, trusted_s=self._calibrator.flown_s),
             counters={**self._counters, **self._examiner.counters},
             news=news,
             flown=flown,
-            diagnosed=dict(self._examiner.diagnosed),
+            flight=self._flight,
             diagnosing=self._examiner.waiting,
         )
+
+    def _calibrations(self) -> dict[int, Calibration]:
+        """In flight the estimator's own answers, on the ground those of the flight as judged."""
+        judged = {}
+        for imu, found in (self._flight.diagnosed if self._flight else {}).items():
+            now = in_force(self._calibrator.parameters, imu)
+            if now is not None:
+                judged[imu] = compared_now(found.calibration, self._answers.get(imu), now)
+        both = judged | self._answers if self._in_air else self._answers | judged
+        return dict(sorted(both.items()))
 
     def _solve(self) -> None:
         """Solve anew if something has come to it, and not too often unless it is urgent."""
@@ -238,35 +341,22 @@ class Learner:
                 self._calibrated.discard(imu)
                 self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
 
-    def _arming(self, *, armed: bool) -> None:
-        """A flight begins: nothing of it is diagnosed, and what was wrong is not carried on."""
-        if armed and not self._in_flight:
-            kept = {imu: one.diagnosed for imu, one in self._kept.items()}
-            for imu, found in (kept | self._examiner.diagnosed).items():
-                if found.missing:
-                    self._calibrator.begin_anew(imu)
-                    self._calibrated.discard(imu)
-                    self._stale = self._urgent = True
-                    text = f"IMU {imu}: learning anew, physics was missing in the flight before"
-                    self._tell("begun_anew", text)
-            self._examiner.took_off()
-            self._kept.clear()
-        self._in_flight = armed
+    # How
 
     def _fly(self, sample: Sample) -> None:
         """Let the judging estimator have what is flown; its answer when the flight ends."""
         if isinstance(sample, VehicleState) and sample.armed is not None:
-            if sample.armed and not self._armed and self._flight is None:
-                self._flight = Calibrator(self._settings)
+            if sample.armed and not self._judging_armed and self._judging is None:
+                self._judging = Calibrator(self._settings)
                 for parameter in self._parameters.values():
-                    self._flight.feed(parameter)
-            ended = self._armed and not sample.armed
-            self._armed = sample.armed
-            if ended and self._flight is not None:
-                self._flight.feed(sample)
-                self._flown = _answers(self._flight)
-        if self._flight is not None and (self._armed or type(sample) is ParameterValue):
-            self._flight.feed(sample)
+                    self._judging.feed(parameter)
+            ended = self._judging_armed and not sample.armed
+            self._judging_armed = sample.armed
+            if ended and self._judging is not None:
+                self._judging.feed(sample)
+                self._flown = _answers(self._judging)
+        if self._judging is not None and (self._judging_armed or type(sample) is ParameterValue):
+            self._judging.feed(sample)
 
     def _note(self, event: object) -> None:
         self._stale = True
@@ -277,16 +367,18 @@ class Learner:
             case WindowClosed(_, reason):
                 why = reason.value.replace("_", " ")
                 self._tell("window_closed", f"GPS is not trusted: {why}")
+            case Advanced():
+                self._in_air = True
+                self._counters["event_Advanced"] += 1
             case _:
-                name = type(event).__name__
-                self._urgent |= isinstance(event, FlightEnded)
                 # A flight that ends with the power of the autopilot has ended, too.
                 if isinstance(event, FlightEnded) or (
-                    isinstance(event, Restarted) and self._in_flight
+                    isinstance(event, Restarted) and self._in_air
                 ):
-                    self._examiner.landed(self._calibrator.imus)
-                    self._in_flight = False
-                self._counters[f"event_{name}"] += 1
+                    self._in_air = False
+                    self._examiner.landed(self._calibrator)
+                self._urgent |= isinstance(event, FlightEnded)
+                self._counters[f"event_{type(event).__name__}"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Keep what a reset must not forget."""
@@ -300,6 +392,13 @@ class Learner:
 
     def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
         self._news.append(News(kind, text, warning))
+
+
+def _surely_another(before: Identity, there: Identity) -> bool:
+    """Whether it is not the one of before by its own word."""
+    if before.system_id != there.system_id:
+        return True
+    return bool(before.board and there.board) and before.board != there.board
 
 
 def _answers(calibrator: Calibrator) -> dict[int, Calibration]:

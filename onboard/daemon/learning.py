@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from onboard.core.samples import ParameterValue, Sample
-from onboard.daemon.learner import Learned, Learner
+from onboard.daemon.learner import Identity, Learned, Learner
 from onboard.daemon.notices import Notices
 from onboard.daemon.worker import Worker
 from onboard.errors import StateError
@@ -39,7 +39,9 @@ class Learning:
         notices: where its news go.
         judging: whether a push waits for the flight that judges it.
         in_flight: whether values may be written in flight.
-        ready: whether the parameters are known that say what the messages mean.
+        identity: who is there, as far as it is known; None while nobody is heard.
+        ready: whether it has said who it is, and the parameters are known that say what its
+            messages mean.
         clock: monotonic time, s.
         wall_clock: Unix time, s.
         save_every_s: how often sums go to disk.
@@ -51,6 +53,7 @@ class Learning:
         notices: Notices,
         *,
         judging: Callable[[], bool],
+        identity: Callable[[], Identity | None],
         in_flight: Callable[[], bool] = lambda: False,
         ready: Callable[[], bool] = lambda: True,
         clock: Callable[[], float],
@@ -64,6 +67,7 @@ class Learning:
         self._notices = notices
         self._judging = judging
         self._in_flight = in_flight
+        self._identity = identity
         self._ready = ready
         self._begun = False
         self._clock = clock
@@ -71,6 +75,7 @@ class Learning:
         self._save_every_s = save_every_s
         self._next_save = 0.0
         self._samples: list[Sample] = []
+        self._before_gap: list[Sample] | None = None
         self._arrived: float | None = None
         self._taken: float | None = None
         self._behind = False
@@ -95,10 +100,25 @@ class Learning:
             del self._samples[:half]
         return samples
 
-    async def run(self, system_id: int, autopilot: str) -> None:
-        """Learn from this vehicle until cancelled."""
+    @property
+    def identified(self) -> bool:
+        """Whether what was learned is of the autopilot that is there now."""
+        return self._begun and self.learned is not None
+
+    def gap(self) -> None:
+        """The autopilot rebooted or is silent: another may answer next, so it is asked who it is.
+
+        What comes from here on waits for that; what came before is learned at once.
+        """
+        self.counters["gaps"] += 1
+        self._before_gap = [*(self._before_gap or ()), *(self._samples if self._begun else ())]
+        if self._begun:
+            self._samples = []
+        self._begun, self._arrived = False, None
+
+    async def run(self) -> None:
+        """Learn until cancelled."""
         self._worker = Worker("learner")
-        await self._call(self._learner.adopt, system_id, autopilot)
         while True:
             await self.step()
             await asyncio.sleep(BATCH_S)
@@ -106,11 +126,12 @@ class Learning:
     async def step(self) -> None:
         """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
         now = self._busy_since = self._clock()
-        samples = self._next_batch(now)
-        learned = await self._call(
-            self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
-        )
-        self._accept(learned)
+        if self._before_gap is not None:
+            await self._close_gap()
+        if not self._begun and not await self._begin(now):
+            self._busy_since = None
+            return
+        learned = await self._learn(self._next_batch())
         self._taken = None
         if learned.diagnosing and not self._closing:
             self._busy_since = self._clock()
@@ -121,15 +142,36 @@ class Learning:
             await self.save()
         self._busy_since = None
 
-    def _next_batch(self, now: float) -> list[Sample]:
-        """What has come; at first nothing until it is known what it means, that before all else."""
-        if not self._begun:
-            waited = 0.0 if self._arrived is None else now - self._arrived
-            self._begun = self._ready() or waited > PARAMETERS_S or self._closing
-            if not self._begun:
-                return []
-            # A stable order: the latest report of a parameter still comes last.
-            self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
+    async def _close_gap(self) -> None:
+        """Learn what came before the gap, and note what was in force then."""
+        before, self._before_gap = self._before_gap, None
+        if before:
+            await self._learn(before)
+        await self._call(self._learner.gap)
+
+    async def _begin(self, now: float) -> bool:
+        """Whether it is known who is there and what the messages mean, or is waited for in vain."""
+        waited = 0.0 if self._arrived is None else now - self._arrived
+        identity = self._identity()
+        ready = self._ready() or waited > PARAMETERS_S or self._closing
+        if identity is None or not ready:
+            return False
+        # The parameters before all else; a stable order: the latest report still comes last.
+        self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
+        told = [s for s in self._samples if type(s) is ParameterValue]
+        gaps = self.counters["gaps"]
+        await self._call(self._learner.identify, identity, told)
+        self._begun = gaps == self.counters["gaps"]  # no other one while that was done
+        return self._begun
+
+    async def _learn(self, samples: list[Sample]) -> Learned:
+        learned = await self._call(
+            self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+        )
+        self._accept(learned)
+        return learned
+
+    def _next_batch(self) -> list[Sample]:
         samples, self._samples = self._samples, []
         self._taken, self._arrived = self._arrived, None
         return samples

@@ -4,20 +4,26 @@ The policy's reasons come from :mod:`onboard.push.policy`; added here are those 
 (:mod:`onboard.push.physics`), of people (approval, refusal), of past failures, and of what kind
 of autopilot it is.
 
-What is proposed is what was diagnosed: the calibration of that moment, not what standing on the
-ground has made of it since.  Where physics was missing, or nobody could look for it, a person
-may have it written all the same, but has to say so: naming the accelerometer and with
+What is proposed is what was diagnosed.  Where physics was missing, or nobody could look for it, a
+person may have it written all the same, but has to say so: naming the accelerometer and with
 ``despite_diagnosis``.  That holds for this diagnosis only.
+
+What was learned belongs to a board and to the values in force (:mod:`onboard.daemon.flight`).  A
+proposal that no flight since the start has confirmed, or whose values somebody has changed since,
+is *unconfirmed*: it waits for the next flight, or for a person who has read why it waits.  An
+approval is for the values that were shown, old and new: those are written, or none.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from onboard.core.accelerometer import SixParameters
-from onboard.core.result import Calibration, Status
+from onboard.core.result import Status
+from onboard.daemon.flight import JudgedFlight
+from onboard.daemon.learner import Learned
 from onboard.daemon.snapshot import ChangeView, ProposalView
 from onboard.errors import PushError, RefusedError
 from onboard.push.physics import Diagnosed
@@ -28,7 +34,7 @@ WAIT_AFTER_FAILURE_S = (30.0, 60.0, 120.0, 300.0)
 """Between a transaction that did not complete and the next for that accelerometer."""
 MOVED_SIGMAS = 2.0
 """An approval is of the values shown: it lapses when an estimate moves by more than this."""
-PEOPLE = frozenset({"approval", "refused"})
+PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
 """Reasons that a person lifts."""
 DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
 """Reasons that a person lifts by saying so explicitly."""
@@ -42,7 +48,8 @@ NOT_DIAGNOSED = object()
 class Standing:
     """Where one accelerometer stands with people and with past failures.
 
-    ``despite`` is the diagnosis in spite of which it was approved.
+    ``despite`` is the diagnosis in spite of which it was approved; ``written`` the six as they
+    were after the last transaction, by our own doing.
     """
 
     approved: PushPlan | None = None
@@ -50,6 +57,7 @@ class Standing:
     refused: str = ""
     failures: int = 0
     not_before: float = 0.0
+    written: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,25 +83,21 @@ class Proposals:
         self._standing: dict[int, Standing] = {}
         self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
         """Called when a refusal begins, or ends (then with nothing to say)."""
-        self._diagnosed: Mapping[int, Diagnosed] = {}
+        self._flight: JudgedFlight | None = None
 
     def update(
         self,
         now: float,
         *,
         system_id: int,
-        calibrations: Mapping[int, Calibration],
+        learned: Learned,
         parameters: Mapping[str, float],
         condition: VehicleCondition,
-        diagnosed: Mapping[int, Diagnosed],
-        diagnosing: Sequence[int] = (),
+        board: str = "",
     ) -> None:
-        """Make them anew from the estimates and the autopilot's values of this moment."""
-        self._diagnosed = diagnosed
-        calibrations = {
-            imu: _as_now(diagnosed[imu].calibration, live) if imu in diagnosed else live
-            for imu, live in calibrations.items()
-        }
+        """Make them anew from what was learned and the autopilot's values of this moment."""
+        self._flight = learned.flight
+        calibrations = learned.calibrations
         plans: dict[int, PushPlan] = {}
         for imu, calibration in calibrations.items():
             try:
@@ -101,6 +105,7 @@ class Proposals:
                     calibration,
                     parameters,
                     system_id=system_id,
+                    board=board,
                     scale_bounds=(self.settings.scale_min, self.settings.scale_max),
                     offset_bound=self.settings.offset_max,
                 )
@@ -126,10 +131,10 @@ class Proposals:
                 plan, calibrations[imu], condition, self.settings, values=parameters, others=others
             )
             held_back = self._beyond_policy(imu, plan, now)
-            held_back |= self._physics(imu, diagnosing=imu in diagnosing)
+            held_back |= self._physics(imu, diagnosing=bool(learned.diagnosing))
             for refusal in refusals:  # several of one name (six sigmas): the first says enough
                 held_back.setdefault(refusal.objection.value, refusal.sentence)
-            self.current[imu] = Proposal(plan, held_back)
+            self.current[imu] = Proposal(self.standing(imu).approved or plan, held_back)
 
     def ready(self) -> PushPlan | None:
         """The first plan that nothing holds back."""
@@ -165,9 +170,10 @@ class Proposals:
                     )
             raise RefusedError("nothing waits for approval")
         for imu in waiting:
-            despite = self._diagnosed.get(imu, NOT_DIAGNOSED) if against[imu] else None
+            despite = (self._diagnosed(imu) or NOT_DIAGNOSED) if against[imu] else None
             self._lift(imu)
-            self._standing[imu] = Standing(approved=self.current[imu].plan, despite=despite)
+            written = self.standing(imu).written
+            self._standing[imu] = Standing(self.current[imu].plan, despite, written=written)
         self.counters["approvals"] += len(waiting)
         return f"{named(waiting)} approved: written as soon as policy and flight state allow"
 
@@ -198,15 +204,21 @@ class Proposals:
         for imu, why in refusals.items():
             self.standing(imu).refused = why
 
-    def succeeded(self, imu: int) -> None:
-        """A transaction completed: its approval is used up."""
+    def succeeded(self, imu: int, values: Sequence[float]) -> None:
+        """A transaction completed: its approval is used up; ``values`` are the six now."""
         standing = self.standing(imu)
         standing.approved = None
         standing.failures = 0
+        standing.written = tuple(values)
 
-    def failed(self, imu: int, now: float) -> None:
-        """A transaction did not complete: wait, the longer the oftener."""
+    def failed(self, imu: int, now: float, *, changed_by_other: bool = False) -> None:
+        """A transaction did not complete: wait, the longer the oftener.
+
+        An approval outlives that, unless somebody else has changed what it was given for.
+        """
         standing = self.standing(imu)
+        if changed_by_other:
+            standing.approved = standing.despite = None
         wait = WAIT_AFTER_FAILURE_S[min(standing.failures, len(WAIT_AFTER_FAILURE_S) - 1)]
         standing.failures += 1
         standing.not_before = now + wait
@@ -248,9 +260,9 @@ class Proposals:
 
     def _physics(self, imu: int, *, diagnosing: bool) -> dict[str, str]:
         """What the diagnosis says against it, unless a person has approved in spite of it."""
-        found = self._diagnosed.get(imu)
-        if found is None and diagnosing:
+        if diagnosing:  # none before all of them are
             return {"diagnosing": "the flight is being diagnosed"}
+        found = self._diagnosed(imu)
         standing = self.standing(imu)
         if standing.approved is not None and standing.despite is (found or NOT_DIAGNOSED):
             return {}
@@ -260,6 +272,29 @@ class Proposals:
             return {}
         offered = "; these values have it modelled" if found.modelled else ""
         return {"physics_missing": f"physics missing: {found.missing}{offered}"}
+
+    def _diagnosed(self, imu: int) -> Diagnosed | None:
+        return None if self._flight is None else self._flight.diagnosed.get(imu)
+
+    def _unconfirmed(self, imu: int, plan: PushPlan) -> str:
+        """Why it takes another flight, or a person, to believe that this is of what is there."""
+        flight = self._flight
+        if flight is None or imu not in flight.imus:
+            return ""  # not diagnosed: that is said
+        if not flight.current:
+            return (
+                "it was learned before the service or the autopilot last started, and no flight "
+                "has confirmed it since"
+            )
+        then, now = flight.imus[imu].in_force, tuple(c.before for c in plan.changes)
+        if now in (then, self.standing(imu).written):
+            return ""
+        changed = [
+            f"{c.name} from {old:.6g} to {c.before:.6g}"
+            for c, old in zip(plan.changes, then, strict=True)
+            if c.before != old
+        ]
+        return f"somebody has changed {', '.join(changed)} since the flight"
 
     def _beyond_policy(self, imu: int, plan: PushPlan, now: float) -> dict[str, str]:
         standing = self.standing(imu)
@@ -273,9 +308,12 @@ class Proposals:
         if now < standing.not_before:
             wait = standing.not_before - now
             found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
-        if standing.approved is not None and _moved(standing.approved, plan):
+        if standing.approved is not None and _lapsed(standing.approved, plan):
             standing.approved = standing.despite = None
             self.counters["approvals_lapsed"] += 1
+        unconfirmed = self._unconfirmed(imu, plan)
+        if unconfirmed and standing.approved is None:
+            found["unconfirmed"] = f"{unconfirmed}: fly, or `onboard approve {imu}`"
         if self.approval and standing.approved is None:
             found["approval"] = "a person has to approve"
         return found
@@ -286,27 +324,13 @@ def named(imus: Sequence[int]) -> str:
     return ", ".join(f"IMU {imu}" for imu in imus)
 
 
-def _as_now(diagnosed: Calibration, live: Calibration) -> Calibration:
-    """The calibration that was diagnosed, compared with the parameters in force now."""
-    if (diagnosed.in_force_scale, diagnosed.in_force_offset) == (
-        live.in_force_scale,
-        live.in_force_offset,
-    ):
-        return diagnosed
-    return replace(
-        diagnosed,
-        in_force_scale=live.in_force_scale,
-        in_force_offset=live.in_force_offset,
-        parameters_known=live.parameters_known,
-        whitened_rms_before=live.whitened_rms_before,
-        held_out_before=live.held_out_before,
-        velocity_rms_before=live.velocity_rms_before,
-    )
-
-
-def _moved(approved: PushPlan, plan: PushPlan) -> bool:
+def _lapsed(approved: PushPlan, plan: PushPlan) -> bool:
+    """Whether what was approved is no longer what is there, or what is known."""
     return any(
-        abs(now.wanted - then.wanted) > MOVED_SIGMAS * max(now.sigma, then.sigma)
+        now.before != then.before
+        or (
+            abs(now.wanted - then.wanted) > MOVED_SIGMAS * max(now.sigma, then.sigma)
+            and not (then.kept and now.kept)
+        )
         for then, now in zip(approved.changes, plan.changes, strict=True)
-        if not (then.kept and now.kept)
     )

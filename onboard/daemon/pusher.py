@@ -16,7 +16,10 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
-from onboard.core.result import Calibration
+import msgspec
+
+from onboard.daemon.flight import JudgedFlight
+from onboard.daemon.learner import Learned
 from onboard.daemon.notices import Notices
 from onboard.daemon.proposals import Proposals, named
 from onboard.daemon.snapshot import PushView
@@ -33,12 +36,12 @@ from onboard.push.entries import (
     Recovery,
     Refused,
     Result,
+    Support,
     Verdict,
     Watched,
     audit,
 )
 from onboard.push.journal import Journal
-from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan
 from onboard.push.policy import Mode, VehicleCondition, ekf_healthy, moment
 from onboard.push.signals import (
@@ -88,6 +91,8 @@ class Pusher:
         self._wall_clock = wall_clock
         self._codec = mavlink.MAVLink(None)
         self._target: tuple[int, int] | None = None
+        self._board = ""
+        self._flight: JudgedFlight | None = None
         self._transaction: PushTransaction | None = None
         self._in_flight_since: float | None = None
         self._report = VehicleReport()
@@ -157,19 +162,27 @@ class Pusher:
         self,
         now: float,
         *,
-        calibrations: Mapping[int, Calibration],
+        learned: Learned,
         parameters: Mapping[str, float],
         condition: VehicleCondition,
-        diagnosed: Mapping[int, Diagnosed],
-        diagnosing: Sequence[int] = (),
+        board: str = "",
         confirmed: Collection[str] | None = None,
     ) -> None:
         """Propose anew; start what nothing holds back: unfinished business first.
 
-        ``confirmed`` are names whose values were read since the autopilot was (again) there;
-        None: all.
+        Args:
+            now: monotonic, s.
+            learned: of the autopilot that is there.
+            parameters: its values by name.
+            condition: the vehicle now.
+            board: its unique id, empty if it tells none.
+            confirmed: names whose values were read since it was (again) there; None: all.
         """
         self._condition = condition
+        self._flight = learned.flight
+        if board != self._board:
+            self._board = board
+            self._read_journal()
         report = VehicleReport(
             condition.armed,
             None if condition.ekf_flags is None else ekf_healthy(condition.ekf_flags),
@@ -183,11 +196,10 @@ class Pusher:
         proposals.update(
             now,
             system_id=self._target[0],
-            calibrations=calibrations,
+            learned=learned,
             parameters=parameters,
             condition=condition,
-            diagnosed=diagnosed,
-            diagnosing=diagnosing,
+            board=board,
         )
         if self._transaction is not None or self._closing or proposals.forbidden:
             return
@@ -229,7 +241,7 @@ class Pusher:
         Raises:
             RefusedError: there is no push in force, or now is not the moment.
         """
-        in_force = {i: p for i in range(1, 6) if (p := self._journal.last_completed(i))}
+        in_force = {i: p for i in range(1, 6) if (p := self._last_completed(i))}
         chosen = [imu for imu in imus or in_force if imu in in_force]
         if not chosen:
             raise RefusedError("no push is in force that could be rolled back")
@@ -261,7 +273,7 @@ class Pusher:
             active_imu=None if self._transaction is None else self._transaction.plan.imu,
             proposals=proposals.view(),
             last_outcome=None if self.last_outcome is None else _told(self.last_outcome),
-            can_roll_back=tuple(i for i in range(1, 6) if self._journal.last_completed(i)),
+            can_roll_back=tuple(i for i in range(1, 6) if self._last_completed(i)),
             judged=tuple(self._witness.judged.values()),
         )
 
@@ -279,7 +291,7 @@ class Pusher:
         verdicts = {e.transaction: e for _, e in self._journal.entries if isinstance(e, Watched)}
         self._condemned.clear()
         for imu in range(1, 6):
-            planned = self._journal.last_completed(imu)
+            planned = self._last_completed(imu)
             if planned is None:
                 self._witness.drop(imu)
                 continue
@@ -292,11 +304,19 @@ class Pusher:
                 self._condemned[imu] = planned
                 self._proposals.refuse(imu, f"after the last push {verdict.sentence}")
 
+    def _last_completed(self, imu: int) -> Planned | None:
+        """The push that is in force on the board that is there, as far as it tells which it is."""
+        planned = self._journal.last_completed(imu)
+        if planned is None or self._target is None:
+            return planned
+        here = planned.plan.vehicle.same_airframe(self._target[0], self._board)
+        return planned if here else None
+
     def _audit(self, values: Mapping[str, float], confirmed: Collection[str]) -> None:
         """Whether what was pushed is still there, now that the autopilot has (perhaps) rebooted."""
         self._to_audit = False
         for imu in range(1, 6):
-            planned = self._journal.last_completed(imu)
+            planned = self._last_completed(imu)
             if planned is None or not planned.plan.wanted.keys() <= set(confirmed):
                 continue
             self.counters["audits"] += 1
@@ -333,9 +353,11 @@ class Pusher:
                 plan,
                 identifier=uuid.uuid4().hex,
                 system_id=self._target[0],
+                board=self._board,
                 allow_armed=in_flight,
                 purpose=purpose,
                 settings=PATIENCE,
+                support=self._support(plan.imu) if purpose is Purpose.PUSH else None,
             ),
             now,
         )
@@ -348,8 +370,18 @@ class Pusher:
         self._notices.post("push_resumed", text, warning=True)
         self._in_flight_since = None
         self._run(
-            PushTransaction.resume(recovery, system_id=self._target[0], settings=PATIENCE), now
+            PushTransaction.resume(
+                recovery, system_id=self._target[0], board=self._board, settings=PATIENCE
+            ),
+            now,
         )
+
+    def _support(self, imu: int) -> Support | None:
+        """What the push that begins rests on."""
+        if self._flight is None:
+            return None
+        approved = self._proposals.standing(imu).approved is not None
+        return msgspec.structs.replace(self._flight.support, approved=approved)
 
     def _run(self, transaction: PushTransaction, now: float) -> None:
         self._transaction = transaction
@@ -400,9 +432,10 @@ class Pusher:
         )
         imu = outcome.plan.imu
         if outcome.result is Result.COMPLETED:
-            self._proposals.succeeded(imu)
+            self._proposals.succeeded(imu, [outcome.values[n] for n in outcome.plan.names])
         else:
-            self._proposals.failed(imu, now)
+            changed = outcome.reason is Reason.CHANGED_BY_OTHER
+            self._proposals.failed(imu, now, changed_by_other=changed)
         if outcome.open:  # once more after a pause; of another vehicle when one turns up anew
             other = outcome.result is Result.OTHER_VEHICLE
             pause_ends = self._proposals.standing(imu).not_before

@@ -23,7 +23,7 @@ from onboard.daemon.configuration import Configuration, read_secret
 from onboard.daemon.diagnoses import Diagnoses
 from onboard.daemon.door import Door
 from onboard.daemon.interrupts import stop_signals
-from onboard.daemon.learner import Learned, Learner
+from onboard.daemon.learner import Identity, Learned, Learner
 from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
 from onboard.daemon.notify import Notifier
@@ -42,9 +42,11 @@ from onboard.mavlink.autopilot import (
     AutopilotRebooted,
     AutopilotReturned,
     AutopilotSilent,
+    AutopilotState,
     ConnectionChanged,
     LinkEvent,
 )
+from onboard.mavlink.board import Board
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.link import Link
@@ -108,12 +110,16 @@ class Service:
         self._witness = Witness()
         self.learning = Learning(
             Learner(
-                Store(directory), settings.estimator_settings(configuration.estimator), clock=clock
+                Store(directory),
+                settings.estimator_settings(configuration.estimator),
+                clock=clock,
+                wall_clock=wall_clock,
             ),
             self.notices,
+            identity=self._identity,
             judging=lambda: self._witness.waiting,
             in_flight=lambda: self._proposals.settings.mode is Mode.IN_FLIGHT,
-            ready=lambda: self._parameters.complete or not self._parameters.enabled,
+            ready=self._is_introduced,
             clock=clock,
             wall_clock=wall_clock,
             save_every_s=configuration.estimator.save_every_s,
@@ -128,6 +134,7 @@ class Service:
         )
         self._diagnoses = Diagnoses(self._pusher.append, self.notices)
         self._parameters = ParameterWatch()
+        self._board = Board()
         self._streams = Streams(settings.stream_requests(link.rates))
         self._timesync = TimeSync()
         self._outlets = Outlets(configuration, self, self.notices, clock=clock)
@@ -195,7 +202,13 @@ class Service:
     async def _startup(self, group: asyncio.TaskGroup) -> None:
         self.link.subscribe_events(self.on_link_event)
         self.link.subscribe(self.on_message, Decoder.names)
-        for participant in (self._streams, self._timesync, self._parameters, self._pusher):
+        for participant in (
+            self._streams,
+            self._timesync,
+            self._board,
+            self._parameters,
+            self._pusher,
+        ):
             self.link.attach(participant)
         self._outlets.join(self.link.attach)
         if self.configuration.http.enabled:
@@ -226,14 +239,16 @@ class Service:
         self._pusher.judge(self._witness.report(condition, now))
         self.learning.tell_of_lag(now)
         learned = self.learning.learned
-        if learned is not None and (self._parameters.complete or self._pusher.busy):
+        # What was learned must be of the board that is there, unless a push is under way, which
+        # looks after itself.
+        known = self._parameters.complete and self.learning.identified
+        if learned is not None and (known or self._pusher.busy):
             self._pusher.consider(
                 now,
-                calibrations=learned.calibrations,
+                learned=learned,
                 parameters=self._parameters.values,
+                board=self._board.uid,
                 condition=condition,
-                diagnosed=learned.diagnosed,
-                diagnosing=learned.diagnosing,
                 confirmed=self._parameters.confirmed,
             )
         if self.server is not None:
@@ -245,7 +260,8 @@ class Service:
     def _on_learned(self, learned: Learned) -> None:
         if learned.flown:
             self._pusher.judge(self._witness.landed(learned.flown))
-        self._diagnoses.take(learned.diagnosed)
+        if learned.flight is not None:
+            self._diagnoses.take(learned.flight.diagnosed)
 
     async def _shutdown(self) -> None:
         """Stage by stage, each bounded: people, the push, the link, the sums."""
@@ -278,8 +294,20 @@ class Service:
         self.learning.let_go()
 
     async def _learn(self) -> None:
-        autopilot = await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
-        await self.learning.run(autopilot.system, autopilot.firmware_name)
+        await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
+        await self.learning.run()
+
+    def _identity(self) -> Identity | None:
+        """Who is there now, None while nobody is heard."""
+        autopilot = self.link.autopilot
+        if autopilot is None or self.link.state is not AutopilotState.PRESENT:
+            return None
+        return Identity(autopilot.system, autopilot.firmware_name, self._board.uid)
+
+    def _is_introduced(self) -> bool:
+        """Whether it has said which board it is and what its messages mean."""
+        told = self._parameters.complete or not self._parameters.enabled
+        return told and self._board.answered
 
     # What comes in
 
@@ -308,12 +336,15 @@ class Service:
             case AutopilotSilent(silence):
                 self.counters["autopilot_silent"] += 1
                 self._observed.forget()
+                self.learning.gap()
                 post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
             case AutopilotReturned():
+                self.learning.gap()
                 post("autopilot_returned", "heartbeats are back")
             case AutopilotRebooted():
                 self.counters["autopilot_rebooted"] += 1
                 self._observed.forget()
+                self.learning.gap()
                 post("autopilot_rebooted", "the autopilot rebooted", warning=True)
             case ConnectionChanged(endpoint, state, reason):
                 logger.info("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")

@@ -1,30 +1,29 @@
 """The sums on disk: what the daemon has learned of each vehicle, across restarts.
 
-With them goes what the diagnosis of the last flight said: without it nothing may be written, and
-the flight itself is not kept.
+With them goes what was found of the last flight: the flight itself is not kept.
 
-One file per vehicle (system id), replaced whole: temporary file, fsync, rename, fsync of the
-directory.  A file that is damaged or of another version is set aside with the reason, never half
-used.  Whether sums are of the sensor that is there now, the estimator itself looks after.
+One file per board of a vehicle (system id and the unique id that the board tells, if it does),
+replaced whole: temporary file, fsync, rename, fsync of the directory.  A file that is damaged or of
+another version is set aside with the reason, never half used.  Whether sums are of the sensors that
+are there now, a flight has to confirm (:mod:`onboard.core.agreement`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
 from pathlib import Path
 from zlib import crc32
 
 import msgspec
 
 from onboard.errors import StateError
-from onboard.push.physics import Diagnosed
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 class Saved(msgspec.Struct, frozen=True, kw_only=True):
-    """The sums of one vehicle; ``saved_at`` is Unix time, ``diagnosed`` encoded, or empty."""
+    """The sums of one board; ``saved_at`` is Unix time, ``flight`` the last one, or empty."""
 
     schema: int = SCHEMA
     version: str
@@ -32,14 +31,8 @@ class Saved(msgspec.Struct, frozen=True, kw_only=True):
     saved_at: float
     sums: bytes
     check: int
-    diagnosed: bytes = b""
-
-
-class Kept(msgspec.Struct, frozen=True):
-    """A diagnosis, and the INS_ACCn_ID of the accelerometer that it is about."""
-
-    device_id: float
-    diagnosed: Diagnosed
+    board: str = ""
+    flight: bytes = b""
 
 
 class Store:
@@ -56,28 +49,32 @@ class Store:
         except OSError as error:
             raise StateError(f"{directory}: {error.strerror}") from None
 
-    def path(self, system_id: int) -> Path:
-        """File of one vehicle."""
-        return self.directory / f"sums-{system_id}.bin"
+    def path(self, system_id: int, board: str = "") -> Path:
+        """File of one board; ``board`` is its unique id in hex, empty if it tells none."""
+        if not re.fullmatch("[0-9a-f]*", board):
+            raise ValueError(f"{board!r} is no board's id")
+        return self.directory / f"sums-{system_id}{f'-{board}' if board else ''}.bin"
 
-    def load(self, system_id: int) -> Saved | None:
-        """What was saved for this vehicle, None if nothing was.
+    def load(self, system_id: int, board: str = "") -> Saved | None:
+        """What was saved for this board, None if nothing was.
 
         Raises:
             StateError: there is a file, but it cannot be used; it has been set aside.
         """
-        path = self.path(system_id)
+        path = self.path(system_id, board)
         try:
             saved = msgspec.msgpack.decode(path.read_bytes(), type=Saved)
         except FileNotFoundError:
             return None
         except OSError as error:
             raise StateError(f"{path}: {error.strerror}") from None
-        except msgspec.DecodeError:
-            raise StateError(f"{path}: damaged, set aside as {self.set_aside(system_id)}") from None
-        if saved.schema != SCHEMA or crc32(saved.sums + saved.diagnosed) != saved.check:
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise StateError(
+                f"{path}: damaged, set aside as {self.set_aside(system_id, board)}"
+            ) from None
+        if saved.schema != SCHEMA or crc32(saved.sums + saved.flight) != saved.check:
             why = "damaged" if saved.schema == SCHEMA else f"of version {saved.schema}"
-            raise StateError(f"{path}: {why}, set aside as {self.set_aside(system_id)}")
+            raise StateError(f"{path}: {why}, set aside as {self.set_aside(system_id, board)}")
         return saved
 
     def save(
@@ -87,22 +84,23 @@ class Store:
         *,
         version: str,
         saved_at: float,
-        diagnosed: Sequence[Kept] = (),
+        board: str = "",
+        flight: bytes = b"",
     ) -> None:
         """Replace the file; it is on the disk when this returns.
 
         Raises:
             StateError: it could not be written; the file before is untouched.
         """
-        path = self.path(system_id)
-        found = msgspec.msgpack.encode(diagnosed) if diagnosed else b""
+        path = self.path(system_id, board)
         saved = Saved(
             version=version,
             system_id=system_id,
+            board=board,
             saved_at=saved_at,
             sums=sums,
-            check=crc32(sums + found),
-            diagnosed=found,
+            check=crc32(sums + flight),
+            flight=flight,
         )
         temporary = path.with_suffix(".new")
         try:
@@ -119,20 +117,9 @@ class Store:
         except OSError as error:
             raise StateError(f"{path}: {error.strerror}") from None
 
-    @staticmethod
-    def diagnoses(saved: Saved) -> dict[int, Kept]:
-        """What was diagnosed, by accelerometer; nothing if another version wrote it differently."""
-        if not saved.diagnosed:
-            return {}
-        try:
-            kept = msgspec.msgpack.decode(saved.diagnosed, type=list[Kept])
-        except msgspec.DecodeError:
-            return {}
-        return {one.diagnosed.imu: one for one in kept}
-
-    def set_aside(self, system_id: int) -> str:
+    def set_aside(self, system_id: int, board: str = "") -> str:
         """Rename the file so that it is not read again but can be looked at; its new name."""
-        path = self.path(system_id)
+        path = self.path(system_id, board)
         aside = path.with_suffix(".refused")
         try:
             path.replace(aside)

@@ -11,7 +11,16 @@ from types import MappingProxyType
 
 from onboard.errors import PushError
 from onboard.mavlink.parameters import ClientSettings, ParameterClient, ParameterOutput
-from onboard.push.entries import Closed, Entry, Planned, Purpose, Result, Undoing, Writing
+from onboard.push.entries import (
+    Closed,
+    Entry,
+    Planned,
+    Purpose,
+    Result,
+    Support,
+    Undoing,
+    Writing,
+)
 from onboard.push.plan import PushPlan
 from onboard.push.signals import Finished, Outcome, Reason, Record, TransactionOutput
 from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
@@ -35,14 +44,21 @@ class Course:
         identifier: names the transaction in the journal.
         purpose: what the plan is for.
         settings: patience.
+        support: what a push rests on.
     """
 
     def __init__(
-        self, plan: PushPlan, identifier: str, purpose: Purpose, settings: TransactionSettings
+        self,
+        plan: PushPlan,
+        identifier: str,
+        purpose: Purpose,
+        settings: TransactionSettings,
+        support: Support | None = None,
     ) -> None:
         self._plan = plan
         self._identifier = identifier
         self._purpose = purpose
+        self._support = support
         self._settings = settings
         self._client = ParameterClient(self._settings.client)
         self._turned = False
@@ -80,7 +96,7 @@ class Course:
             case State.COMPARING | State.VERIFYING | State.UNDO_VERIFYING:
                 self._read_six(now)
             case State.RECORDING:
-                self._record(Planned(self._identifier, self._plan, self._purpose))
+                self._record(Planned(self._identifier, self._plan, self._purpose, self._support))
             case State.WRITING:
                 self._queue = list(self._plan.write_order(self._values))
                 self._write_next(now)

@@ -47,12 +47,31 @@ class Verdict(Enum):
     SUPERSEDED = "superseded"
 
 
+class Support(Struct, frozen=True):
+    """What a push rests on: the flight, and whether a person approved.
+
+    ``flight`` is its unique id, ``landed_at`` Unix time (of a push in flight: of its diagnosis),
+    ``board`` the autopilot's unique id in hex, empty if it tells none, ``trusted_s`` the flight
+    with trusted GPS.
+    """
+
+    flight: str
+    landed_at: float
+    board: str
+    trusted_s: float
+    approved: bool = False
+
+
 class Planned(Struct, frozen=True, tag="planned"):
-    """A transaction begins; holds everything needed to undo it.  Durable before any write."""
+    """A transaction begins; holds everything needed to undo it.  Durable before any write.
+
+    ``support`` is None for the way back.
+    """
 
     transaction: str
     plan: PushPlan
     purpose: Purpose = Purpose.PUSH
+    support: Support | None = None
 
 
 class Writing(Struct, frozen=True, tag="writing"):

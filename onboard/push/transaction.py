@@ -70,6 +70,7 @@ from onboard.push.entries import (
     ReadBack,
     Recovery,
     Result,
+    Support,
 )
 from onboard.push.plan import PushPlan
 from onboard.push.reading import Reading
@@ -101,6 +102,7 @@ class PushTransaction(Course):
         allow_armed: bool = False,
         purpose: Purpose = Purpose.PUSH,
         settings: TransactionSettings | None = None,
+        support: Support | None = None,
     ) -> None:
         """A new push.
 
@@ -112,8 +114,9 @@ class PushTransaction(Course):
             allow_armed: an in-flight push; then the EKF is watched instead of arming.
             purpose: what the plan is for; a roll-back is the plan ``reversed()``.
             settings: patience.
+            support: the flight that it rests on, for the journal.
         """
-        super().__init__(plan, identifier, purpose, settings or TransactionSettings())
+        super().__init__(plan, identifier, purpose, settings or TransactionSettings(), support)
         self._right_link = plan.vehicle.same_airframe(system_id, board)
         self._allow_armed = allow_armed
         self._recovery: Recovery | None = None

@@ -21,11 +21,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.result import Calibration
 from onboard.push.entries import Planned, Verdict, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.signals import VehicleReport
+
+Array = NDArray[np.float64]
 
 SAME = 1e-6
 
@@ -83,14 +86,15 @@ class PushWatch:
         if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > SAME:
             return self._say(Verdict.SUPERSEDED, "somebody has changed the parameters since")
         worse = self._residual_worse(flown)
-        preference = _preference(plan, flown)
+        old, new = plan.six_before().as_vector(), plan.six_wanted().as_vector()
+        preferred = preference(old, new, flown)
         clear = self._settings.evidence
-        if preference is not None and preference < -clear:
-            sentence = f"the old values fit this flight better (by {-preference:.3g} in J)"
+        if preferred is not None and preferred < -clear:
+            sentence = f"the old values fit this flight better (by {-preferred:.3g} in J)"
             return self._say(Verdict.WORSE, sentence)
-        if worse is None and preference is None:
+        if worse is None and preferred is None:
             return None
-        if worse and (preference is None or preference < clear):
+        if worse and (preferred is None or preferred < clear):
             return self._say(Verdict.WORSE, worse)
         if worse:
             sentence = f"{worse}, but the old values would have done worse still on this flight"
@@ -118,8 +122,14 @@ class PushWatch:
         return Watched(self._pushed.transaction, verdict, sentence)
 
 
-def _preference(plan: PushPlan, flown: Calibration) -> float | None:
-    """J(old) - J(pushed) on the new flight: positive speaks for the push.  None: unknown."""
+def preference(old: Array, new: Array, flown: Calibration) -> float | None:
+    """``J(old) - J(new)`` on a flight, twice a difference of log-likelihoods; None: unknown.
+
+    Args:
+        old: (6,) scale and offset.
+        new: (6,) others; positive speaks for them.
+        flown: what the flight says by itself.
+    """
     P = np.array(flown.covariance, dtype=np.float64)
     x = np.array(flown.scale + flown.offset)
     if P.shape != (6, 6) or not np.all(np.isfinite(P)) or not np.all(np.isfinite(x)):
@@ -128,6 +138,7 @@ def _preference(plan: PushPlan, flown: Calibration) -> float | None:
     correlation = P / np.outer(unit, unit)
     if np.linalg.eigvalsh(correlation)[0] <= 0.0:
         return None
-    old = (plan.six_before().as_vector() - x) / unit
-    new = (plan.six_wanted().as_vector() - x) / unit
-    return float(old @ np.linalg.solve(correlation, old) - new @ np.linalg.solve(correlation, new))
+    far, near = (old - x) / unit, (new - x) / unit
+    return float(
+        far @ np.linalg.solve(correlation, far) - near @ np.linalg.solve(correlation, near)
+    )
