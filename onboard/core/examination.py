@@ -83,7 +83,7 @@ class Examination(Engine):
             more=tuple(families),
         )
         self.chunks = list(like.chunks if chunks is None else chunks)
-        self.trusted_s = like.trusted_s
+        self.trusted_s = sum(c.trusted_s for c in self.chunks)
         self._blocks = _blocks(self.chunks)
 
     def with_noise(self) -> Examination:

@@ -15,11 +15,12 @@ from collections.abc import Callable, Iterable
 import msgspec
 import numpy as np
 
+from onboard.answer import answer, diagnosed
 from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose, since_reboot
+from onboard.core.diagnosis import since_reboot
 from onboard.core.findings import Diagnosis
 from onboard.explain_document import explain_document
-from onboard.push.physics import Diagnosed, judge_physics
+from onboard.push.physics import Diagnosed
 
 logger = logging.getLogger(__name__)
 
@@ -64,10 +65,9 @@ class Examiner:
         self.waiting = tuple(rest)
         began = self._clock()
         try:
-            calibration = calibrator.calibration(imu)
-            found = diagnose(calibrator, imu, latest=True)
-            document = msgspec.to_builtins(self._document(calibrator, found))
-            self.diagnosed[imu] = judge_physics(calibration, found, document)
+            given = answer(calibrator, imu, latest=True)
+            document = msgspec.to_builtins(self._document(calibrator, given.diagnosis))
+            self.diagnosed[imu] = diagnosed(given, document)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers no model fits
             self.counters["diagnosis_failed"] += 1
             logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
