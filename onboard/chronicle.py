@@ -266,7 +266,6 @@ class Chronicle:
         sixes = (np.concatenate([scale, -scale * np.array(held.offset)]), solution.theta[:6])
         chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
         states = list(engine.states)
-        runs = _runs(chain, [x.start for x in chain])
         known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}
         times, errors = [np.zeros(0)], [np.zeros((2, 0))]
         for piece, run in self._runs(chain, [x.start for x in chain]):
