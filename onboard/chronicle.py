@@ -1,32 +1,35 @@
-"""How a calibration came about: its course over the flight, kept while a recording is replayed.
+"""How a calibration came about: its course over the flight, kept while a recording is read.
 
-A :class:`Chronicle` stands before a calibrator and passes everything on; what goes by is what a
-live service would have shown at that moment.  Times are seconds since the first inertial sample,
+A :class:`Chronicle` stands before a calibrator and passes everything on; when GPS was trusted, how
+fast the vehicle was, and which parameters were in force it notes as they go by.  Estimates are
+those of the answer's own sums, cut off at each moment: what was known with what had been flown by
+then, so that a course ends at the answer.  Times are seconds since the first inertial sample,
 recordings of several flights one after the other.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.calibrator import Advanced, Calibrator, Event, Restarted
+from onboard.core.calibrator import OF_ACCELEROMETER, Calibrator, Event, Restarted
 from onboard.core.deadreckoning import free_errors, intervals
 from onboard.core.engine import Engine
 from onboard.core.observability import Observability, assess
 from onboard.core.report import six_covariance, six_information
-from onboard.core.result import Calibration
-from onboard.core.samples import GpsFix, ImuSample, Sample
+from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.solution import solve
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
 
-POINT_S = 5.0
-"""Between two points of a course."""
+MOST_POINTS = 60
+"""Of a course: each is a solution of its own."""
 SPEED_S = 0.4
 """Between two points of the speed."""
 PAUSE_S = 10.0
@@ -52,9 +55,10 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Estimates as they were known then: ``t`` (n,) s, the others (n, 6) in order of SIX_NAMES.
+    """What was known with the flight up to then: ``t`` (n,) s, the others (n, 6), as SIX_NAMES.
 
-    ``coverage`` in percent; ``in_force`` are the parameters that the autopilot used.
+    ``coverage`` in percent; ``in_force`` are the parameters that the autopilot used.  Timing and
+    noise are those of the whole flight: the last row is the answer.
     """
 
     t: Array
@@ -78,7 +82,7 @@ class Figures:
 
     ``before`` and ``after``: velocity error (m/s) of free integration over :data:`FREE_S` with
     the parameters in force and with the estimate; ``innovation``: length of the filter's velocity
-    residual (m/s), which the certificate bounds; both of the flight that is still buffered.
+    residual (m/s), which the certificate bounds; both of the flight whose states are kept.
     """
 
     course: Course
@@ -102,23 +106,18 @@ class _Piece:
 
 
 class Chronicle:
-    """A calibrator that is watched; give it to :func:`onboard.replay.replay` in its place."""
+    """A calibrator that is watched: samples go through it."""
 
     def __init__(self, calibrator: Calibrator) -> None:
         self.calibrator = calibrator
         self._pieces: list[_Piece] = []
         self._piece: _Piece | None = None
-        self._points: dict[int, list[tuple[Array, ...]]] = {}
-        self._next_point = -np.inf
+        self._engines: dict[int, Engine] = {}
+        self._held: dict[int, list[tuple[float, Array]]] = {}
         self._spans: list[Span] = []
         self._speed: list[tuple[float, float]] = []
 
-    # What replay calls
-
-    @property
-    def imus(self) -> tuple[int, ...]:
-        """Accelerometers seen."""
-        return self.calibrator.imus
+    # What goes by
 
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Pass a sample on, and note what came of it."""
@@ -129,8 +128,8 @@ class Chronicle:
             self._tick(sample.t)
         elif isinstance(sample, GpsFix):
             self._fix(sample)
-        if self._piece is not None and any(isinstance(event, Advanced) for event in events):
-            self._note(self._piece.last)
+        elif isinstance(sample, ParameterValue) and sample.name in OF_ACCELEROMETER:
+            self._hold(OF_ACCELEROMETER[sample.name])
         return events
 
     def restart(self) -> tuple[Event, ...]:
@@ -142,15 +141,12 @@ class Chronicle:
     def finish(self) -> tuple[Event, ...]:
         """There are no more recordings."""
         events = self.calibrator.finish()
-        if self._piece is not None:
-            self._next_point = -np.inf
-            self._note(self._piece.last)
         self._begin_anew()
         return events
 
-    def calibration(self, imu: int) -> Calibration:
-        """The calibrator's answer."""
-        return self.calibrator.calibration(imu)
+    def take(self, imu: int, engine: Engine) -> None:
+        """The engine whose sums gave the answer for one accelerometer."""
+        self._engines[imu] = engine
 
     # What a report asks
 
@@ -171,13 +167,18 @@ class Chronicle:
 
     def figures(self, imu: int) -> Figures:
         """The figures of one accelerometer; empty curves where nothing was learned."""
-        engine = self.calibrator.engine(imu) if imu in self.calibrator.imus else None
-        nothing = Curve(np.zeros(0), np.zeros(0))
+        engine = self._engines.get(imu)
         if engine is None or engine.solution() is None:
-            return Figures(self._course(imu), nothing, nothing, nothing, None)
+            nothing = Curve(np.zeros(0), np.zeros(0))
+            course = Course(np.zeros(0), *(np.zeros((0, 6)) for _ in range(4)))
+            return Figures(course, nothing, nothing, nothing, None)
         before, after = self._free(imu, engine)
         return Figures(
-            self._course(imu), before, after, self._innovation(engine), _observability(engine)
+            self._course(imu, engine),
+            before,
+            after,
+            self._innovation(engine),
+            _observability(engine),
         )
 
     # How
@@ -193,7 +194,12 @@ class Chronicle:
         if self._piece is not None:
             self._pieces.append(self._piece)
         self._piece = None
-        self._next_point = -np.inf
+
+    def _hold(self, imu: int) -> None:
+        """One of the six was reported: what is in force from now on."""
+        now = 0.0 if self._piece is None else self._shown(self._piece.last)
+        six = self.calibrator.parameters.six(imu)
+        self._held.setdefault(imu, []).append((now, np.array([*six.scale, *six.offset])))
 
     def _shown(self, t: float) -> float:
         piece = self._piece
@@ -218,35 +224,38 @@ class Chronicle:
         if not self._speed or now - self._speed[-1][0] >= SPEED_S:
             self._speed.append((now, float(np.hypot(fix.v_n, fix.v_e))))
 
-    def _note(self, t: float) -> None:
-        if t < self._next_point:
-            return
-        self._next_point = t + POINT_S
-        for imu in self.calibrator.imus:
-            engine = self.calibrator.engine(imu)
-            solution = engine.solution()
-            if solution is None:
-                continue
+    def _course(self, imu: int, engine: Engine) -> Course:
+        """Solutions of the sums up to some of the portions, the last of all of them."""
+        portions = engine.all_portions
+        times = [
+            math.nan if piece is None else float(piece.time(np.array(p.end)))
+            for p, piece in zip(portions, self._places([p.start for p in portions]), strict=True)
+        ]
+        last = len(portions) - 1
+        rows = []
+        for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
+            solution = engine.solution() if i == last else None
+            solution = solution or solve(portions[: i + 1], engine.model)
             scale = solution.theta[:3]
-            held = self.calibrator.parameters.six(imu)
-            sigma = np.sqrt(np.diag(six_covariance(solution)))
             seen = assess(six_information(solution), engine.settings.needs)
-            self._points.setdefault(imu, []).append(
+            rows.append(
                 (
-                    np.array([self._shown(t)]),
+                    np.array([times[i]]),
                     np.concatenate([scale, -solution.theta[3:6] / scale]),
-                    sigma,
-                    np.array([*held.scale, *held.offset]),
+                    np.sqrt(np.diag(six_covariance(solution))),
+                    self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
                 )
             )
-
-    def _course(self, imu: int) -> Course:
-        points = self._points.get(imu, [])
-        if not points:
-            return Course(np.zeros(0), *(np.zeros((0, 6)) for _ in range(4)))
-        t, *six = (np.array(column) for column in zip(*points, strict=True))
+        t, *six = (np.array(column) for column in zip(*rows, strict=True))
         return Course(t[:, 0], *six)
+
+    def _in_force(self, imu: int, t: float) -> Array:
+        """(6,) what the autopilot used then; what was first reported, before that."""
+        held = self._held.get(imu)
+        if not held:
+            return np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        return next((six for since, six in reversed(held) if since <= t), held[0][1])
 
     def _free(self, imu: int, engine: Engine) -> tuple[Curve, Curve]:
         solution = engine.solution()
@@ -257,13 +266,10 @@ class Chronicle:
         sixes = (np.concatenate([scale, -scale * np.array(held.offset)]), solution.theta[:6])
         chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
         states = list(engine.states)
-        runs = _runs(chain, [x.start for x in chain])
-        # Both end with the newest flight; states may reach further back.
-        of_runs = _runs(states, [s.t for s in states])[-len(runs) :]
-        places = self._places([(run[0].start, run[-1].end) for run in runs])
+        known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}
         times, errors = [np.zeros(0)], [np.zeros((2, 0))]
-        for run, of_run, piece in zip(runs[-len(of_runs) :], of_runs, places, strict=False):
-            if piece is not None:
+        for piece, run in self._runs(chain, [x.start for x in chain]):
+            if of_run := known.get(id(piece)):
                 got = free_errors(run, of_run, sixes, horizon_s=FREE_S)
                 times.append(piece.time(got.t))
                 errors.append(got.error)
@@ -272,36 +278,36 @@ class Chronicle:
 
     def _innovation(self, engine: Engine) -> Curve:
         states = list(engine.states)
-        runs = _runs(states, [s.t for s in states])
         times, lengths = [np.zeros(0)], [np.zeros(0)]
-        for run, piece in zip(runs, self._places([(r[0].t, r[-1].t) for r in runs]), strict=True):
-            if piece is not None:
-                times.append(piece.time(np.array([s.t for s in run])))
-                residual = np.nan_to_num(np.array([s.innovation for s in run]))
-                lengths.append(np.linalg.norm(residual, axis=1))
+        for piece, run in self._runs(states, [s.t for s in states]):
+            times.append(piece.time(np.array([s.t for s in run])))
+            residual = np.nan_to_num(np.array([s.innovation for s in run]))
+            lengths.append(np.linalg.norm(residual, axis=1))
         return Curve(np.concatenate(times), np.concatenate(lengths))
 
-    def _places(self, ranges: list[tuple[float, float]]) -> list[_Piece | None]:
-        """The run of the clock that each time range is of, the latest possible, in order."""
+    def _runs(self, items: list[Item], times: list[float]) -> list[tuple[_Piece, list[Item]]]:
+        """What is of one run of the clock each, by its times in order."""
+        pairs = zip(self._places(times), items, strict=True)
+        grouped = itertools.groupby(pairs, key=lambda pair: pair[0])
+        return [(piece, [x for _, x in group]) for piece, group in grouped if piece is not None]
+
+    def _places(self, times: list[float]) -> list[_Piece | None]:
+        """The run of the clock that each of these times is of, the latest possible, in order."""
         left = list(self._pieces)
         placed: list[_Piece | None] = []
-        for start, end in reversed(ranges):
-            piece = None
-            while left and piece is None:
-                last = left.pop()
-                if last.first - CLOCK_MARGIN_S <= start and end <= last.last + CLOCK_MARGIN_S:
-                    piece = last
-            placed.insert(0, piece)
-        return placed
+        piece, later = left.pop() if left else None, math.inf
+        for t in reversed(times):
+            if t > later:
+                piece = left.pop() if left else None
+            while piece is not None and not piece.first - CLOCK_MARGIN_S <= t <= (
+                piece.last + CLOCK_MARGIN_S
+            ):
+                piece = left.pop() if left else None
+            placed.append(piece)
+            later = t
+        return placed[::-1]
 
 
 def _observability(engine: Engine) -> Observability | None:
     solution = engine.solution()
     return None if solution is None else assess(six_information(solution), engine.settings.needs)
-
-
-def _runs(items: list[Item], times: list[float]) -> list[list[Item]]:
-    """Cut where the clock goes back: a reboot, or another recording."""
-    back = [i for i in range(1, len(times)) if times[i] < times[i - 1]]
-    cuts = [0, *back, len(items)]
-    return [items[a:b] for a, b in itertools.pairwise(cuts) if b > a]

@@ -31,10 +31,11 @@ class Number(msgspec.Struct, frozen=True):
 class CalibrationDocument(msgspec.Struct, frozen=True, kw_only=True):
     """Scale and offset, x, y, z, absolute, ArduPilot's; offsets in m/s^2.
 
-    ``parameters`` has them by name, for ArduPilot only; ``observable`` is in the order scale x, y,
-    z, offset x, y, z.
+    ``status`` is how far they may be believed; ``parameters`` has them by name, for ArduPilot only;
+    ``observable`` is in the order scale x, y, z, offset x, y, z.
     """
 
+    status: str
     scale: Numbers
     offset: Numbers
     scale_sigma: Numbers
@@ -166,6 +167,7 @@ def calibration_document(calibration: Calibration, autopilot: str) -> Calibratio
     values = calibration.scale + calibration.offset
     named = zip(names, values, strict=True) if autopilot == "ardupilot" else ()
     return CalibrationDocument(
+        status=calibration.status.value,
         scale=_numbers(calibration.scale),
         offset=_numbers(calibration.offset),
         scale_sigma=_numbers(calibration.scale_sigma),

@@ -10,11 +10,10 @@ from typing import Protocol
 
 import msgspec
 
-from onboard.caution import with_caution
 from onboard.chronicle import Chronicle
-from onboard.core.calibrator import Calibrator
 from onboard.document import ReplayDocument
 from onboard.errors import OnboardError, UsageError
+from onboard.recorded import Recorded
 from onboard.replay import Progress, Replay, replay
 
 SCHEMA = "onboard.fleet/1"
@@ -120,13 +119,11 @@ def fly(
         watching: told of what is going on.
     """
     for number, (path, name) in enumerate(files, start=1):
-        chronicle = Chronicle(Calibrator())
-        estimator = chronicle if watched else chronicle.calibrator
+        recorded = Recorded(() if imu is None else (1, imu), watched=watched)
         try:
             with watching(path, number, len(files)) as progress:
-                result = replay([path], estimator, imu=imu, progress=progress)
-                result = with_caution(result, chronicle.calibrator)
+                result = replay([path], recorded, imu=imu, progress=progress)
         except OnboardError as error:
             yield Flown(path, name, None, None, str(error))
         else:
-            yield Flown(path, name, result, chronicle if watched else None)
+            yield Flown(path, name, result, recorded.chronicle)

@@ -1,19 +1,21 @@
-"""Recordings of one vehicle through the core: the code path of the live service, fed from files."""
+"""Recordings of one vehicle through the core, and what they gave."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
+from onboard.answer import Answer
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Calibration, Coverage, Status
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample, Vector3
 from onboard.document import RecordingDocument, ReplayDocument, imu_document
 from onboard.errors import RecordingError, UsageError
+from onboard.recorded import unanswered
 from onboard.recordings.opening import open_recording
 from onboard.recordings.recording import Recording
 
@@ -24,8 +26,8 @@ PROGRESS_EVERY = 1024
 DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
 
 
-class Estimator(Protocol):
-    """What replay needs of :class:`onboard.core.calibrator.Calibrator`."""
+class Reader(Protocol):
+    """What is fed with recordings (:class:`onboard.core.calibrator.Calibrator` can be)."""
 
     def feed(self, sample: Sample) -> object:
         """Take a sample."""
@@ -36,25 +38,58 @@ class Estimator(Protocol):
     def finish(self) -> object:
         """Process what is pending: there are no more recordings."""
 
+
+class Estimator(Reader, Protocol):
+    """What replay needs of :class:`onboard.recorded.Recorded`."""
+
     @property
     def imus(self) -> tuple[int, ...]:
         """Accelerometers seen."""
 
-    def calibration(self, imu: int) -> Calibration:
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The autopilot's parameters as they were reported last, by name."""
+
+    def answer(self, imu: int) -> Answer:
         """The answer for one of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Recordings that were read; ``vehicle`` knows what was in them."""
+
+    recordings: tuple[Recording, ...]
+    vehicle: Vehicle
+
+    @property
+    def autopilot(self) -> str:
+        """The kind of autopilot that all of them come from."""
+        return self.recordings[0].autopilot
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all recordings together, s."""
+        return sum(recording.duration_s for recording in self.recordings)
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
     """Recordings and what they gave.
 
-    ``counts`` are samples fed, ``imu <n>`` and ``gps``; ``notes`` says what is left out.
+    ``counts`` are samples fed, ``imu <n>`` and ``gps``; ``notes`` says what is left out;
+    ``parameters`` are the autopilot's as they were reported last.
     """
 
     recordings: tuple[Recording, ...]
-    calibrations: tuple[Calibration, ...]
+    answers: tuple[Answer, ...]
     counts: dict[str, int]
     notes: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        """The calibration of each answer."""
+        return tuple(answer.calibration for answer in self.answers)
 
     @property
     def autopilot(self) -> str:
@@ -89,12 +124,43 @@ def replay(
     imu: int | None = None,
     progress: Progress | None = None,
 ) -> Replay:
-    """Feed files, one after the other, to one estimator: its sums add up over the flights.
+    """Feed files to one estimator and ask it.
 
     Args:
         paths: at least one recording, all of the same vehicle.
         estimator: a fresh one; restarted between files, finished after the last.
         imu: answer for this accelerometer only.
+        progress: called every few thousand samples.
+
+    Raises:
+        RecordingError: a file that cannot be used, or one of another vehicle.
+        UsageError: there is no such accelerometer in the recordings.
+    """
+    source = read(paths, estimator, imu=imu, progress=progress)
+    vehicle, answered = source.vehicle, estimator.imus
+    # A stream too slow to calibrate from is not worth a table, unless asked for or alone.
+    wanted = (imu,) if imu is not None else answered or vehicle.imus
+    answers = tuple(
+        estimator.answer(n) if n in answered else unanswered(vehicle.unanswered(n)) for n in wanted
+    )
+    quiet = () if imu is not None else sorted({*vehicle.imus} - {*wanted})
+    notes = tuple(map(vehicle.silence, quiet))
+    return Replay(source.recordings, answers, vehicle.counts, notes, estimator.parameters)
+
+
+def read(
+    paths: Sequence[str | Path],
+    reader: Reader,
+    *,
+    imu: int | None = None,
+    progress: Progress | None = None,
+) -> Reading:
+    """Feed files, one after the other, to one reader: its sums add up over the flights.
+
+    Args:
+        paths: at least one recording, all of the same vehicle.
+        reader: a fresh one; restarted between files, finished after the last.
+        imu: an accelerometer that must be there.
         progress: called every few thousand samples.
 
     Raises:
@@ -107,32 +173,24 @@ def replay(
     _refuse_repetition(recordings)
     _refuse_mixture(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
-    vehicle = _Vehicle()
+    vehicle = Vehicle()
     fed = 0
     for recording in recordings:
         if recording is not recordings[0]:
-            estimator.restart()
+            reader.restart()
         for sample in recording.samples():
             vehicle.check(sample, recording)
-            estimator.feed(sample)
+            reader.feed(sample)
             fed += 1
             if progress is not None and fed % PROGRESS_EVERY == 0:
                 progress(min(1.0, fed / total))
-    estimator.finish()
+    reader.finish()
     if progress is not None:
         progress(1.0)
-    seen = vehicle.imus
-    if imu is not None and imu not in seen:
-        there = ", ".join(map(str, seen))
+    if imu is not None and imu not in vehicle.imus:
+        there = ", ".join(map(str, vehicle.imus))
         raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
-    answered = estimator.imus
-    # A stream too slow to calibrate from is not worth a table, unless asked for or alone.
-    wanted = (imu,) if imu is not None else answered or seen
-    calibrations = tuple(
-        estimator.calibration(n) if n in answered else vehicle.unanswered(n) for n in wanted
-    )
-    notes = () if imu is not None else tuple(map(vehicle.silence, sorted({*seen} - {*wanted})))
-    return Replay(recordings, calibrations, vehicle.counts, notes)
+    return Reading(recordings, vehicle)
 
 
 def _refuse_repetition(recordings: Sequence[Recording]) -> None:
@@ -155,7 +213,7 @@ def _refuse_mixture(recordings: Sequence[Recording]) -> None:
             )
 
 
-class _Vehicle:
+class Vehicle:
     """Counts the samples and sees to it that the accelerometers stay the same ones."""
 
     def __init__(self) -> None:
@@ -164,6 +222,11 @@ class _Vehicle:
         self._device: dict[int, tuple[np.float32, Recording]] = {}
 
     def check(self, sample: Sample, recording: Recording) -> None:
+        """Take a sample.
+
+        Raises:
+            RecordingError: it is of another vehicle.
+        """
         if isinstance(sample, ImuSample):
             self._count(f"imu {sample.imu}")
         elif isinstance(sample, GpsFix):

@@ -7,13 +7,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from onboard.caution import with_caution
-from onboard.chronicle import Chronicle
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
-from onboard.core.calibrator import Calibrator
 from onboard.errors import UsageError
-from onboard.replay import Estimator
+from onboard.recorded import Recorded
 from onboard.replay import replay as replay_recordings
 
 STANDARD_OUTPUT = "-"
@@ -58,16 +55,14 @@ def replay(
     Several LOGs of one vehicle are merged: what a single flight does not show, several may.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    chronicle = Chronicle(Calibrator())
-    estimator: Estimator = chronicle.calibrator if report_file is None else chronicle
-    with reading(logs) as progress:
-        result = replay_recordings(logs, estimator, imu=imu, progress=progress)
-        result = with_caution(result, chronicle.calibrator)
-    if report_file is not None:
+    recorded = Recorded(() if imu is None else (1, imu), watched=report_file is not None)
+    with reading(logs, then="comparing models") as progress:
+        result = replay_recordings(logs, recorded, imu=imu, progress=progress)
+    if report_file is not None and recorded.chronicle is not None:
         # jinja2 only when it is wanted.
         from onboard.report.replay import replay_html
 
-        write_text(replay_html(result, chronicle), report_file)
+        write_text(replay_html(result, recorded.chronicle), report_file)
     if param_file is not None:
         from onboard.report.parameters import calibration_text, is_qgc
 

@@ -65,7 +65,12 @@ SUSPECT = 18.0
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
-    """Diagnose one accelerometer's recording; the calibrator is left as it is.
+    """Diagnose one accelerometer's recording: what :func:`examine` has found, as a record."""
+    return examine(calibrator, imu, latest=latest).diagnosis()
+
+
+def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
+    """Find the model of one accelerometer's recording; the calibrator is left as it is.
 
     Args:
         calibrator: finished; its settings' buffer must hold the flight of interest.
@@ -145,7 +150,7 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         origin,
         absent,
         tuple(e for e in (rail, fault) if e is not None),
-    ).diagnosis()
+    )
 
 
 def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:

@@ -83,7 +83,8 @@ class Examination(Engine):
             more=tuple(families),
         )
         self.chunks = list(like.chunks if chunks is None else chunks)
-        self.trusted_s, self.left_brisk_s = like.trusted_s, like.left_brisk_s
+        self.trusted_s = sum(c.trusted_s for c in self.chunks)
+        self.left_brisk_s = like.left_brisk_s
         self._blocks = _blocks(self.chunks)
 
     def with_noise(self) -> Examination:

@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.result import Calibration, Estimate
+from onboard.core.result import Calibration, Estimate, Six, SixFlags
 
 Array = NDArray[np.float64]
 
@@ -188,8 +188,25 @@ class RegimeResidual:
 
 
 @dataclass(frozen=True, slots=True)
+class Plain:
+    """What the same sums say of the six without the effects that were found.
+
+    ``value`` and ``sigma`` are scale and offset in the order of SIX_NAMES; ``observable`` as in a
+    calibration.  Timing and constant attitude errors are in it: they are in every model.
+    """
+
+    value: Six
+    sigma: Six
+    observable: SixFlags
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Everything about one accelerometer's recording."""
+    """Everything about one accelerometer's recording.
+
+    ``calibration`` is that of the model with what was found in it; ``plain`` is the one without,
+    None where nothing was found that is not in every model.
+    """
 
     imu: int
     verdict: Verdict
@@ -203,3 +220,4 @@ class Diagnosis:
     regimes: tuple[RegimeResidual, ...]
     series: Series
     note: str
+    plain: Plain | None = None

@@ -31,8 +31,9 @@ from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
+from onboard.core.plain import plain_six
 from onboard.core.regimes import Residuals, axis_of, located, main_axis, regime_residuals, spans
-from onboard.core.report import timing_of
+from onboard.core.report import CONTRADICTION, timing_of
 from onboard.core.result import Calibration
 from onboard.core.selection import Fit, Fitter
 from onboard.core.timing_effects import (
@@ -52,8 +53,6 @@ APART = {
 """Manoeuvres that tell a timing error from what looks alike."""
 AMBIGUOUS = 10.0
 """Rivals within this difference of BIC cannot be told apart."""
-UNEXPLAINED = 6.0
-"""Inflation of the variance past which the residual is not noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +123,7 @@ class Judge:
         ]
         effects += [self._effect(f) for f in self.families]
         effects += self.excluded
-        insufficient = not self.calibrator.engine(self.imu).moving
+        insufficient = not self.engine.moving
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, insufficient=insufficient)
         if verdict is Verdict.INSUFFICIENT:
@@ -143,6 +142,7 @@ class Judge:
             regimes=regime_residuals(self.traces, self.engine.chunks, before.theta, after.theta),
             series=self._series(before.theta, after.theta),
             note=note,
+            plain=plain_six(self.engine, self.families) if self.families else None,
         )
 
     def _held(self, names: Sequence[str]) -> Array:
@@ -344,7 +344,7 @@ class Judge:
         note = self.calibration.note
         if insufficient:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
-        left = self.solution.inflation > UNEXPLAINED
+        left = self.solution.inflation > CONTRADICTION
         if any(e.name == "empirical" for e in effects):
             named = [e for e in effects if e.name != "empirical"]
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (

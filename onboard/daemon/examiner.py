@@ -19,15 +19,16 @@ from dataclasses import dataclass, field, replace
 import msgspec
 import numpy as np
 
+from onboard.answer import answer, diagnosed
 from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose, since_reboot
+from onboard.core.diagnosis import since_reboot
 from onboard.core.findings import Diagnosis
 from onboard.core.result import Calibration, Status
 from onboard.daemon.flight import Judged, JudgedFlight, in_force
 from onboard.explain_document import explain_document
 from onboard.push.conditioning import CHI_SQUARE_999
 from onboard.push.entries import Support
-from onboard.push.physics import Diagnosed, judge_physics
+from onboard.push.physics import Diagnosed
 from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)
@@ -113,14 +114,14 @@ class Examiner:
             self.counters["diagnosis_of_unknown"] += 1
             return
         try:
-            found = diagnose(flight, imu, latest=True)
-            document = msgspec.to_builtins(self._document(flight, found))
-            diagnosed = judge_physics(flight.calibration(imu), found, document)
+            given = answer(flight, imu, latest=True)
+            document = msgspec.to_builtins(self._document(flight, given.diagnosis))
+            found = diagnosed(given, document)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers no model fits
             self.counters["diagnosis_failed"] += 1
             logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
             return
-        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, diagnosed))
+        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found))
 
     def _document(self, flight: Calibrator, found: Diagnosis) -> msgspec.Struct:
         chunks = since_reboot(flight.engine(found.imu).chunks)
@@ -136,28 +137,28 @@ class Examiner:
         )
 
 
-def with_earlier(flight: Calibrator, diagnosed: Diagnosed) -> Diagnosed:
+def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
     """With the answer of all flights, where this one says too little by itself but supports it.
 
     Support is the flight's own: by its likelihood alone it must prefer those values to the ones in
     force, past the 0.999 quantile of what six numbers that change nothing gain by chance.
     """
-    alone = diagnosed.calibration
-    if diagnosed.missing or alone.status is Status.CALIBRATED:
-        return diagnosed
-    if not flight.engine(diagnosed.imu).aged:
-        return diagnosed
-    together = flight.calibration(diagnosed.imu)
+    alone = found.calibration
+    if found.missing or alone.status is Status.CALIBRATED:
+        return found
+    if not flight.engine(found.imu).aged:
+        return found
+    together = flight.calibration(found.imu)
     if together.status is not Status.CALIBRATED:
-        return diagnosed
+        return found
     gain = preference(
         np.array(together.in_force_scale + together.in_force_offset),
         np.array(together.scale + together.offset),
         alone,
     )
     if gain is None or gain < CHI_SQUARE_999[6]:
-        return diagnosed
-    return replace(diagnosed, calibration=_added(together))
+        return found
+    return replace(found, calibration=_added(together))
 
 
 def _added(together: Calibration) -> Calibration:

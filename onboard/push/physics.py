@@ -1,14 +1,6 @@
-"""Whether physics that the model left out forbids a push, and what may be offered instead.
+"""What each effect of the catalogue means for a push, and the record of a flight's diagnosis.
 
-A calibration is only as good as the model behind it.  A diagnosis fits the same flight with every
-effect of the catalogue; where it finds one, the six numbers of the plain model are compared with
-those of the model that has the effect.  A number that moves by more than what was claimed for
-it is wrong by more than what was claimed, however small its sigma is: nothing is written by
-itself then.  The numbers of the fuller model are offered to a person, where they mean what
-the autopilot takes them for.
-
-Latency and averaging of the receiver, delay of the attitude and a wrong heading are in the
-plain model, too: they are worth knowing and forbid nothing.
+Which of these apply to a flight, and what becomes of its calibration, :mod:`onboard.answer` says.
 """
 
 from __future__ import annotations
@@ -18,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from onboard.core.findings import Diagnosis, Effect, Verdict
-from onboard.core.result import SIX_NAMES, Calibration, Status
+from onboard.core.findings import Effect
+from onboard.core.result import Calibration
 
-MOVED_SIGMAS = 2.0
-"""Of what is claimed for a number: how far missing physics may move it."""
 IN_EVERY_MODEL = frozenset(
     {"gps_latency", "gps_smoothing", "imu_delay", "heading_error", "gps_fault"}
 )
@@ -59,9 +49,9 @@ class Diagnosed:
         imu: which accelerometer.
         verdict: the diagnosis in one word.
         effects: names of what was found, the largest first.
-        calibration: the one that may be proposed, as it was when it was diagnosed.
+        calibration: of the model with what was found in it, as it was when it was diagnosed.
         missing: why it must not be written by itself, in words; empty if nothing forbids it.
-        modelled: the calibration is that of the fuller model.
+        modelled: what is missing is modelled beside the six, which may be offered to a person.
         document: the diagnosis as other programs read it.
         resumed: it was made before the service last started.
     """
@@ -76,75 +66,8 @@ class Diagnosed:
     resumed: bool = False
 
 
-def judge_physics(
-    calibration: Calibration, diagnosis: Diagnosis, document: dict[str, Any]
-) -> Diagnosed:
-    """What a diagnosis means for the push of ``calibration``.
-
-    Args:
-        calibration: of the plain model, as it would be proposed.
-        diagnosis: of the same accelerometer, at the same moment.
-        document: the diagnosis for other programs.
-    """
-    suspects = [e for e in diagnosis.effects if e.name not in IN_EVERY_MODEL]
-    fuller = diagnosis.calibration
-    missing, modelled = "", False
-    if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
-        found = _listed(suspects)
-        missing = "the residual is not noise, and " + (
-            f"what was found ({found}) does not explain all of it"
-            if found
-            else "no known effect explains it"
-        )
-    elif any(e.name in NO_ONE_NUMBER for e in suspects):
-        missing = _cured(suspects)
-    elif suspects and (moved := moved_most(calibration, fuller)) is not None:
-        name, by, sigmas = moved
-        missing = f"{_cured(suspects)} (it moves the {name} by {by:+.2g}, {sigmas:.1f} sigma)"
-        modelled = fuller.status is Status.CALIBRATED and {e.name for e in suspects} <= GEOMETRY
-    return Diagnosed(
-        imu=calibration.imu,
-        verdict=diagnosis.verdict.value,
-        effects=tuple(e.name for e in diagnosis.effects),
-        calibration=fuller if modelled else calibration,
-        missing=missing,
-        modelled=modelled,
-        document=document,
-    )
-
-
-def moved_most(plain: Calibration, fuller: Calibration) -> tuple[str, float, float] | None:
-    """The number that the fuller model moves most: name, by how much, in claimed sigmas.
-
-    None if none that the flight shows moves by more than :data:`MOVED_SIGMAS`.
-    """
-    by = np.array(fuller.scale + fuller.offset) - np.array(plain.scale + plain.offset)
-    claimed = np.array(plain.scale_sigma + plain.offset_sigma)
-    sigmas = np.where(plain.observable, np.abs(by) / claimed, 0.0)
-    worst = int(np.argmax(sigmas))
-    # What is no number is not within its claim.
-    if sigmas[worst] <= MOVED_SIGMAS:
-        return None
-    return SIX_NAMES[worst], float(by[worst]), float(sigmas[worst])
-
-
-def _cured(effects: list[Effect]) -> str:
-    """What is missing and what to do about it."""
-    cures = [
-        f"set {', '.join(f'{n} {v:.2f}' for n, v in e.parameters.items())}"
-        if e.parameters
-        else e.cure
-        for e in effects
-    ]
-    todo = "; ".join(dict.fromkeys(c for c in cures if c))
-    return f"{_listed(effects)}: {todo}; then fly again" if todo else _listed(effects)
-
-
-def _listed(effects: list[Effect]) -> str:
-    return ", ".join(_words(e) for e in effects)
-
-
-def _words(effect: Effect) -> str:
+def words_of(effect: Effect) -> str:
+    """A found effect as part of a sentence, with its size and its name."""
     size = float(np.linalg.norm([q.value for q in effect.unknowns.values()]))
     text = WORDS.get(effect.name, "something is missing")
     return f"{text.format(size=size, degrees=np.degrees(size))} ({effect.name})"

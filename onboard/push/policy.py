@@ -1,9 +1,10 @@
 """Whether a plan may be written now: every objection has a name and a sentence.
 
 Modes: ``never`` (advise only), ``landed`` (default: disarmed for 5 s), ``in_flight`` (opt-in:
-small steps, EKF healthy; landed counts too).  :func:`judge` gives *all* objections to a plan,
-:func:`moment` only those to writing now, which is also what a roll-back, or the resumption
-of an interrupted transaction, has to pass.
+small steps, EKF healthy; landed counts too).  :func:`judge` gives *all* objections to a plan:
+those of :func:`objections` to its values, which hold for whoever would set them, by a link or by
+a parameter file, and those of :func:`moment` to writing now, which is also what a roll-back, or
+the resumption of an interrupted transaction, has to pass.
 
 What the estimate must show, number by number: a sigma below its limit, given the numbers
 that stay as they are.  A number that the flight does not show is not changed; then the
@@ -69,6 +70,7 @@ class Objection(Enum):
     IMUS_INCONSISTENT = "imus_inconsistent"
     TEMPERATURE_LEARNING = "temperature_learning"
     TEMPERATURE_REFERENCE = "temperature_reference_unknown"
+    PHYSICS_MISSING = "physics_missing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +179,32 @@ def judge(
     found = list(moment(condition, settings))
     if condition.armed and settings.mode is Mode.IN_FLIGHT:
         found += _steps(plan, settings)
+    return (*found, *objections(plan, calibration, settings, values=values, others=others))
+
+
+def objections(
+    plan: PushPlan,
+    calibration: Calibration,
+    settings: PolicySettings,
+    *,
+    values: Mapping[str, float] | None = None,
+    others: Sequence[Accelerometer] = (),
+    missing: str = "",
+) -> tuple[Refusal, ...]:
+    """Every objection to the values of a plan, whenever and by whomever they would be set.
+
+    Args:
+        plan: from :func:`onboard.push.plan.propose` with this calibration.
+        calibration: the estimate that the plan was made from.
+        settings: limits.
+        values: the autopilot's parameters by name, for :func:`context_names`.
+        others: the vehicle's other accelerometers, where their calibration is known.
+        missing: physics that the autopilot lacks and that forbids it, in words
+            (:attr:`onboard.answer.Answer.missing`).
+    """
+    found: list[Refusal] = []
+    if missing:
+        found.append(_no(Objection.PHYSICS_MISSING, f"physics missing: {missing}"))
     found += _estimate(plan, calibration, settings)
     for change in plan.changes:
         found += _number(change, settings)

@@ -13,6 +13,7 @@ from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue
 from onboard.errors import RecordingError, UsageError
+from onboard.recorded import unanswered
 from onboard.replay import replay
 
 
@@ -37,8 +38,12 @@ class Listener:
     def imus(self) -> tuple[int, ...]:
         return tuple(sorted({s.imu for s in self.samples if isinstance(s, ImuSample)}))
 
-    def calibration(self, imu: int) -> object:
-        return replace(CALIBRATED, imu=imu)
+    @property
+    def parameters(self) -> dict[str, float]:
+        return {s.name: s.value for s in self.samples if isinstance(s, ParameterValue)}
+
+    def answer(self, imu: int) -> object:
+        return unanswered(replace(CALIBRATED, imu=imu))
 
 
 def saved(tmp_path: Path, name: str, data: object) -> Path:

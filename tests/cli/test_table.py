@@ -9,6 +9,7 @@ from results import CALIBRATED, NOTHING_KNOWN
 from rich.console import Console
 
 from onboard.cli.table import replay_report
+from onboard.recorded import unanswered
 from onboard.recordings.recording import Recording
 from onboard.replay import Replay
 
@@ -18,7 +19,7 @@ def shown(*calibrations: object, autopilot: str = "ardupilot", **about: object) 
         Path("a-flight-with-a-rather-long-name.tlog"), "tlog", autopilot, 261.2, {}, iter, **about
     )
     console = Console(file=io.StringIO(), width=80)
-    for part in replay_report(Replay((recording,), calibrations, {})):
+    for part in replay_report(Replay((recording,), tuple(map(unanswered, calibrations)), {})):
         console.print(part)
     return console.file.getvalue()
 
@@ -64,6 +65,6 @@ def test_px4_gets_advice_without_parameters():
 def test_file_names_are_not_markup(name):
     recording = Recording(Path(name), "tlog", "ardupilot", 1.0, {}, iter)
     console = Console(file=io.StringIO(), width=80)
-    for part in replay_report(Replay((recording,), (CALIBRATED,), {})):
+    for part in replay_report(Replay((recording,), (unanswered(CALIBRATED),), {})):
         console.print(part)
     assert name in console.file.getvalue()

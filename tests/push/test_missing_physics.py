@@ -1,13 +1,14 @@
-"""What a diagnosis means for a push."""
+"""What a diagnosis means for its calibration: one status, by one set of rules."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from calibrations import calibration
+from calibrations import SIGMAS, calibration
 
-from onboard.core.findings import Diagnosis, Effect, Mismatch, Quantity, Series, Verdict
-from onboard.push.physics import judge_physics
+from onboard.answer import diagnosed, judged
+from onboard.core.findings import Diagnosis, Effect, Mismatch, Plain, Quantity, Series, Verdict
+from onboard.core.result import Status
 
 NAN = float("nan")
 
@@ -25,11 +26,21 @@ def effect(name, parameters=None, **unknowns):
     )
 
 
-def diagnosis(fuller, *effects, verdict=None):
+FOUND = calibration()
+
+
+def plain(sigmas=0.0, number=0, observable=(True,) * 6):
+    """The six without the effects: one scale is so many of its claimed sigmas lower."""
+    value = list(FOUND.scale + FOUND.offset)
+    value[number] -= sigmas * SIGMAS[number]
+    return Plain(tuple(value), SIGMAS, observable)
+
+
+def diagnosis(*effects, without=None, verdict=None, **changes):
     return Diagnosis(
-        imu=fuller.imu,
+        imu=FOUND.imu,
         verdict=verdict or (Verdict.EXPLAINED if effects else Verdict.CLEAN),
-        calibration=fuller,
+        calibration=dataclasses.replace(FOUND, **changes),
         timing={},
         mismatch=Mismatch(False, NAN, NAN, 1.0, NAN, NAN, NAN, NAN),
         effects=effects,
@@ -39,66 +50,99 @@ def diagnosis(fuller, *effects, verdict=None):
         regimes=(),
         series=Series(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=bool)),
         note="",
+        plain=without,
     )
 
 
-PLAIN = calibration()
 ARM = effect("gps_lever_arm", {"GPS1_POS_X": 0.6}, x=0.6, y=0.0, z=0.0)
-
-
-def moved(sigmas, number=0):
-    """The plain calibration with one scale moved by so many claimed sigmas."""
-    scale = list(PLAIN.scale)
-    scale[number] += sigmas * PLAIN.scale_sigma[number]
-    return dataclasses.replace(PLAIN, scale=tuple(scale))
+THROTTLE = effect("throttle_coupling", x=0.3)
 
 
 def test_a_clean_flight_forbids_nothing():
-    found = judge_physics(PLAIN, diagnosis(PLAIN), {})
+    found = judged(diagnosis())
     assert (found.missing, found.modelled) == ("", False)
-    assert found.calibration is PLAIN
+    assert found.calibration == FOUND
 
 
 def test_a_lever_arm_that_moves_a_number_past_its_claim_is_said_and_its_model_offered():
-    fuller = moved(3.8)
-    found = judge_physics(PLAIN, diagnosis(fuller, ARM), {})
+    found = judged(diagnosis(ARM, without=plain(3.8)))
     assert "antenna is 0.6 m away" in found.missing
     assert "GPS1_POS_X 0.60" in found.missing
-    assert "x scale" in found.missing
+    assert "x scale by +0.0038, 3.8 sigma" in found.missing
     assert found.modelled
-    assert found.calibration is fuller
+    assert found.calibration.status is Status.CALIBRATED
+    assert found.calibration.scale == FOUND.scale
+    assert "taken into account beside the six" in found.calibration.note
 
 
 @pytest.mark.parametrize("sigmas", [-1.5, 0.0, 1.5])
-def test_an_effect_within_the_claim_forbids_nothing(sigmas):
-    found = judge_physics(PLAIN, diagnosis(moved(sigmas), ARM), {})
-    assert found.missing == ""
-    assert found.calibration is PLAIN
+@pytest.mark.parametrize("found", [ARM, THROTTLE])
+def test_an_effect_within_the_claim_forbids_nothing(sigmas, found):
+    given = judged(diagnosis(found, without=plain(sigmas)))
+    assert given.missing == ""
+    assert given.calibration == FOUND
 
 
 def test_a_number_that_the_flight_does_not_show_cannot_be_moved():
-    hidden = dataclasses.replace(PLAIN, observable=(False, True, True, True, True, True))
-    assert judge_physics(hidden, diagnosis(moved(50.0), ARM), {}).missing == ""
+    hidden = plain(50.0, observable=(False, True, True, True, True, True))
+    assert judged(diagnosis(ARM, without=hidden)).missing == ""
 
 
 def test_what_every_model_has_forbids_nothing():
     late = effect("gps_latency", {"GPS1_DELAY_MS": 120.0}, delay=0.12)
-    found = judge_physics(PLAIN, diagnosis(moved(5.0), late), {})
+    found = judged(diagnosis(late))
     assert found.missing == ""
-    assert found.effects == ("gps_latency",)
+    assert found.calibration.status is Status.CALIBRATED
+
+
+def test_what_changes_the_meaning_of_a_number_withdraws_it():
+    found = judged(diagnosis(THROTTLE, without=plain(3.0)))
+    assert "the throttle shifts the offset" in found.missing
+    assert not found.modelled
+    assert found.calibration.status is Status.INSUFFICIENT
+
+
+def test_geometry_beside_something_else_withdraws_it():
+    found = judged(diagnosis(ARM, THROTTLE, without=plain(3.0)))
+    assert not found.modelled
+    assert found.calibration.status is Status.INSUFFICIENT
 
 
 @pytest.mark.parametrize("name", ["bias_step", "bias_ramp", "temperature_drift", "saturation"])
-def test_where_no_one_number_holds_none_is_offered(name):
-    found = judge_physics(PLAIN, diagnosis(PLAIN, effect(name, x=0.1)), {})
+def test_where_no_one_number_holds_none_is_called_calibrated(name):
+    found = judged(diagnosis(effect(name, x=0.1), without=plain()))
     assert "mend it" in found.missing
     assert not found.modelled
-    assert found.calibration is PLAIN
+    assert found.calibration.status is Status.INSUFFICIENT
+    assert found.missing in found.calibration.note
 
 
 @pytest.mark.parametrize("verdict", [Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED])
 def test_a_residual_that_is_not_noise_forbids_it(verdict):
     effects = (ARM,) if verdict is Verdict.PARTLY_EXPLAINED else ()
-    found = judge_physics(PLAIN, diagnosis(PLAIN, *effects, verdict=verdict), {})
+    found = judged(diagnosis(*effects, without=plain(9.0), verdict=verdict))
     assert "not noise" in found.missing
     assert not found.modelled
+    assert found.calibration.status is Status.INSUFFICIENT
+
+
+def test_a_flight_that_says_too_little_is_never_calibrated():
+    found = judged(diagnosis(verdict=Verdict.INSUFFICIENT))
+    assert found.calibration.status is Status.INSUFFICIENT
+    assert found.missing == ""
+
+
+@pytest.mark.parametrize("status", [Status.COLLECTING, Status.INVALID])
+def test_what_is_not_calibrated_anyway_keeps_its_status(status):
+    found = judged(diagnosis(effect("bias_step", x=0.1), status=status))
+    assert found.calibration.status is status
+    assert not judged(diagnosis(ARM, without=plain(5.0), status=status)).modelled
+
+
+def test_what_the_daemon_keeps_is_the_answer():
+    given = judged(diagnosis(ARM, without=plain(3.8)))
+    kept = diagnosed(given, {"schema": "onboard.explain/1"})
+    assert (kept.verdict, kept.effects) == ("explained", ("gps_lever_arm",))
+    assert (kept.calibration, kept.missing) == (given.calibration, given.missing)
+    assert (kept.modelled, kept.resumed) == (True, False)
+    assert kept.document == {"schema": "onboard.explain/1"}

@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose
-from onboard.core.settings import EstimatorSettings
-from onboard.explain import LONGEST_FLIGHT_S, explain
+from onboard.explain import explain
 from onboard.mavlink.dialect import MESSAGE_IDS
-from onboard.replay import replay
+from onboard.recorded import Recorded
+from onboard.replay import read
 from sitl.builtin.effects import GpsFault
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly, write_tlog
@@ -45,10 +43,10 @@ def write(tmp_path, frames):
 
 def test_the_second_is_diagnosed_as_if_all_had_been_read(write):
     path = write()
-    everything = Calibrator(EstimatorSettings(refine=False, buffer_s=LONGEST_FLIGHT_S))
-    replay([path], everything)
+    everything = Recorded()
+    read([path], everything)
     assert everything.imus == (1, 2)
-    theirs, ours = diagnose(everything, 2), explain([path], imu=2)
+    theirs, ours = everything.answer(2).diagnosis, explain([path], imu=2)
     assert ours.imu == ours.diagnosis.imu == 2
     assert ours.diagnosis.verdict is theirs.verdict
     np.testing.assert_array_equal(ours.diagnosis.calibration.scale, theirs.calibration.scale)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from html_page import Page
 
-from onboard.chronicle import FREE_S, PAUSE_S, Chronicle
-from onboard.core.calibrator import Calibrator
+from onboard.chronicle import FREE_S, PAUSE_S
 from onboard.core.observability import SIX_NAMES
 from onboard.core.result import Estimate, Status
+from onboard.recorded import Recorded, unanswered
 from onboard.replay import replay
 from onboard.report.replay import replay_html
 from onboard.report.words import seconds
@@ -35,13 +35,13 @@ def flight(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def told(flight):
-    chronicle = Chronicle(Calibrator())
-    return replay([flight], chronicle), chronicle
+    recorded = Recorded(watched=True)
+    return replay([flight], recorded), recorded.chronicle
 
 
 def test_watching_changes_nothing(flight, told):
     result, _ = told
-    plain = replay([flight], Calibrator())
+    plain = replay([flight], Recorded())
     assert plain.calibrations[0].scale == result.calibrations[0].scale
     assert plain.calibrations[0].covariance == result.calibrations[0].covariance
     assert plain.counts == result.counts
@@ -81,8 +81,9 @@ def test_a_second_recording_is_drawn_after_the_first(flight, told, tmp_path):
     once = told[1].duration_s
     again = tmp_path / "again.tlog"
     again.write_bytes(flight.read_bytes())
-    chronicle = Chronicle(Calibrator())
-    replay([flight, again], chronicle)
+    recorded = Recorded(watched=True)
+    replay([flight, again], recorded)
+    chronicle = recorded.chronicle
     figures = chronicle.figures(1)
     assert chronicle.duration_s == pytest.approx(2.0 * once + PAUSE_S, abs=0.1)
     assert figures.course.t[-1] > once + PAUSE_S
@@ -108,8 +109,8 @@ def test_a_recording_without_flight_says_so_and_what_to_fly(tmp_path):
     path = tmp_path / "dull.tlog"
     spec = FlightSpec(vehicle="copter", duration=60.0, imus=(TRUE,), dull=True)
     recording.write_tlog(spec, path)
-    chronicle = Chronicle(Calibrator())
-    page = Page.of(replay_html(replay([path], chronicle), chronicle))
+    recorded = Recorded(watched=True)
+    page = Page.of(replay_html(replay([path], recorded), recorded.chronicle))
     assert "Calibrated" not in page.words.replace("calibrated", "")
     assert "To fly next" in page.words
     assert "The flight does not show enough" in page.words
@@ -130,7 +131,8 @@ def test_what_is_not_known_is_said_in_words(told):
         certificate=None,
         dead_reckoning=None,
     )
-    html = replay_html(replace(result, calibrations=(nothing,)), Chronicle(Calibrator()))
+    unwatched = Recorded(watched=True).chronicle
+    html = replay_html(replace(result, answers=(unanswered(nothing),)), unwatched)
     page = Page.of(html)
     assert not re.search(r"\b(nan|inf)\b", html, re.IGNORECASE)
     assert "no data to draw" in page.words
