@@ -18,6 +18,7 @@ from onboard.document import (
     finite,
     timing_document,
 )
+from onboard.push.physics import headline, severity_of_effect
 
 EXPLAIN_SCHEMA = "onboard.explain/1"
 
@@ -48,9 +49,10 @@ class RivalDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EffectDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """One accepted effect."""
+    """One accepted effect; ``severity`` ``info``: every calibration has it, else ``warning``."""
 
     name: str
+    severity: str
     unknowns: dict[str, UnknownDocument]
     share_of_mismatch: float | None
     delta_bic: float | None
@@ -117,12 +119,18 @@ class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """``onboard explain --json``."""
+    """``onboard explain --json``.
+
+    ``headline`` is the verdict as a sentence; ``severity`` is ``good``, ``info``, ``warning`` or
+    ``error``.
+    """
 
     recording: ExplainedRecording
     calibration: CalibrationDocument
     timing: dict[str, Number]
     verdict: str
+    headline: str
+    severity: str
     note: str
     mismatch: MismatchDocument
     effects: list[EffectDocument]
@@ -146,6 +154,7 @@ def explain_document(
 ) -> ExplainDocument:
     """The document of one diagnosis."""
     m = diagnosis.mismatch
+    sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
     return ExplainDocument(
         recording=ExplainedRecording(
             files=list(files),
@@ -157,6 +166,8 @@ def explain_document(
         calibration=calibration_document(diagnosis.calibration, autopilot),
         timing=timing_document(diagnosis.timing),
         verdict=diagnosis.verdict.value,
+        headline=sentence,
+        severity=severity,
         note=diagnosis.note,
         mismatch=MismatchDocument(
             detected=m.detected,
@@ -193,6 +204,7 @@ def explain_document(
 def _effect(e: Effect, autopilot: str) -> EffectDocument:
     return EffectDocument(
         name=e.name,
+        severity=severity_of_effect(e.name),
         unknowns={
             name: UnknownDocument(value=finite(q.value), sigma=finite(q.sigma), unit=q.unit)
             for name, q in e.unknowns.items()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 import tempfile
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING
 import click
 from rich.console import Console
 
+from onboard.daemon.interrupts import stop_signals
 from onboard.errors import OnboardError
 
 if TYPE_CHECKING:
@@ -33,8 +35,9 @@ SPEEDUP = 12.0
 LANDING_S = 120.0
 FIRST_FLIGHT_S, PROOF_FLIGHT_S = 200.0, 90.0
 POLL_S = 0.25
-PUSH_LIMIT_S = 90.0
-"""Wall-clock seconds for the service to write, after the landing."""
+PATIENCE_S = 400.0
+"""Wall-clock seconds for what follows a flight; on an idle computer it takes ten.  Only ends a
+demonstration that is hopeless."""
 
 
 class DemoError(OnboardError):
@@ -45,18 +48,23 @@ class DemoError(OnboardError):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line asks for; times in simulated seconds."""
+    """What the command line asks for; times in simulated seconds.
+
+    ``stays``: the page is kept when all is done, until somebody ends it.
+    """
 
     duration: float
     port: int
     speedup: float
     seed: int
+    stays: bool
 
 
 EXAMPLES = """\
 \b
 onboard demo
-onboard demo --port 8191     # look at http://127.0.0.1:8191 while it flies
+onboard demo --port 8191     # look at http://127.0.0.1:8191, until Ctrl-C
+onboard demo --once          # end when it is done, on a terminal too
 onboard demo --seed 5 --duration 400 --json result.json
 """
 
@@ -84,21 +92,37 @@ onboard demo --seed 5 --duration 400 --json result.json
     help="Simulated seconds a second.",
 )
 @click.option("--seed", default=SEED, show_default=True, help="Of truth, manoeuvres and noise.")
-def demo(json_file: str | None, duration: float, port: int, speedup: float, seed: int) -> None:
+@click.option(
+    "--once", is_flag=True, help="End when it is done; on a terminal the page stays until Ctrl-C."
+)
+def demo(
+    json_file: str | None,
+    duration: float,
+    port: int,
+    speedup: float,
+    seed: int,
+    *,
+    once: bool,
+) -> None:
     """Fly a simulated autopilot, calibrate it, and fly again to see that it was right.
 
     Two accelerometers are off by some per cent and some tenths of m/s^2.  The service finds
     out by how much while the vehicle flies, writes the parameters after the landing and reads
-    them back; a second flight shows the residual that is left.
+    them back; a second flight shows the residual that is left.  Where a person watches, the
+    page stays until Ctrl-C.
     """
-    from onboard.cli.demo_report import report
-    from onboard.cli.demo_show import Show
-
     logging.getLogger("onboard").addHandler(logging.NullHandler())
     out = Console(stderr=json_file == "-", highlight=False)
-    options = Options(duration, port, speedup, seed)
-    with Show(out, Console(stderr=True, highlight=False)) as show:
-        outcome = asyncio.run(_demonstrate(options, show))
+    options = Options(duration, port, speedup, seed, stays=sys.stdout.isatty() and not once)
+    outcome = asyncio.run(_demonstrate(options, out, json_file))
+    if outcome.shortcomings:
+        raise DemoError("; ".join(outcome.shortcomings))
+
+
+def _tell(outcome: Outcome, out: Console, json_file: str | None) -> None:
+    """The result, for people and for programs."""
+    from onboard.cli.demo_report import report
+
     for part in report(outcome):
         out.print(part)
     if json_file is not None:
@@ -107,19 +131,18 @@ def demo(json_file: str | None, duration: float, port: int, speedup: float, seed
             click.echo(document, nl=False)
         else:
             Path(json_file).write_bytes(document)
-    if outcome.shortcomings:
-        raise DemoError("; ".join(outcome.shortcomings))
 
 
-async def _demonstrate(options: Options, show: Show) -> Outcome:
+async def _demonstrate(options: Options, out: Console, json_file: str | None) -> Outcome:
     from onboard.cli.demo_report import Outcome
+    from onboard.cli.demo_show import Show
     from onboard.daemon import configuration
     from onboard.daemon.service import Service
     from sitl.builtin.process import autopilot_process
     from sitl.builtin.truth import random_imus
 
     imus = random_imus(options.seed, 2)
-    with tempfile.TemporaryDirectory(prefix="onboard-demo-") as folder:
+    with Show(out) as show, tempfile.TemporaryDirectory(prefix="onboard-demo-") as folder:
         show.stage("starting a simulated ArduPilot copter, two accelerometers, clearly off")
         async with autopilot_process(
             VEHICLE,
@@ -141,10 +164,24 @@ async def _demonstrate(options: Options, show: Show) -> Outcome:
             running = asyncio.create_task(service.run(), name="service")
             try:
                 await _first(running, _fly_twice(service, sim_port, options, show))
+                show.end()
+                outcome = Outcome.of(service, imus, options.duration)
+                _tell(outcome, out, json_file)
+                if options.stays and service.server is not None:
+                    await _stay(out, service.server.url)
             finally:
                 service.stop()
                 await asyncio.gather(running, return_exceptions=True)
-        return Outcome.of(service, Path(folder) / "journal.jsonl", imus, options.duration)
+        return outcome
+
+
+async def _stay(out: Console, url: str) -> None:
+    """Keep the page for whoever looks, until Ctrl-C."""
+    out.print(f"the status page stays at {url}; Ctrl-C ends it")
+    asked = asyncio.Event()
+    with stop_signals(lambda _: asked.set()):
+        await asked.wait()
+    out.print()
 
 
 async def _fly_twice(service: Service, sim_port: int, options: Options, show: Show) -> None:
@@ -157,7 +194,7 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         if service.server is not None:
             show.stage(f"status page: {service.server.url}")
         show.stage("the service reads the parameters and asks for its message rates")
-        await _until(lambda: bool(service.snapshot().imus), "the first samples", PUSH_LIMIT_S)
+        await _until(lambda: bool(service.snapshot().imus), "the first samples", PATIENCE_S)
         show.stage(f"first flight: {options.duration:.0f} s of random manoeuvres")
         await _flight(station, options.duration, options.speedup)
         show.stage("landed; the service writes when it has been disarmed for 5 s")
@@ -165,15 +202,15 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         await _until(
             lambda: set(service.snapshot().push.can_roll_back) >= wanted,
             "the parameters to be written",
-            PUSH_LIMIT_S,
+            PATIENCE_S,
         )
         show.stage("parameters are written and read back")
         show.stage(f"second flight, {PROOF_FLIGHT_S:.0f} s: is the residual smaller now?")
         await _flight(station, PROOF_FLIGHT_S, options.speedup)
         await _until(
-            lambda: {j.imu for j in service.snapshot().push.judged} >= wanted,
+            lambda: {w.imu for w in service.snapshot().push.written if w.verdict} >= wanted,
             "the verdict on the second flight",
-            PUSH_LIMIT_S,
+            PATIENCE_S,
         )
         show.stage("done")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import RenderableType
@@ -14,12 +13,10 @@ from rich.text import Text
 from onboard.core.accelerometer import SixParameters, parameter_names
 from onboard.core.result import Calibration
 from onboard.document import PushedDocument, RecordingDocument, ReplayDocument, imu_document
-from onboard.push.entries import Planned, Purpose, ReadBack
-from onboard.push.journal import Journal
 
 if TYPE_CHECKING:
     from onboard.daemon.service import Service
-    from onboard.daemon.snapshot import JudgedView
+    from onboard.daemon.snapshot import WrittenView
     from sitl.builtin.truth import ImuTruth
 
 SCALE_LIMIT, OFFSET_LIMIT = 0.01, 0.05
@@ -30,19 +27,16 @@ READ_BACK_LIMIT = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The end of a demonstration.  Keys are accelerometers."""
+    """The end of a demonstration.  Keys are accelerometers; ``written`` is the first push."""
 
     truth: Mapping[int, SixParameters]
     calibrations: Mapping[int, Calibration]
-    pushed: Mapping[int, tuple[PushedDocument, ...]]
-    judged: Mapping[int, JudgedView]
+    written: Mapping[int, WrittenView]
     duration: float
 
     @classmethod
-    def of(
-        cls, service: Service, journal: Path, imus: Sequence[ImuTruth], duration: float
-    ) -> Outcome:
-        """Collects it from the service, which has ended, and its journal."""
+    def of(cls, service: Service, imus: Sequence[ImuTruth], duration: float) -> Outcome:
+        """Collects it from the service, which goes on."""
         truth = {
             number: SixParameters(scale=imu.scale, offset=imu.offset)
             for number, imu in enumerate(imus, start=1)
@@ -51,8 +45,7 @@ class Outcome:
         return cls(
             truth=truth,
             calibrations={} if learned is None else learned.calibrations,
-            pushed=_pushed(journal),
-            judged={view.imu: view for view in service.snapshot().push.judged},
+            written={w.imu: w for w in reversed(service.snapshot().push.written)},
             duration=duration,
         )
 
@@ -62,7 +55,7 @@ class Outcome:
         return tuple(s for imu in self.truth for s in self._shortcomings(imu))
 
     def _shortcomings(self, imu: int) -> Iterator[str]:
-        calibration, judged = self.calibrations.get(imu), self.judged.get(imu)
+        calibration, written = self.calibrations.get(imu), self.written.get(imu)
         if calibration is None:
             yield f"IMU {imu} was not calibrated"
             return
@@ -71,13 +64,13 @@ class Outcome:
                 yield f"{name} is off by {error:.4f}, more than {limit}"
             if abs(error) > SIGMAS * sigma:
                 yield f"{name} is off by {abs(error) / sigma:.1f} sigma"
-        pushed = self.pushed.get(imu, ())
+        pushed = _pushed(written)
         if {p.name for p in pushed} != set(parameter_names(imu).six):
             yield f"IMU {imu}: not all six parameters were pushed"
         for p in pushed:
             if p.read_back is None or abs(p.read_back - p.wanted) > READ_BACK_LIMIT:
                 yield f"{p.name} reads back {p.read_back}, wanted {p.wanted}"
-        before, after = _residuals(judged)
+        before, after = _residuals(written)
         if before is None or after is None or after >= before:
             yield f"IMU {imu}: the residual has not fallen"
 
@@ -89,7 +82,7 @@ class Outcome:
                 files=[], autopilot="ardupilot", duration_s=self.duration, samples=samples
             ),
             imus=[
-                imu_document(c, truth=self.truth[imu], pushed=self.pushed.get(imu, ()))
+                imu_document(c, truth=self.truth[imu], pushed=_pushed(self.written.get(imu)))
                 for imu, c in self.calibrations.items()
                 if imu in self.truth
             ],
@@ -104,7 +97,7 @@ def report(outcome: Outcome) -> Iterator[RenderableType]:
             continue
         yield Text()
         yield _table(outcome, imu, calibration)
-        before, after = _residuals(outcome.judged.get(imu))
+        before, after = _residuals(outcome.written.get(imu))
         if before is not None and after is not None:
             yield Text(
                 f"velocity residual: {before:.3f} m/s with the old parameters, "
@@ -125,7 +118,7 @@ def _table(outcome: Outcome, imu: int, calibration: Calibration) -> Table:
     truth = outcome.truth[imu].as_vector()
     estimate = calibration.scale + calibration.offset
     sigma = calibration.scale_sigma + calibration.offset_sigma
-    pushed = {p.name: p for p in outcome.pushed.get(imu, ())}
+    pushed = {p.name: p for p in _pushed(outcome.written.get(imu))}
     for i, name in enumerate(parameter_names(imu).six):
         p = pushed.get(name)
         numbers = (
@@ -152,35 +145,16 @@ def _errors(
         yield name, x - float(t), s, limit
 
 
-def _residuals(judged: JudgedView | None) -> tuple[float | None, float | None]:
+def _residuals(written: WrittenView | None) -> tuple[float | None, float | None]:
     """Velocity residual with the parameters in force, first flight and second, m/s."""
-    if judged is None:
+    if written is None:
         return None, None
-    return judged.velocity_rms_before_push_m_s, judged.velocity_rms_after_push_m_s
+    return written.velocity_rms_before_m_s, written.next_velocity_rms_m_s
 
 
-def _pushed(journal: Path) -> dict[int, tuple[PushedDocument, ...]]:
-    """The first push of each accelerometer, from the service's own journal."""
-    plans: dict[str, Planned] = {}
-    read: dict[tuple[str, str], float] = {}
-    with Journal(journal) as kept:
-        for _, entry in kept.entries:
-            if isinstance(entry, Planned) and entry.purpose is Purpose.PUSH:
-                plans[entry.transaction] = entry
-            elif isinstance(entry, ReadBack):
-                read[entry.transaction, entry.name] = entry.value
-    found: dict[int, tuple[PushedDocument, ...]] = {}
-    for transaction, planned in plans.items():
-        found.setdefault(
-            planned.plan.imu,
-            tuple(
-                PushedDocument(
-                    name=change.name,
-                    before=change.before,
-                    wanted=change.wanted,
-                    read_back=read.get((transaction, change.name)),
-                )
-                for change in planned.plan.changes
-            ),
-        )
-    return found
+def _pushed(written: WrittenView | None) -> tuple[PushedDocument, ...]:
+    """What was written to one accelerometer, and read back."""
+    return tuple(
+        PushedDocument(name=v.name, before=v.before, wanted=v.written, read_back=v.read_back)
+        for v in (() if written is None else written.values)
+    )

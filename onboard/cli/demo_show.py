@@ -1,4 +1,7 @@
-"""What the demonstration shows while it runs: stages as lines, progress below them."""
+"""What the demonstration shows while it runs: stages as lines, progress below them.
+
+One console owns the terminal: a panel that another one draws would be written over by the lines.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from onboard.cli.panel import STYLES
 from onboard.core.result import SIX_NAMES
 
 if TYPE_CHECKING:
@@ -19,20 +23,17 @@ if TYPE_CHECKING:
     from sitl.station import Station
 
 REFRESH_HZ = 4.0
-STATUS_STYLE = {"calibrated": "bold green", "collecting": "yellow", "insufficient": "yellow"}
 
 
 class Show:
-    """Lines for the stages; on a terminal also a panel that lives.
+    """Lines for the stages; on a terminal also a panel that lives, below them.
 
     Args:
-        out: where the stages go.
-        live: where the panel goes, if that is a terminal.
+        console: where all of it goes.
     """
 
-    def __init__(self, out: Console, live: Console) -> None:
-        self._out = out
-        self._console = live
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._live: Live | None = None
         self._service: Service | None = None
         self._station: Station | None = None
@@ -55,8 +56,13 @@ class Show:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """The panel goes; the lines stay."""
         if self._live is not None:
             self._live.stop()
+            self._live = None
 
     def watch(self, service: Service, station: Station) -> None:
         """Shows these from now on."""
@@ -66,7 +72,7 @@ class Show:
     def stage(self, sentence: str) -> None:
         """Says what comes next."""
         clock = "" if self._station is None else f"{self._station.time:6.0f} s  "
-        self._out.print(Text(f"{clock:>10}{sentence}"))
+        self._console.print(Text(f"{clock:>10}{sentence}"))
 
     def _panel(self) -> RenderableType:
         with self._lock:
@@ -77,22 +83,24 @@ class Show:
         state = "armed" if station.armed else "disarmed"
         trust = "GPS trusted" if snapshot.trust.open else "GPS not trusted"
         head = Text(f"{station.time:8.0f} s  {state}, {trust}", style="bold")
-        return Group(head, *(_imu(view) for view in snapshot.imus))
+        return Group(Text(), head, *(_imu(view) for view in snapshot.imus))
 
 
 def _imu(view: ImuView) -> RenderableType:
-    """One line of estimates, with sigmas under them."""
+    """Its state, estimates, and sigmas under them."""
+    head = Text(f"IMU {view.imu}: ", no_wrap=True, overflow="ellipsis")
+    head.append(view.state.title, style=STYLES.get(view.state.severity, "default"))
+    head.append(f", {view.coverage.percent:.0f} % covered")
     table = Table(box=None, padding=(0, 1), show_edge=False)
-    table.add_column(f"IMU {view.imu}", width=12)
+    table.add_column("", width=8)
     for name in SIX_NAMES:
         table.add_column(name, justify="right", width=9)
     c = view.calibration
     numbers = c.scale + c.offset
     sigmas = c.scale_sigma + c.offset_sigma
-    style = STATUS_STYLE.get(view.status, "red")
-    table.add_row(Text(view.status, style=style), *(_number(x, "{:.4f}") for x in numbers))
-    table.add_row(f"{view.coverage.percent:.0f} %", *(_number(x, "±{:.4f}") for x in sigmas))
-    return table
+    table.add_row("estimate", *(_number(x, "{:.4f}") for x in numbers))
+    table.add_row("sigma", *(_number(x, "{:.4f}") for x in sigmas))
+    return Group(head, table)
 
 
 def _number(x: float | None, pattern: str) -> str:

@@ -88,7 +88,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     """What a pilot reads in ten seconds, and then the numbers."""
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
-    yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[d.verdict]}")
+    yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, parameters=result.source.autopilot == "ardupilot")
     if d.verdict is Verdict.INSUFFICIENT:
         return

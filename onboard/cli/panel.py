@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from rich import box
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
@@ -11,10 +12,11 @@ from rich.text import Text
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import SIX_NAMES
-from onboard.daemon.snapshot import ImuView, ProposalView, Snapshot
+from onboard.daemon.snapshot import ImuView, Snapshot, WrittenView
 
 JOURNAL_LINES = 5
-STATUS_STYLE = {"calibrated": "bold green", "collecting": "yellow", "invalid": "bold red"}
+STYLES = {"good": "bold green", "info": "bold", "warning": "bold yellow", "error": "bold red"}
+"""By severity of a state."""
 
 
 def panel(snapshot: Snapshot) -> RenderableType:
@@ -25,27 +27,68 @@ def panel(snapshot: Snapshot) -> RenderableType:
     return Group(*parts)
 
 
+def headline(imu: ImuView, more: str) -> Text:
+    """Who, its state, and something more."""
+    head = Text(f"IMU {imu.imu}: ", style="bold")
+    head.append(imu.state.title, style=STYLES.get(imu.state.severity, "default"))
+    return head.append(f"; {more}" if more else "", style="default")
+
+
+def residual(imu: ImuView, written: WrittenView | None) -> str:
+    """Velocity residual: what the last push has brought, else what a push would bring."""
+    before, after = imu.velocity_rms_before_m_s, imu.velocity_rms_after_m_s
+    what = "residual"
+    if written is not None and written.velocity_rms_before_m_s is not None:
+        before, what = written.velocity_rms_before_m_s, "residual by what was written"
+        after = written.next_velocity_rms_m_s or written.velocity_rms_after_m_s
+    if before is None or after is None:
+        return ""
+    return f"{what} {before:.2f} -> {after:.2f} m/s"
+
+
+def last_push(snapshot: Snapshot, imu: int) -> WrittenView | None:
+    """The push of an accelerometer that is in force."""
+    return next((w for w in snapshot.push.written if w.imu == imu and w.in_force), None)
+
+
+def who(snapshot: Snapshot) -> str:
+    """The autopilot and its state."""
+    link = snapshot.link
+    flags = [
+        {True: "armed", False: "disarmed", None: "arming unknown"}[link.armed],
+        *({True: ["landed"], False: ["in the air"], None: []}[link.landed]),
+    ]
+    return f"{link.autopilot} {link.vehicle}, system {link.system_id}, {link.state}, " + (
+        ", ".join(flags)
+    )
+
+
+def gps(snapshot: Snapshot) -> Text:
+    """Whether GPS is trusted, and why not."""
+    trust = snapshot.trust
+    text = Text("GPS ", style="bold")
+    if trust.open:
+        text.append("trusted", style="green")
+    else:
+        why = ", ".join(trust.reasons) or trust.reason or "nothing heard yet"
+        text.append(f"not trusted: {why}", style="yellow")
+    return text.append(f"; {duration(trust.trusted_s)} used so far", style="default")
+
+
 def _head(snapshot: Snapshot) -> Table:
-    link, trust = snapshot.link, snapshot.trust
+    link = snapshot.link
     table = Table.grid(padding=(0, 1))
     table.add_column(style="bold", width=9)
     table.add_column(max_width=70)
     table.add_row(
-        "onboard", f"{snapshot.version}, {snapshot.phase}, up {_duration(snapshot.uptime_s)}"
+        "onboard", f"{snapshot.version}, {snapshot.phase}, up {duration(snapshot.uptime_s)}"
     )
+    said = who(snapshot)
     if link.system_id is None:
-        who = f"{link.state}: " + ", ".join(
+        said = f"{link.state}: " + ", ".join(
             f"{e.endpoint} ({e.reason or e.state})" for e in link.endpoints
         )
-    else:
-        flags = [
-            {True: "armed", False: "disarmed", None: "arming unknown"}[link.armed],
-            *({True: ["landed"], False: ["in the air"], None: []}[link.landed]),
-        ]
-        who = f"{link.autopilot} {link.vehicle}, system {link.system_id}, {link.state}, " + (
-            ", ".join(flags)
-        )
-    table.add_row("autopilot", escape(who))
+    table.add_row("autopilot", escape(said))
     if snapshot.mode != "active":
         table.add_row("mode", Text(f"{snapshot.mode}: {snapshot.mode_reason}", style="yellow"))
     rates = [
@@ -56,12 +99,7 @@ def _head(snapshot: Snapshot) -> Table:
         and rate.count
     ]
     table.add_row("messages", ", ".join(rates) or "none yet")
-    gps = Text("trusted", style="green")
-    if not trust.open:
-        why = ", ".join(trust.reasons) or trust.reason or "nothing heard yet"
-        gps = Text(f"not trusted: {why}", style="yellow")
-    gps.append(f"; {_duration(trust.trusted_s)} used so far", style="default")
-    table.add_row("GPS", gps)
+    table.add_row("GPS", gps(snapshot)[4:])
     return table
 
 
@@ -84,38 +122,63 @@ def _imu(snapshot: Snapshot, imu: ImuView) -> RenderableType:
     for i, name in enumerate(names):
         table.add_row(
             name,
-            _decimal(in_force[i]) if imu.parameters_known else "?",
-            _decimal(values[i]),
-            _decimal(sigmas[i]),
+            decimal(in_force[i]) if imu.parameters_known else "?",
+            decimal(values[i]),
+            decimal(sigmas[i]),
             f"{imu.coverage.per_parameter.get(SIX_NAMES[i], 0.0):.0f} %",
             "" if c.observable[i] else "not seen yet",
         )
-    head = Text(f"\nIMU {imu.imu}: ", style="bold")
-    head.append(imu.status, style=STATUS_STYLE.get(imu.status, "default"))
-    head.append(f", coverage {imu.coverage.percent:.0f} %", style="default")
-    residual = (imu.velocity_rms_before_m_s, imu.velocity_rms_after_m_s)
-    if residual[0] is not None and residual[1] is not None:
-        head.append(f", residual {residual[0]:.2f} -> {residual[1]:.2f} m/s", style="default")
-    parts: list[RenderableType] = [head, table]
-    if imu.coverage.advice and imu.status != "calibrated":
-        parts.append(Text(f" next: {imu.coverage.advice}"))
-    if c.note:
-        parts.append(Text(f" {c.note}", style="dim"))
-    proposal = next((p for p in snapshot.push.proposals if p.imu == imu.imu), None)
-    if proposal is not None and "not_calibrated" not in proposal.held_back:
-        parts.append(_proposal(proposal))
+    share = f"coverage {imu.coverage.percent:.0f} %"
+    parts: list[RenderableType] = [Text(), headline(imu, share), Text(f" {imu.state.sentence}")]
+    if imu.state.next:
+        parts.append(Text(f" next: {imu.state.next}"))
+    reasons = _held_back(snapshot, imu.imu)
+    if len(reasons) > 1:
+        parts.append(Text(f" not written now: {'; '.join(reasons)}"))
+    parts.append(table)
+    if change := residual(imu, None):
+        parts.append(Text(f" {change} (parameters in force -> estimate)"))
+    written = last_push(snapshot, imu.imu)
+    if written is not None:
+        parts.append(_written(written))
     return Group(*parts)
 
 
-def _proposal(proposal: ProposalView) -> Text:
-    if "nothing_to_change" in proposal.held_back:
-        return Text(" the autopilot has these values: nothing to write", style="green")
-    changed = sum(change.before != change.after for change in proposal.changes)
-    text = Text(f" push of {changed} values ", style="bold")
-    if not proposal.held_back:
-        return text.append("is about to be made", style="green")
-    text.append("waits: ", style="yellow")
-    return text.append("; ".join(proposal.held_back.values()), style="default")
+def _held_back(snapshot: Snapshot, imu: int) -> list[str]:
+    """Every reason why its values are not written now."""
+    return [why for p in snapshot.push.proposals if p.imu == imu for why in p.held_back.values()]
+
+
+def _written(written: WrittenView) -> RenderableType:
+    """What the last push has changed, and what it has brought."""
+    parts: list[RenderableType] = [Text(f" written {_moment(written.at)}:"), changes(written)]
+    rows = (
+        ("velocity residual", written.velocity_rms_before_m_s, written.velocity_rms_after_m_s),
+        ("held-out residual", written.held_out_before, written.held_out_after),
+    )
+    for what, before, after in rows:
+        if before is not None and after is not None:
+            unit = " m/s" if what.startswith("velocity") else " (1 is noise)"
+            parts.append(Text(f" {what} {before:.3g} before, {after:.3g} with these{unit}"))
+    if written.verdict is None:
+        parts.append(Text(" the next flight has not judged it yet", style="dim"))
+    else:
+        seen = written.next_velocity_rms_m_s
+        found = "" if seen is None else f"; velocity residual {seen:.3g} m/s"
+        parts.append(Text(f" the flight after it: {written.verdict_sentence}{found}"))
+    return Group(*parts)
+
+
+def changes(written: WrittenView, *, back: bool = False) -> Table:
+    """Old and new values of a push; ``back``: of the way back."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    headings = ("in force", "to be written") if back else ("before", "written")
+    for name in ("parameter", *headings):
+        table.add_column(name, justify="left" if name == "parameter" else "right", no_wrap=True)
+    for value in written.values:
+        pair = (value.before, value.written)
+        table.add_row(value.name, *(f"{v:.5f}" for v in (reversed(pair) if back else pair)))
+    return table
 
 
 def _push(snapshot: Snapshot) -> RenderableType:
@@ -127,18 +190,26 @@ def _push(snapshot: Snapshot) -> RenderableType:
     if push.last_outcome:
         text.append(f"\n last: {push.last_outcome}", style="default")
     lines: list[RenderableType] = [text]
-    lines += [
-        Text(f" {time.strftime('%H:%M:%S', time.localtime(line.at))}  {line.text}", style="dim")
-        for line in snapshot.journal[-JOURNAL_LINES:]
-    ]
+    lines += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]
     return Group(*lines)
 
 
-def _decimal(value: float | None) -> str:
+def when(at: float, text: str) -> Text:
+    """A line of the journal."""
+    return Text(f" {time.strftime('%H:%M:%S', time.localtime(at))}  {text}", style="dim")
+
+
+def _moment(at: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
+
+
+def decimal(value: float | None) -> str:
+    """One of the six numbers."""
     return "?" if value is None else f"{value:.5f}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """As people say it."""
     minutes, s = divmod(int(seconds), 60)
     hours, m = divmod(minutes, 60)
     if hours:

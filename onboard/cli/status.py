@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,8 @@ import click
 from onboard.errors import LinkError, RefusedError, UsageError
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from onboard.daemon.snapshot import Snapshot
 
 TIMEOUT_S = 10.0
@@ -126,7 +129,7 @@ def _where(command: Callable[..., Any]) -> Callable[..., Any]:
 EXAMPLES = """\
 \b
 onboard status
-onboard status --watch
+onboard status --watch          # as it changes; --full for more than 24 lines
 onboard status --json | jq '.push.proposals[].held_back'
 onboard status --url http://kite.local:8191 --token-file token
 """
@@ -140,10 +143,17 @@ onboard {name} --url http://kite.local:8191 --token-file token
 
 @click.command(epilog=EXAMPLES)
 @_where
-@click.option("--watch", is_flag=True, help="Go on showing it until Ctrl-C.")
+@click.option("--watch", is_flag=True, help="Go on showing it until Ctrl-C; fits 80x24.")
+@click.option("--full", is_flag=True, help="With --watch: everything, for a tall terminal.")
 @click.option("--json", "as_json", is_flag=True, help="The snapshot as JSON.")
 def status(
-    url: str | None, config: str | None, token_file: str | None, *, watch: bool, as_json: bool
+    url: str | None,
+    config: str | None,
+    token_file: str | None,
+    *,
+    watch: bool,
+    full: bool,
+    as_json: bool,
 ) -> None:
     """Show what the running daemon sees, has learned, and would write."""
     client = _client(url, config, token_file)
@@ -152,6 +162,7 @@ def status(
         return
     from rich.console import Console
 
+    from onboard.cli.compact import compact
     from onboard.cli.panel import panel
 
     console = Console(highlight=False)
@@ -160,11 +171,15 @@ def status(
         return
     from rich.live import Live
 
-    with Live(panel(client.snapshot()), console=console, auto_refresh=False) as live:
+    def shown() -> RenderableType:
+        snapshot = client.snapshot()
+        return panel(snapshot) if full else compact(snapshot, console.size.height)
+
+    with Live(shown(), console=console, auto_refresh=False) as live:
         while True:
             time.sleep(WATCH_INTERVAL_S)
             try:
-                live.update(panel(client.snapshot()), refresh=True)
+                live.update(shown(), refresh=True)
             except LinkError as error:  # the daemon restarts: go on watching
                 live.update(str(error), refresh=True)
 
@@ -208,5 +223,36 @@ def approve(
 
 
 reject = _action("reject", "Refuse the proposed parameters.")
-rollback = _action("rollback", "Write back the values that were in force before the last push.")
+
+
+@click.command(epilog=ACTION_EXAMPLES.format(name="rollback"))
+@_where
+@click.option("--yes", is_flag=True, help="Do not ask (nobody is asked without a terminal).")
+@click.argument("imus", nargs=-1, type=click.IntRange(1, 5), metavar="[IMU]...")
+def rollback(
+    url: str | None, config: str | None, token_file: str | None, imus: tuple[int, ...], *, yes: bool
+) -> None:
+    """Write back the values that were in force before the last push.
+
+    Shows both first, and on a terminal asks.
+    """
+    from rich.console import Console
+
+    from onboard.cli.panel import changes
+
+    client = _client(url, config, token_file)
+    console = Console(highlight=False)
+    in_force = [w for w in client.snapshot().push.written if w.in_force]
+    chosen = [w for w in in_force if not imus or w.imu in imus]
+    for written in chosen:
+        console.print(f"IMU {written.imu}: what would be written")
+        console.print(changes(written, back=True))
+    # With several, or none, the daemon refuses in any case.
+    ask = len(chosen) == 1 and sys.stdin.isatty() and not yes
+    if ask and not click.confirm("Write these values?"):
+        click.echo("nothing was written")
+        return
+    click.echo(client.act("rollback", imus))
+
+
 reset = _action("reset", "Forget what was learned; the autopilot is left as it is.")

@@ -55,6 +55,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "window_closed": Line(NOTICE, "", "window", FLAPPING_S),
         "calibrated": Line(NOTICE),
         "invalid": Line(WARNING),
+        "imu_state": Line(NOTICE),
         "advise_only": Line(WARNING, "not ArduPilot, advise-only"),
         "state_refused": Line(WARNING, "saved calibration unusable, starts anew"),
         "push_begins": Line(INFO, "{imu} writing calibration", "push {imu}"),

@@ -22,7 +22,6 @@ from onboard.daemon.parameter_view import (
     parameter_values,
     top_effect,
 )
-from onboard.daemon.proposals import DIAGNOSIS, PEOPLE
 from onboard.daemon.snapshot import Snapshot
 from onboard.errors import OnboardError, RefusedError
 from onboard.mavlink.autopilot import Participant
@@ -83,6 +82,7 @@ class Outlets:
         self._last_denied = ("", 0.0)
         self._finding: tuple[int, str] = (0, "")
         self._approval_needed = False
+        self._states: dict[int, str] = {}
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
         self._publisher: Publisher | None = None
@@ -124,6 +124,7 @@ class Outlets:
         self.history.take(snapshot)
         self._tell_of_physics(snapshot)
         self._tell_of_approval(snapshot)
+        self._tell_of_states(snapshot)
         if self._server is not None:
             self._server.update(self._values(snapshot))
         if self._publisher is not None:
@@ -163,10 +164,7 @@ class Outlets:
             return
         if self._approving:
             raise RefusedError("an approval is under way")
-        if not any(
-            (PEOPLE | DIAGNOSIS) & proposal.held_back.keys()
-            for proposal in self._service.snapshot().push.proposals
-        ):
+        if not any(p.approvable for p in self._service.snapshot().push.proposals):
             raise RefusedError("nothing waits for approval")
         # The station is first told that its 1 has arrived, then that it is done.
         self._approving = True
@@ -194,6 +192,18 @@ class Outlets:
         if needed and not self._approval_needed:
             self._notices.post("approval_needed", "a calibration waits for approval")
         self._approval_needed = needed
+
+    def _tell_of_states(self, snapshot: Snapshot) -> None:
+        """Say on the ground what has become of an accelerometer that will not be written."""
+        if snapshot.link.armed is not False:
+            return
+        for imu in snapshot.imus:
+            state = imu.state
+            if self._states.get(imu.imu) == state.title:
+                continue
+            self._states[imu.imu] = state.title
+            if state.name in {"held_back", "insufficient"}:
+                self._notices.post("imu_state", f"IMU {imu.imu}: {state.title}", warning=True)
 
     # Diagnosis
 

@@ -16,7 +16,7 @@ name               meaning
 ``OBC_WINDOW``     averaging span of the GPS receiver, s
 ``OBC_IMU_DELAY``  how late attitude is stamped against the accelerometer, s
 ``OBC_FINDING``    the physics that is missing most, see :data:`FINDINGS`
-``OBC_n_STAT``     accelerometer n: see :data:`STATUSES`
+``OBC_n_STAT``     state of accelerometer n, see :data:`STATUSES`
 ``OBC_n_COV``      its coverage, percent
 ``OBC_n_SCAL_X``   its scale (Y, Z alike), as ``INS_ACCSCAL_X`` would be
 ``OBC_n_OFFS_X``   its offset, m/s^2, as ``INS_ACCOFFS_X`` would be
@@ -36,6 +36,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from onboard.core.accelerometer import AXES
+from onboard.daemon import state
 from onboard.daemon.snapshot import ImuView, Number, Snapshot, Three
 from onboard.push.physics import IN_EVERY_MODEL
 
@@ -53,8 +54,10 @@ STATES: Final[Mapping[str, int]] = MappingProxyType(
 
 POLICIES: Final = ("never", "landed", "in_flight")
 STATUSES: Final[Mapping[str, int]] = MappingProxyType(
-    {"collecting": 1, "calibrated": 2, "insufficient": 3, "invalid": 4}
+    {name: number for number, name in enumerate(state.NAMES, start=1)}
 )
+"""Numbers of the states of an accelerometer (:mod:`onboard.daemon.state`)."""
+UNFINISHED: Final = frozenset({"collecting", "insufficient", "invalid"})
 REASONS: Final[Mapping[str, int]] = MappingProxyType(
     {
         "spoofed": 1,
@@ -167,15 +170,16 @@ def _state(snapshot: Snapshot) -> str:
         return "no_autopilot"
     if snapshot.push.state not in {"idle", "interrupted"}:
         return "writing"
-    if snapshot.push.approval_needed:
+    names = {imu.state.name for imu in snapshot.imus}
+    if "approval" in names:
         return "approval"
-    if snapshot.imus and all(imu.status == "calibrated" for imu in snapshot.imus):
+    if names and not names & UNFINISHED:
         return "calibrated"
     return "learning" if snapshot.trust.open else "waiting"
 
 
 def _waiting(snapshot: Snapshot) -> int:
-    return sum(proposal.held_back.keys() == {"approval"} for proposal in snapshot.push.proposals)
+    return sum(imu.state.name == "approval" for imu in snapshot.imus)
 
 
 def _timing(snapshot: Snapshot) -> Mapping[str, Number]:
@@ -193,7 +197,7 @@ def _accelerometer(number: int, imu: ImuView | None) -> dict[str, float]:
         ("SO", c.offset_sigma if c else nothing, 4),
     )
     values = {
-        f"OBC_{number}_STAT": float(STATUSES.get(imu.status, 0)) if imu else 0.0,
+        f"OBC_{number}_STAT": float(STATUSES.get(imu.state.name, 0)) if imu else 0.0,
         f"OBC_{number}_COV": float(math.floor(imu.coverage.percent)) if imu else 0.0,
     }
     for row, three, digits in rows:

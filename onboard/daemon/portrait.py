@@ -15,7 +15,8 @@ from onboard.daemon.outlets import Outlets
 from onboard.daemon.parameters import ParameterWatch
 from onboard.daemon.proposals import Proposals
 from onboard.daemon.pusher import Pusher
-from onboard.daemon.snapshot import Snapshot
+from onboard.daemon.snapshot import ImuView, PushView, Snapshot
+from onboard.daemon.state import Circumstances, next_step
 from onboard.daemon.traffic import Traffic
 from onboard.daemon.view import NO_TRUST, finite_values, imu_view, journal_view, link_view
 from onboard.mavlink.link import Link
@@ -23,6 +24,7 @@ from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.streams import Streams
 from onboard.mavlink.timesync import TimeSync
 from onboard.push.journal import Journal
+from onboard.push.policy import VehicleCondition
 
 JOURNAL_SHOWN = 50
 BEHIND_WORTH_SAYING_S = 5.0
@@ -61,6 +63,9 @@ class Portrait:
     ) -> Snapshot:
         """Everything, now; what is given is the service's own."""
         learned = self.learning.learned
+        condition = self.observed.condition(now)
+        push = self.pusher.view()
+        imus = self._imus(push, condition)
         return Snapshot(
             version=__version__,
             time=self.wall_clock(),
@@ -70,18 +75,39 @@ class Portrait:
             mode_reason=mode_reason,
             link=link_view(
                 self.link,
-                condition=self.observed.condition(now),
+                condition=condition,
                 messages=self.traffic.view(self.streams.report()),
                 signed=self.signed,
             ),
             trust=NO_TRUST if learned is None else learned.trust,
-            imus=tuple(imu_view(c) for c in learned.calibrations.values()) if learned else (),
-            push=self.pusher.view(),
+            imus=imus,
+            push=push,
             parameters=finite_values(self.parameters.values),
             journal=journal_view(self.journal.entries[-JOURNAL_SHOWN:]),
             notices=self.notices.kept,
             counters=self._counters(counters),
             diagnosis=self.diagnoses.document,
+            next_step=next_step(imus),
+        )
+
+    def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
+        """What is known of each accelerometer."""
+        learned = self.learning.learned
+        proposals = {proposal.imu: proposal for proposal in push.proposals}
+        values = self.parameters.values
+        flying = condition.armed is not False and condition.landed is not True
+        return tuple(
+            imu_view(
+                calibration,
+                Circumstances(
+                    proposal=proposals.get(imu),
+                    writing=imu == push.active_imu,
+                    written=imu in push.can_roll_back,
+                    flying=flying,
+                ),
+                values,
+            )
+            for imu, calibration in (learned.calibrations.items() if learned else ())
         )
 
     def sentence(self, now: float) -> str:
@@ -91,10 +117,8 @@ class Portrait:
         learned = self.learning.learned
         if learned is None:
             return f"{self.link.state.value}, nothing learned yet"
-        imus = ", ".join(
-            f"IMU {imu} {c.status.value} {c.coverage.percent:.0f} %"
-            for imu, c in learned.calibrations.items()
-        )
+        views = self._imus(self.pusher.view(), self.observed.condition(now))
+        imus = ", ".join(f"IMU {view.imu} {view.state.title}" for view in views)
         trust = "trusted" if learned.trust.open else "not trusted"
         lag = self.learning.behind(now)
         late = f", {lag:.0f} s behind" if lag > BEHIND_WORTH_SAYING_S else ""

@@ -25,6 +25,7 @@ from onboard.core.result import Status
 from onboard.daemon.flight import JudgedFlight
 from onboard.daemon.learner import Learned
 from onboard.daemon.snapshot import ChangeView, ProposalView
+from onboard.daemon.state import landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan, propose
@@ -158,11 +159,11 @@ class Proposals:
         waiting = [
             imu
             for imu, held in chosen.items()
-            if (despite_diagnosis if against[imu] else held.keys() & PEOPLE)
+            if approvable(held) and (despite_diagnosis or not against[imu])
         ]
         if not waiting:
             for imu, names in against.items():
-                if names:
+                if names and approvable(chosen[imu]):
                     why = chosen[imu][min(names)]
                     raise RefusedError(
                         f"IMU {imu}: {why}; `onboard approve {imu} --despite-diagnosis` "
@@ -254,6 +255,7 @@ class Proposals:
                 held_back=dict(proposal.held_back),
                 approved=self.standing(imu).approved is not None,
                 rejected=bool(self.standing(imu).refused),
+                approvable=approvable(proposal.held_back),
             )
             for imu, proposal in self.current.items()
         )
@@ -317,6 +319,15 @@ class Proposals:
         if self.approval and standing.approved is None:
             found["approval"] = "a person has to approve"
         return found
+
+
+def approvable(held_back: Mapping[str, str]) -> bool:
+    """Whether a person's approval would lift one of the reasons, and something would change.
+
+    That this flight is not diagnosed yet, which it will be after the landing, is none of them.
+    """
+    lifted = [n for n in held_back if n in PEOPLE | DIAGNOSIS and not landing_lifts(n, held_back)]
+    return "nothing_to_change" not in held_back and bool(lifted)
 
 
 def named(imus: Sequence[int]) -> str:

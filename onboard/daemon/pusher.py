@@ -24,6 +24,7 @@ from onboard.daemon.notices import Notices
 from onboard.daemon.proposals import Proposals, named
 from onboard.daemon.snapshot import PushView
 from onboard.daemon.witness import Witness
+from onboard.daemon.written import written_view
 from onboard.errors import RefusedError, StateError
 from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
@@ -275,6 +276,7 @@ class Pusher:
             last_outcome=None if self.last_outcome is None else _told(self.last_outcome),
             can_roll_back=tuple(i for i in range(1, 6) if self._last_completed(i)),
             judged=tuple(self._witness.judged.values()),
+            written=written_view(self._journal.entries),
         )
 
     # How

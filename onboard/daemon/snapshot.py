@@ -93,11 +93,38 @@ class CalibrationView(Record, frozen=True, kw_only=True):
     note: str
 
 
+class StateView(Record, frozen=True, kw_only=True):
+    """Where one accelerometer stands: made in :mod:`onboard.daemon.state`, shown as it is.
+
+    ``name`` is for programs, ``title`` a few words, ``sentence`` why, ``next`` what a person
+    should do (empty: nothing).  ``severity``: ``good``, ``info``, ``warning`` or ``error``.
+    """
+
+    name: str
+    title: str
+    sentence: str
+    severity: str
+    next: str = ""
+
+
+class StepView(Record, frozen=True, kw_only=True):
+    """What a person should do next; ``imu``: for which accelerometer, None: for none."""
+
+    imu: int | None
+    text: str
+    severity: str
+
+
 class ImuView(Record, frozen=True, kw_only=True):
-    """One accelerometer; ``None`` where a number is not known (yet)."""
+    """One accelerometer; ``None`` where a number is not known (yet).
+
+    ``in_force_*`` are what the autopilot uses now.  Residuals "before" are with the values in
+    force; None until the flight has been solved with those that were written since.
+    """
 
     imu: int
     status: str
+    state: StateView
     calibration: CalibrationView
     in_force_scale: Three
     in_force_offset: Three
@@ -131,7 +158,8 @@ class ProposalView(Record, frozen=True, kw_only=True):
     """What would be written for one accelerometer.
 
     ``held_back`` is every reason why it is not written now, by name, with a sentence; empty: it
-    is about to be.  ``approved``: a person has allowed it; ``rejected``: has refused it.
+    is about to be.  ``approved``: a person has allowed it; ``rejected``: has refused it;
+    ``approvable``: a person's approval would lift one of the reasons.
     """
 
     imu: int
@@ -139,6 +167,39 @@ class ProposalView(Record, frozen=True, kw_only=True):
     held_back: dict[str, str]
     approved: bool
     rejected: bool
+    approvable: bool = False
+
+
+class WrittenValue(Record, frozen=True, kw_only=True):
+    """One parameter of a push; ``read_back``: what the autopilot said last, None: nothing."""
+
+    name: str
+    before: float
+    written: float
+    read_back: float | None
+
+
+class WrittenView(Record, frozen=True, kw_only=True):
+    """One push that was completed, as the journal has it; ``at`` is Unix time.
+
+    Residuals ``before`` and ``after`` are of the flight that taught the values: with those that
+    were in force then, and with those written.  ``next_*`` are of the flight after it, with the
+    values written; ``verdict`` is what that flight said.  ``in_force``: nothing has been written
+    since, and it was not taken back.
+    """
+
+    imu: int
+    at: float
+    values: tuple[WrittenValue, ...]
+    in_force: bool
+    held_out_before: float | None
+    held_out_after: float | None
+    velocity_rms_before_m_s: float | None
+    velocity_rms_after_m_s: float | None
+    verdict: str | None = None
+    verdict_sentence: str = ""
+    next_held_out: float | None = None
+    next_velocity_rms_m_s: float | None = None
 
 
 class JudgedView(Record, frozen=True, kw_only=True):
@@ -157,7 +218,8 @@ class PushView(Record, frozen=True, kw_only=True):
     """Policy, proposals, the transaction under way and the outcome of the last.
 
     ``approval_needed``: some proposal waits for a person and for nothing else.
-    ``can_roll_back``: accelerometers whose last push is still in force.
+    ``can_roll_back``: accelerometers whose last push is still in force.  ``written``: pushes
+    that were completed, oldest first; of each accelerometer the first and the last few.
     """
 
     policy: str
@@ -169,6 +231,7 @@ class PushView(Record, frozen=True, kw_only=True):
     last_outcome: str | None
     can_roll_back: tuple[int, ...]
     judged: tuple[JudgedView, ...] = ()
+    written: tuple[WrittenView, ...] = ()
 
 
 class JournalLine(Record, frozen=True, kw_only=True):
@@ -208,6 +271,7 @@ class Snapshot(Record, frozen=True, kw_only=True):
     notices: tuple[Notice, ...]
     counters: dict[str, int]
     diagnosis: dict[str, Any] | None = None
+    next_step: StepView | None = None
     schema: str = SCHEMA
 
     def to_json(self) -> bytes:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 from onboard.core.accelerometer import parameter_names
-from onboard.core.result import SIX_NAMES, Calibration, Estimate
+from onboard.core.result import SIX_NAMES, Calibration, Estimate, Six
 from onboard.core.trust import TrustWindow
 from onboard.daemon.snapshot import (
     CalibrationView,
@@ -20,6 +21,7 @@ from onboard.daemon.snapshot import (
     Three,
     TrustView,
 )
+from onboard.daemon.state import ALONE, Circumstances, state_of
 from onboard.mavlink.link import Link
 from onboard.push.entries import (
     Closed,
@@ -34,17 +36,38 @@ from onboard.push.entries import (
 )
 from onboard.push.policy import VehicleCondition
 
+SAME = 1e-6
+"""Parameters are float32."""
 
-def imu_view(calibration: Calibration) -> ImuView:
-    """One accelerometer's answer for people; what is not finite becomes None."""
+
+def imu_view(
+    calibration: Calibration,
+    circumstances: Circumstances = ALONE,
+    parameters: Mapping[str, float] | None = None,
+) -> ImuView:
+    """One accelerometer's answer for people; what is not finite becomes None.
+
+    Args:
+        calibration: the answer; the learner's thread may be busy and it some minutes old.
+        circumstances: proposal, push and flight.
+        parameters: the autopilot's, as read last.  Where they are not those that the answer was
+            compared with, nothing is known yet of the residual with them.
+    """
     c = calibration
     certificate = c.certificate
     drift = c.dead_reckoning
     names = parameter_names(c.imu).six
     values = c.scale + c.offset
+    in_force = _in_force(c, parameters or {})
+    current = in_force == c.in_force_scale + c.in_force_offset
+
+    def before(value: float) -> float | None:
+        return finite(value) if current else None
+
     return ImuView(
         imu=c.imu,
         status=c.status.value,
+        state=state_of(c, circumstances),
         calibration=CalibrationView(
             scale=_three(c.scale),
             offset=_three(c.offset),
@@ -58,17 +81,17 @@ def imu_view(calibration: Calibration) -> ImuView:
             observable=c.observable,
             note=c.note,
         ),
-        in_force_scale=_three(c.in_force_scale),
-        in_force_offset=_three(c.in_force_offset),
+        in_force_scale=_three(in_force[:3]),
+        in_force_offset=_three(in_force[3:]),
         parameters_known=c.parameters_known,
         timing={name: _number(estimate) for name, estimate in c.timing.items()},
         trusted_s=c.trusted_s,
         rejected=c.rejected,
-        whitened_rms_before=finite(c.whitened_rms_before),
+        whitened_rms_before=before(c.whitened_rms_before),
         whitened_rms_after=finite(c.whitened_rms_after),
-        held_out_before=finite(c.held_out_before),
+        held_out_before=before(c.held_out_before),
         held_out_after=finite(c.held_out_after),
-        velocity_rms_before_m_s=finite(c.velocity_rms_before),
+        velocity_rms_before_m_s=before(c.velocity_rms_before),
         velocity_rms_after_m_s=finite(c.velocity_rms_after),
         coverage=CoverageView(
             percent=c.coverage.percent,
@@ -89,12 +112,24 @@ def imu_view(calibration: Calibration) -> ImuView:
         if drift is None
         else {
             "horizon_s": finite(drift.horizon_s),
-            "drift_before_m_s": finite(drift.drift_before),
+            "drift_before_m_s": before(drift.drift_before),
             "drift_after_m_s": finite(drift.drift_after),
             "windows": drift.windows,
         },
         temperature=None if c.temperature is None else _number(c.temperature),
     )
+
+
+def _in_force(c: Calibration, parameters: Mapping[str, float]) -> Six:
+    """The six that the autopilot uses: as read last, else those of the calibration."""
+    known = c.in_force_scale + c.in_force_offset
+    names = parameter_names(c.imu).six
+    if not c.parameters_known or not parameters.keys() >= set(names):
+        return known
+    read = tuple(parameters[name] for name in names)
+    # The autopilot's are float32; the same number is no other value.
+    same = all(abs(a - b) <= SAME for a, b in zip(read, known, strict=True))
+    return known if same else cast("Six", read)
 
 
 def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...]:

@@ -112,11 +112,17 @@ class Closed(Struct, frozen=True, tag="closed"):
 
 
 class Watched(Struct, frozen=True, tag="watched"):
-    """The verdict of the flight after a completed push."""
+    """The verdict of the flight after a completed push.
+
+    ``held_out`` (whitened) and ``velocity_rms`` (m/s) are that flight's residuals with the values
+    that were pushed; None where it was not they that decided.
+    """
 
     transaction: str
     verdict: Verdict
     sentence: str
+    held_out: float | None = None
+    velocity_rms: float | None = None
 
 
 class Found(Struct, frozen=True, tag="found"):

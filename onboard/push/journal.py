@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -68,8 +69,9 @@ class Journal:
         Args:
             path: the file; its directory is made.
             limit_bytes: size from which on old transactions are dropped.
-            keep: closed transactions and diagnoses kept then.  Open ones, and the last completed
-                push of each accelerometer (what a roll-back goes to), are always kept.
+            keep: closed transactions and diagnoses kept then.  Open ones, and of each
+                accelerometer the first completed push (what calibrating was good for) and the
+                last (what a roll-back goes to), are always kept.
         """
         self._path = path
         self._limit = limit_bytes
@@ -179,6 +181,17 @@ class Journal:
     def _plans(self) -> dict[str, Planned]:
         return {e.transaction: e for _, e in self._lines if isinstance(e, Planned)}
 
+    def _first_completed(self) -> Iterable[str]:
+        """The first push of each accelerometer that was completed."""
+        plans = self._plans()
+        first: dict[int, str] = {}
+        for _, entry in self._lines:
+            if isinstance(entry, Closed) and entry.result is Result.COMPLETED:
+                planned = plans.get(entry.transaction)
+                if planned is not None and planned.purpose is Purpose.PUSH:
+                    first.setdefault(planned.plan.imu, entry.transaction)
+        return first.values()
+
     def _open_transactions(self) -> list[str]:
         order: dict[str, None] = {}
         for _, entry in self._lines:
@@ -248,6 +261,7 @@ class Journal:
             last = self.last_completed(imu)
             if last is not None:
                 keep.add(last.transaction)
+        keep.update(self._first_completed())
         said = {e.imu: e.transaction for _, e in self._lines if isinstance(e, Refused)}
         keep.update(said.values())
         closed = [e.transaction for _, e in self._lines if isinstance(e, Closed | Found)]

@@ -5,6 +5,7 @@ Which of these apply to a flight, and what becomes of its calibration, :mod:`onb
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +40,34 @@ WORDS = {
     "gravity": "gravity is not the expected",
     "load_flex": "the mount bends under load",
 }
+
+
+HEADLINES = {
+    "clean": "Nothing is missing beyond the six numbers and the timing.",
+    "explained": "Physics is missing from the model, and it was found.",
+    "partly_explained": "Physics is missing from the model; a part of it was found.",
+    "unexplained": "Something is missing, and nothing known explains it.",
+    "insufficient": "This flight cannot tell.",
+}
+KNOWN_ALREADY = "Nothing is missing: what was found is in every calibration, and worth knowing."
+
+
+def severity_of_effect(name: str) -> str:
+    """``info`` for what every calibration has, ``warning`` for what the six numbers lack."""
+    return "info" if name in IN_EVERY_MODEL else "warning"
+
+
+def headline(verdict: str, effects: Collection[str]) -> tuple[str, str]:
+    """A diagnosis in one sentence, and its severity: good, info, warning or error.
+
+    Args:
+        verdict: a value of :class:`onboard.core.findings.Verdict`.
+        effects: names of what was found.
+    """
+    if verdict == "explained" and all(severity_of_effect(n) == "info" for n in effects):
+        return KNOWN_ALREADY, "info"
+    severity = {"clean": "good", "unexplained": "error"}
+    return HEADLINES[verdict], severity.get(verdict, "warning")
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,12 +86,13 @@ class Baseline:
     """Residuals at the time of the plan, for judging it later; None where not known.
 
     Whitened RMS on held-out segments with the parameters in force and with the estimate,
-    and velocity RMS (m/s) with the parameters in force.
+    and velocity RMS (m/s) likewise.
     """
 
     held_out_before: float | None
     held_out_after: float | None
     velocity_rms_before: float | None
+    velocity_rms_after: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,6 +232,7 @@ def propose(
             _finite(calibration.held_out_before),
             _finite(calibration.held_out_after),
             _finite(calibration.velocity_rms_before),
+            _finite(calibration.velocity_rms_after),
         ),
         contradiction=result.contradiction,
         contradiction_limit=result.limit,

@@ -85,21 +85,31 @@ class PushWatch:
         in_force = np.array(flown.in_force_scale + flown.in_force_offset)
         if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > SAME:
             return self._say(Verdict.SUPERSEDED, "somebody has changed the parameters since")
+        verdict = self._verdict(flown)
+        return None if verdict is None else self._say(*verdict, flown)
+
+    def _verdict(self, flown: Calibration) -> tuple[Verdict, str] | None:
+        """What a flight with the pushed values says; None: nothing that could be judged."""
         worse = self._residual_worse(flown)
+        plan = self._pushed.plan
         old, new = plan.six_before().as_vector(), plan.six_wanted().as_vector()
         preferred = preference(old, new, flown)
         clear = self._settings.evidence
         if preferred is not None and preferred < -clear:
-            sentence = f"the old values fit this flight better (by {-preferred:.3g} in J)"
-            return self._say(Verdict.WORSE, sentence)
+            return (
+                Verdict.WORSE,
+                f"the old values fit this flight better (by {-preferred:.3g} in J)",
+            )
         if worse is None and preferred is None:
             return None
         if worse and (preferred is None or preferred < clear):
-            return self._say(Verdict.WORSE, worse)
+            return Verdict.WORSE, worse
         if worse:
-            sentence = f"{worse}, but the old values would have done worse still on this flight"
-            return self._say(Verdict.KEPT, sentence)
-        return self._say(Verdict.KEPT, "the residual has not grown")
+            return (
+                Verdict.KEPT,
+                f"{worse}, but the old values would have done worse still on this flight",
+            )
+        return Verdict.KEPT, "the residual has not grown"
 
     def _residual_worse(self, flown: Calibration) -> str | None:
         """A sentence if it is worse, empty if it is not, None if it cannot be said."""
@@ -118,8 +128,18 @@ class PushWatch:
             return ""
         return None
 
-    def _say(self, verdict: Verdict, sentence: str) -> Watched:
-        return Watched(self._pushed.transaction, verdict, sentence)
+    def _say(self, verdict: Verdict, sentence: str, flown: Calibration | None = None) -> Watched:
+        return Watched(
+            self._pushed.transaction,
+            verdict,
+            sentence,
+            held_out=None if flown is None else _finite(flown.held_out_before),
+            velocity_rms=None if flown is None else _finite(flown.velocity_rms_before),
+        )
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def preference(old: Array, new: Array, flown: Calibration) -> float | None:

@@ -42,6 +42,7 @@ def explain_html(
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
         headline=verdict.headline(diagnosis),
+        severity=verdict.severity(diagnosis),
         missing=verdict.missing(diagnosis),
         sure=verdict.proof(diagnosis),
         change=verdict.cures(diagnosis, parameters=ours),

@@ -8,18 +8,13 @@ import re
 import numpy as np
 
 from onboard.core.findings import Diagnosis, Effect, Verdict
+from onboard.push import physics
 from onboard.report.parameters import to_set
 from onboard.report.sizes import size_in_words
 from onboard.report.words import capital, effect_title, fixed, number, setting, signed
 
-COLOURS = {
-    Verdict.CLEAN: "green",
-    Verdict.EXPLAINED: "yellow",
-    Verdict.PARTLY_EXPLAINED: "yellow",
-    Verdict.UNEXPLAINED: "red",
-    Verdict.INSUFFICIENT: "red",
-}
-"""For terminals."""
+COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
+"""For terminals, by severity."""
 EXCLUDED = ("gps_fault", "saturation")
 """Effects that are seen in the data themselves, which are then left out of the fit."""
 MOST_NAMED = 2
@@ -53,6 +48,11 @@ def headline(diagnosis: Diagnosis) -> str:
     elif more:
         found.append("one more effect" if more == 1 else f"{more} more effects")
     return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
+
+
+def severity(diagnosis: Diagnosis) -> str:
+    """``good``, ``info``, ``warning`` or ``error``."""
+    return physics.headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])[1]
 
 
 def missing(diagnosis: Diagnosis) -> list[str]:

@@ -18,6 +18,16 @@ function span(plot) {
   return [least - margin, most + margin];
 }
 
+/** Steps between two marks of the time axis, s: those that people count in. */
+const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 180, 300, 600, 1200, 1800, 3600, 7200, 18000, 36000];
+
+/** Marks of a time axis (s) in the unit that makes them whole numbers; the last one names it. */
+export function elapsed(marks) {
+  const whole = (unit) => marks.every((mark) => mark % unit === 0) && marks.at(-1) >= unit;
+  const [unit, name] = whole(3600) ? [3600, "h"] : whole(60) ? [60, "min"] : [1, "s"];
+  return marks.map((mark, at) => `${mark / unit}${at === marks.length - 1 ? ` ${name}` : ""}`);
+}
+
 export class Chart {
   /** Draws into `host`; number `index` of the six. */
   constructor(host, index) {
@@ -55,12 +65,12 @@ export class Chart {
     return {
       width,
       height,
-      padding: [6, 4, 6, 0],
+      padding: [6, 12, 0, 0],
       legend: { show: false },
       cursor: { show: false },
       scales: { x: { time: false }, y: { range: span } },
       axes: [
-        { show: false }, // the legend says how long it is
+        { ...axis, size: 18, space: 34, incrs: STEPS, values: (_, marks) => elapsed(marks), grid: { stroke: line, width: 1 } },
         { ...axis, size: 44, space: 28, grid: { stroke: line, width: 1 } },
       ],
       series: [

@@ -1,7 +1,7 @@
 // The diagnosis in words: what physics is missing, how sure, what cures it, what it holds back.
 
 import { byId, h, renew } from "./dom.js";
-import { brief, capital, effectInWords, measured, plain, unitInWords, verdictInWords } from "./words.js";
+import { brief, capital, effectInWords, measured, plain, toneOf, unitInWords } from "./words.js";
 
 export function showDiagnosis(diagnosis, push) {
   const held = (push?.proposals ?? []).filter((p) => p.held_back.physics_missing).map((p) => `IMU ${p.imu}`);
@@ -9,9 +9,9 @@ export function showDiagnosis(diagnosis, push) {
     if (!diagnosis) {
       return [h("p", { class: "soft" }, "None yet. After the flight, ", h("code", { text: "onboard explain" }), " on the recording says what physics is missing beyond the six numbers.")];
     }
-    const [sentence, kind] = verdictInWords(diagnosis.verdict);
     const imu = diagnosis.recording?.imu;
-    const parts = [h("p", { class: kind }, h("strong", { text: sentence }))];
+    const sentence = diagnosis.headline ?? capital(plain(diagnosis.verdict));
+    const parts = [h("p", { class: toneOf(diagnosis.severity ?? "info") }, h("strong", { text: sentence }))];
     const effects = diagnosis.effects ?? [];
     if (effects.length) parts.push(...effects.map(effect));
     if (diagnosis.verdict !== "insufficient") parts.push(...proof(diagnosis.mismatch, effects.length > 0));
@@ -39,7 +39,10 @@ function proof(mismatch, found) {
 }
 
 function effect(found) {
-  const share = typeof found.share_of_mismatch === "number" ? `${Math.round(100 * found.share_of_mismatch)} % of the mismatch` : "";
+  const share = [
+    found.severity === "info" ? "worth knowing, in every calibration" : "",
+    typeof found.share_of_mismatch === "number" ? `${Math.round(100 * found.share_of_mismatch)} % of the mismatch` : "",
+  ].filter(Boolean).join("; ");
   const facts = Object.entries(found.unknowns ?? {}).map(([name, u]) => [plain(name), `${measured(u.value, u.sigma)} ± ${brief(u.sigma, 2)}\u00a0${unitInWords(u.unit)}`]);
   if (found.formula) facts.push(["formula", found.formula]);
   if (found.cure) facts.push(["to do", found.cure]);

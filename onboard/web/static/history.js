@@ -1,6 +1,7 @@
 // What the page remembers of each accelerometer, bounded: a page open for a day does not grow.
 
 const POINTS_MAX = 600;
+const BACK_S = 1; // trusted time that went back by more: the estimates have begun anew
 
 /**
  * Rows of (time, values...) in a fixed budget.  When it is full every second row is dropped and
@@ -14,6 +15,7 @@ export class History {
   }
 
   clear() {
+    this.over = false;
     this.rows = [];
     this.every = 1;
     this.skipped = 0;
@@ -60,13 +62,15 @@ export class History {
 }
 
 /**
- * Histories by accelerometer; each row is trusted seconds, then six values, six sigmas, six in force.
- * They go by trusted time: a vehicle that stands for days adds nothing.
+ * Histories by accelerometer; each row is seconds of trusted flight, then six values, six sigmas, six
+ * in force.  As the service's own (onboard/daemon/history.py), which they begin with: time on
+ * the ground adds nothing, and a curve ends when the flight that replaces it begins.
  */
 export class Remembered {
   constructor() {
     this.byImu = new Map();
     this.trusted = new Map();
+    this.resets = null;
   }
 
   of(imu) {
@@ -79,24 +83,41 @@ export class Remembered {
     for (const { imu, rows } of imus) {
       const history = this.of(imu);
       history.clear();
-      for (const [, trusted, value, sigma, inForce] of rows) history.add([trusted, ...value, ...sigma, ...inForce]);
+      for (const [, flown, value, sigma, inForce] of rows) history.add([flown, ...value, ...sigma, ...inForce]);
     }
   }
 
-  /** Take a snapshot in; what was learned being forgotten begins the history anew. */
+  /** Take a snapshot in. */
   take(snapshot) {
+    const resets = snapshot.counters?.resets ?? 0;
+    if (this.resets !== null && resets !== this.resets) this.byImu.clear();
+    this.resets = resets;
+    const flying = snapshot.link.armed !== false && snapshot.link.landed !== true;
     for (const view of snapshot.imus) {
       const history = this.of(view.imu);
-      if (view.trusted_s + 1 < (this.trusted.get(view.imu) ?? 0)) history.clear();
-      this.trusted.set(view.imu, view.trusted_s);
-      if (view.trusted_s <= 0) continue;
+      const flown = this.advance(history, view, flying);
+      if (flown === null) continue;
       const c = view.calibration;
       history.add([
-        view.trusted_s,
+        flown,
         ...c.scale, ...c.offset,
         ...c.scale_sigma, ...c.offset_sigma,
         ...view.in_force_scale, ...view.in_force_offset,
       ]);
     }
+  }
+
+  /** Where on the axis of trusted flight this moment lies; null: before any flight. */
+  advance(history, view, flying) {
+    let gained = view.trusted_s - (this.trusted.get(view.imu) ?? view.trusted_s);
+    this.trusted.set(view.imu, view.trusted_s);
+    if (gained < -BACK_S) {
+      history.over = true;
+      gained = view.trusted_s;
+    }
+    const last = history.rows.at(-1)?.[0];
+    if (!(flying && gained > 0)) return last === undefined || history.over ? null : last;
+    if (history.over) history.clear();
+    return (history.rows.at(-1)?.[0] ?? 0) + gained;
   }
 }

@@ -2,7 +2,8 @@
 
 import { Chart } from "./charts.js";
 import { byId, h, renew, say } from "./dom.js";
-import { brief, duration, fixed, measured, parameterName, statusInWords } from "./words.js";
+import { brief, duration, fixed, measured, parameterName } from "./words.js";
+import { showWritten } from "./written.js";
 
 const NAMES = ["x scale", "y scale", "z scale", "x offset", "y offset", "z offset"];
 const ENOUGH_PERCENT = 60;
@@ -67,19 +68,20 @@ export class Imus {
     byId("imu-tabs").addEventListener("keydown", (event) => this.step(event));
   }
 
-  show(views) {
+  show(views, push) {
     this.views = views;
+    this.push = push;
     if (!views.some((view) => view.imu === this.chosen)) this.choose(views[0]?.imu ?? null);
-    renew(byId("imu-tabs"), [this.chosen, views.map((v) => [v.imu, v.status])], () => views.map((v) => this.tab(v)));
+    renew(byId("imu-tabs"), [this.chosen, views.map((v) => v.imu)], () => views.map((v) => this.tab(v)));
     const view = this.view;
     byId("imu").hidden = view === undefined;
     byId("residual").hidden = view === undefined;
-    if (view === undefined) return;
+    if (view === undefined) return showWritten(push, null);
     for (const axis of this.axes) axis.show(view);
     const seconds = this.remembered.of(view.imu).seconds;
-    say(byId("axes-span"), seconds > 0 ? `over ${duration(seconds)} of trusted flight` : "");
-    say(byId("imu-note"), view.calibration.note);
+    say(byId("axes-span"), seconds > 0 ? `over ${duration(seconds)} of trusted flight` : "nothing flown yet");
     this.showResidual(view);
+    showWritten(this.push, view.imu);
     this.redraw();
   }
 
@@ -97,10 +99,10 @@ export class Imus {
       "aria-selected": String(chosen),
       "aria-controls": "axes",
       tabindex: chosen ? "0" : "-1",
-      text: `IMU ${view.imu}: ${statusInWords(view.status)[0]}`,
+      text: `IMU ${view.imu}`,
       onclick: () => {
         this.choose(view.imu);
-        this.show(this.views);
+        this.show(this.views, this.push);
       },
     });
   }
@@ -117,7 +119,7 @@ export class Imus {
     if (by === undefined || this.views.length < 2) return;
     const at = this.views.findIndex((view) => view.imu === this.chosen);
     this.choose(this.views[(at + by + this.views.length) % this.views.length].imu);
-    this.show(this.views);
+    this.show(this.views, this.push);
     byId(`tab-${this.chosen}`)?.focus();
     event.preventDefault();
   }
@@ -148,10 +150,10 @@ export class Imus {
         h("div", { class: "scroll" }, h(
           "table",
           { class: "compare" },
-          h("thead", {}, h("tr", {}, h("th", { scope: "col", text: `IMU ${view.imu}` }), h("th", { scope: "col", text: "before" }), h("th", { scope: "col", text: "after" }), h("th", { class: "bars" }, h("span", { class: "soft", text: "" })))),
+          h("thead", {}, h("tr", {}, h("th", { scope: "col", text: `IMU ${view.imu}` }), h("th", { scope: "col", text: "in force" }), h("th", { scope: "col", text: "estimate" }), h("th", { class: "bars" }, h("span", { class: "soft", text: "" })))),
           h("tbody", {}, ...rows.map((row, at) => residualRow(row, shown[at]))),
         )),
-        h("p", { class: "soft", text: "Before: with the parameters in force. After: with the estimate." }),
+        h("p", { class: "soft", text: "Both of what has been flown so far. In force: what the autopilot uses now. Estimate: what is known now." }),
       ];
       if (told) parts.push(h("p", { text: `Certificate: over ${told[1]} s the velocity residual is nowhere above ${told[0]} m/s (seen: ${told[2]} m/s).` }));
       return parts;

@@ -49,11 +49,14 @@ function ratesTable(rates) {
   );
 }
 
+// What has a line of the journal needs no second one, unless it is a warning.
+const isNews = ({ kind, warning }) => warning || !/^(push|roll_back)_|^diagnosed$/.test(kind);
+
 /** Journal and notices in one list, newest first. */
 export function showJournal(journal, notices) {
   const lines = [
     ...journal.map((line) => ({ at: line.at, text: line.imu ? `IMU ${line.imu}: ${line.text}` : line.text, kind: "" })),
-    ...notices.map((notice) => ({ at: notice.at, text: notice.text, kind: notice.warning ? "warn" : "" })),
+    ...notices.filter(isNews).map((notice) => ({ at: notice.at, text: notice.text, kind: notice.warning ? "warn" : "" })),
   ].sort((a, b) => b.at - a.at);
   renew(byId("journal-lines"), lines, () =>
     lines.length

@@ -24,7 +24,7 @@ function showSnapshot(snapshot) {
   lastHeard = Date.now() / 1000;
   remembered.take(snapshot);
   showGlance(snapshot);
-  imus.show(snapshot.imus);
+  imus.show(snapshot.imus, snapshot.push);
   push.show(snapshot.push, snapshot.imus);
   showDiagnosis(snapshot.diagnosis, snapshot.push);
   showJournal(snapshot.journal, snapshot.notices);

@@ -1,18 +1,18 @@
 // What will be written, and the three things that a person may say to it.
 
 import { byId, h, renew, say } from "./dom.js";
-import { brief, capital, fixed, passes, plain, policyInWords, whyNot } from "./words.js";
+import { valuesTable } from "./written.js";
+import { brief, capital, fixed, plain, policyInWords } from "./words.js";
 
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
-const PEOPLE = ["approval", "refused"]; // reasons that a person lifts
-const DIAGNOSIS = ["physics_missing", "not_diagnosed"]; // ... by saying so explicitly
+const DIAGNOSIS = ["physics_missing", "not_diagnosed"]; // reasons that a person lifts by saying so explicitly
 
 const QUESTIONS = {
   approve: (imus) => [`Write the new values for ${imus}?`, "They are written as soon as policy and flight state allow, read back, and watched in the next flight."],
   override: (imus, why) => [`Write the new values for ${imus} although the diagnosis is against it?`, `${capital(why)}.`],
   reject: (imus) => [`Reject the new values for ${imus}?`, "Nothing is written until it is approved or what was learned is forgotten."],
-  rollback: (imus) => [`Roll back ${imus}?`, "The values from before the last push are written again."],
+  rollback: (imus) => [`Roll back ${imus}?`, "The values from before the last push are written again:"],
   reset: () => ["Forget what was learned?", "Of all accelerometers: learning begins anew. The autopilot's parameters stay as they are."],
 };
 const LABELS = { approve: "Approve", override: "Approve all the same", reject: "Reject", rollback: "Roll back", reset: "Forget what was learned" };
@@ -42,34 +42,34 @@ export class Push {
     const doing = push.state === "idle" ? "" : ` Now: ${plain(push.state)}${push.active_imu ? `, IMU ${push.active_imu}` : ""}.`;
     const last = push.last_outcome ? ` Last time: ${push.last_outcome}` : "";
     say(byId("push-state"), `Policy: ${policyInWords(push.policy)}${approval}.${doing}${last}`);
-    renew(byId("proposals"), push.proposals, () =>
+    const states = new Map(imus.map(({ imu, state }) => [imu, state]));
+    renew(byId("proposals"), [push.proposals, [...states]], () =>
       push.proposals.length
-        ? push.proposals.map((proposal) => this.proposal(proposal))
+        ? push.proposals.map((proposal) => this.proposal(proposal, states.get(proposal.imu)))
         : [h("p", { class: "soft", text: "Nothing is proposed yet: no accelerometer has an answer that differs from the values in force." })],
     );
-    renew(byId("judged"), push.judged ?? [], () => (push.judged ?? []).map(judged));
     renew(byId("push-all"), [push.can_roll_back, imus.length > 0], () => [
       ...push.can_roll_back.map((imu) => this.button("rollback", [imu], { text: `Roll back IMU ${imu}` })),
       ...(imus.length ? [this.button("reset", [])] : []),
     ]);
   }
 
-  proposal(proposal) {
-    const reasons = Object.entries(proposal.held_back);
-    const waits = reasons.some(([name]) => PEOPLE.includes(name));
+  proposal(proposal, state) {
     const imus = [proposal.imu];
-    if (proposal.held_back.nothing_to_change && !proposal.rejected) return same(proposal);
+    const title = `IMU ${proposal.imu}: ${state?.title ?? "proposed"}`;
+    if (state?.name === "up_to_date") return same(proposal, title, state);
+    const reasons = Object.values(proposal.held_back);
     return h(
       "div",
       { class: "proposal", "data-imu": proposal.imu },
-      h("h3", { text: `IMU ${proposal.imu}: ${heading(proposal)}` }),
+      h("h3", { text: title }),
       changesTable(proposal.changes),
       ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
-      ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map(([name]) => h("li", { text: whyNot(name, proposal.held_back) })))] : []),
+      ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map((text) => h("li", { text })))] : []),
       h(
         "div",
         { class: "row actions" },
-        against(proposal) ? this.button("override", imus) : this.button("approve", imus, { class: waits ? "primary" : "", disabled: !waits }),
+        against(proposal) && proposal.approvable ? this.button("override", imus) : this.button("approve", imus, { class: proposal.approvable ? "primary" : "", disabled: !proposal.approvable }),
         this.button("reject", imus, { disabled: proposal.rejected }),
       ),
     );
@@ -95,9 +95,16 @@ export class Push {
     say(byId("confirm-title"), title);
     say(byId("confirm-text"), text);
     say(byId("confirm-yes"), LABELS[action]);
-    byId("confirm-changes").replaceChildren(...(["approve", "override"].includes(action) && proposal ? [changesTable(proposal.changes)] : []));
+    byId("confirm-changes").replaceChildren(...this.table(action, imus, proposal));
     byId("confirm").showModal();
     byId("confirm-no").focus(); // Enter by mistake changes nothing
+  }
+
+  /** What would be written, old and new, before it is asked for. */
+  table(action, imus, proposal) {
+    if (["approve", "override"].includes(action) && proposal) return [changesTable(proposal.changes)];
+    const written = action === "rollback" && (this.push.written ?? []).find((push) => push.in_force && imus.includes(push.imu));
+    return written ? [valuesTable(written.values, { back: true })] : [];
   }
 
   async send(action, imus) {
@@ -131,27 +138,13 @@ export class Push {
   }
 }
 
-// What becomes of a proposal, by the reason that decides.
-function heading(proposal) {
-  const reasons = Object.keys(proposal.held_back);
-  const others = reasons.filter((name) => !passes(name, proposal.held_back));
-  if (proposal.rejected) return "rejected";
-  if (proposal.held_back.not_calibrated) return "not calibrated yet";
-  if (against(proposal)) return proposal.held_back.physics_missing ? "held back by the diagnosis" : "not diagnosed yet";
-  if (proposal.approved) return others.length ? "approved, but held back" : "approved";
-  if (reasons.length === 0) return "about to be written";
-  if (others.length === 0) return "waits for its moment";
-  if (others.every((name) => PEOPLE.includes(name))) return "waits for your approval";
-  return "held back";
-}
-
 // A proposal that would change nothing: there is nothing to approve.
-function same(proposal) {
+function same(proposal, title, state) {
   return h(
     "div",
     { class: "proposal", "data-imu": proposal.imu },
-    h("h3", { text: `IMU ${proposal.imu}: nothing to change` }),
-    h("p", { class: "soft", text: `The autopilot has these values: ${proposal.held_back.nothing_to_change}.` }),
+    h("h3", { text: title }),
+    h("p", { class: "soft", text: capital(`${state.sentence}.`) }),
     h("details", { "data-key": `same-${proposal.imu}` }, h("summary", { text: "The numbers" }), changesTable(proposal.changes)),
   );
 }
@@ -159,7 +152,7 @@ function same(proposal) {
 // What the diagnosis has against writing a proposal, empty if nothing.
 function against(proposal) {
   const held = proposal?.held_back ?? {};
-  const name = DIAGNOSIS.find((reason) => reason in held && !passes(reason, held));
+  const name = DIAGNOSIS.find((reason) => reason in held);
   return name ? held[name] : "";
 }
 
@@ -184,9 +177,4 @@ function changesTable(changes) {
       )),
     ),
   );
-}
-
-function judged(view) {
-  const numbers = view.held_out_before_push === null ? "" : ` Residual ${brief(view.held_out_before_push)} → ${brief(view.held_out_after_push)}.`;
-  return h("p", { class: view.verdict === "worse" ? "bad" : "", text: `IMU ${view.imu}, flight after the push: ${plain(view.verdict)}: ${view.sentence}.${numbers}` });
 }

@@ -16,12 +16,7 @@ const REASONS = {
   configured_end: "the configured time is over",
   end_of_data: "no more data",
 };
-const STATUS = {
-  collecting: ["collecting", "warn"],
-  calibrated: ["calibrated", "good"],
-  insufficient: ["not enough yet", "warn"],
-  invalid: ["invalid", "bad"],
-};
+const TONES = { good: "good", info: "", warning: "warn", error: "bad" };
 const EFFECTS = {
   gps_latency: "GPS is late",
   gps_smoothing: "GPS averages its velocity",
@@ -45,31 +40,11 @@ const EFFECTS = {
   rotor_drag: "The rotors drag in the wind",
   empirical: "An unnamed dependence on a measured signal",
 };
-const VERDICTS = {
-  clean: ["Nothing is missing beyond the six numbers and the timing.", "good"],
-  explained: ["Physics is missing from the model, and it was found.", "warn"],
-  partly_explained: ["Physics is missing from the model; a part of it was found.", "warn"],
-  unexplained: ["Something is missing, and nothing known explains it.", "bad"],
-  insufficient: ["This flight cannot tell.", "warn"],
-};
 const POLICIES = {
   never: "nothing is ever written",
   landed: "written when landed and disarmed",
   in_flight: "written in flight in bounded steps",
 };
-
-const SOON = ["armed", "disarmed_too_short", "in_air", "diagnosing"];
-
-/** Whether a reason against a push goes away by itself once the vehicle stands disarmed. */
-export function passes(name, heldBack) {
-  // A flight is diagnosed after it has ended.
-  const flying = "armed" in heldBack || "in_air" in heldBack;
-  return SOON.includes(name) || (name === "not_diagnosed" && flying);
-}
-
-/** Why a proposal is not written now, as a sentence. */
-export const whyNot = (name, heldBack) =>
-  name === "not_diagnosed" && passes(name, heldBack) ? "this flight will be diagnosed after the landing" : heldBack[name];
 
 const FIRMWARE = { ardupilot: "ArduPilot", px4: "PX4" };
 
@@ -81,9 +56,9 @@ export const vehicleInWords = ({ autopilot, vehicle, system_id: system }) =>
   `${FIRMWARE[autopilot] ?? autopilot ?? "autopilot"} ${vehicle ?? ""}, system ${system}`;
 
 export const reasonInWords = (name) => REASONS[name] ?? plain(name);
-export const statusInWords = (name) => STATUS[name] ?? [plain(name), "warn"];
+/** How a severity looks. */
+export const toneOf = (severity) => TONES[severity] ?? "warn";
 export const effectInWords = (name) => EFFECTS[name] ?? capital(plain(name));
-export const verdictInWords = (name) => VERDICTS[name] ?? [capital(plain(name)), "warn"];
 /** A unit with raised digits; nothing for a plain number. */
 export const unitInWords = (unit) => (unit === "1" || unit === "-" ? "" : unit.replaceAll("^2", "²").replaceAll("^3", "³"));
 export const policyInWords = (name) => POLICIES[name] ?? plain(name);
@@ -121,6 +96,11 @@ export function duration(seconds) {
 /** Unix time as the clock of whoever reads. */
 export function clockTime(unix) {
   return new Date(unix * 1000).toLocaleTimeString([], { hour12: false });
+}
+
+/** Unix time as day and clock of whoever reads. */
+export function moment(unix) {
+  return new Date(unix * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
 const AXES = ["X", "Y", "Z"];
