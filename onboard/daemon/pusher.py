@@ -21,7 +21,7 @@ import msgspec
 from onboard.daemon.flight import JudgedFlight
 from onboard.daemon.learner import Learned
 from onboard.daemon.notices import Notices
-from onboard.daemon.proposals import Proposals, named
+from onboard.daemon.proposals import WAITING, Proposals, named
 from onboard.daemon.snapshot import PushView
 from onboard.daemon.witness import Witness
 from onboard.daemon.written import written_view
@@ -268,7 +268,8 @@ class Pusher:
             policy=proposals.settings.mode.value,
             approval_required=proposals.approval,
             approval_needed=any(
-                p.held_back.keys() == {"approval"} for p in proposals.current.values()
+                bool(p.held_back) and p.held_back.keys() <= WAITING
+                for p in proposals.current.values()
             ),
             state=state if self._transaction is None else self._transaction.state.value,
             active_imu=None if self._transaction is None else self._transaction.plan.imu,

@@ -127,12 +127,12 @@ def _proposed(
     if lasting.keys() <= BY_CHOICE:
         why = "; ".join(lasting.values())
         return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
-    if lasting.keys() == {"approval"}:
-        if len(held) > 1:
+    if lasting.keys() <= {"approval", "unconfirmed"}:
+        if not held.keys() <= {"approval", "unconfirmed"}:
             then = "after the landing a person has to approve it"
             return _state("calibrated", "calibrated", f"{known}; {then}", GOOD, further)
         todo = "look at the values, then approve or reject them"
-        why = f"{known}; a person has to approve it"
+        why = f"{known}; {lasting.get('unconfirmed', 'a person has to approve it')}"
         return _state("approval", "waits for your approval", why, WARNING, todo)
     rest = [sentence for name, sentence in lasting.items() if name != "approval"]
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"

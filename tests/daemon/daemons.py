@@ -2,11 +2,15 @@
 
 import asyncio
 import math
+import time
 from contextlib import asynccontextmanager
 
 from onboard.core.result import Calibration, Coverage, Status
 from onboard.daemon.configuration import from_mapping
+from onboard.daemon.flight import Judged, JudgedFlight
 from onboard.daemon.service import Service
+from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.entries import Support
 from onboard.push.physics import Diagnosed
 
 
@@ -63,26 +67,46 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
 
 
 def convinced(service, *calibrations, missing="", modelled=False, effects=()):
-    """Have the daemon believe that it has learned these, and what the diagnosis said of them."""
+    """Have the daemon believe that it has learned these from the flight that has just ended."""
     learner = service.learning._learner
     learner._solve = lambda: None
     learner._answers = {c.imu: c for c in calibrations}
-    examiner = learner._examiner
-    examiner.took_off = lambda: None
-    examiner.landed = lambda imus: None
-    examiner.diagnosed = {
-        c.imu: Diagnosed(
-            imu=c.imu,
-            verdict="explained" if effects else "clean",
-            effects=tuple(effects),
-            calibration=c,
-            missing=missing,
-            modelled=modelled,
-            document={
-                "schema": "onboard.explain/1",
-                "verdict": "explained" if effects else "clean",
-                "effects": [{"name": name} for name in effects],
-            },
+    verdict = "explained" if effects else "clean"
+    document = {
+        "schema": "onboard.explain/1",
+        "verdict": verdict,
+        "effects": [{"name": name} for name in effects],
+    }
+    judged = {
+        c.imu: Judged(
+            device_id=2_700_000.0 + c.imu,
+            in_force=tuple(to_float32(x) for x in (*c.in_force_scale, *c.in_force_offset)),
+            diagnosed=Diagnosed(
+                imu=c.imu,
+                verdict=verdict,
+                effects=tuple(effects),
+                calibration=c,
+                missing=missing,
+                modelled=modelled,
+                document=document,
+            ),
         )
         for c in calibrations
     }
+    support = Support("flight", time.time(), learner._examiner.board, 200.0)
+
+    def believe():
+        learner._flight = JudgedFlight(support, judged)
+        learner._answers = {c.imu: c for c in calibrations}
+
+    believe()
+    if learner._identity is not None:
+        return
+    identify = learner.identify
+
+    def first(*args):
+        learner.identify = identify
+        identify(*args)
+        believe()
+
+    learner.identify = first

@@ -35,6 +35,7 @@ class Vehicle(asyncio.DatagramProtocol):
         self.parameters = ardupilot_parameters() if parameters is None else parameters
         self.armed = False
         self.landed = True
+        self.board = "0a0b0c"
         self.boot_ms = 60_000.0
         self.sets = []
         self.heard = []
@@ -102,6 +103,17 @@ class Vehicle(asyncio.DatagramProtocol):
                 self._set(message)
             elif kind == "COMMAND_LONG":
                 self.send(mavlink.MAVLink_command_ack_message(message.command, 0))
+                if message.command == 512 and message.param1 == 148:
+                    self._introduce()
+
+    def _introduce(self):
+        uid2 = list(bytes.fromhex(self.board).ljust(18, b"\0"))
+        eight = [0] * 8
+        self.send(
+            mavlink.MAVLink_autopilot_version_message(
+                0, 0, 0, 0, 0, eight, eight, eight, 0, 0, 0, uid2
+            )
+        )
 
     def _set(self, message):
         if self.mute_after_sets is not None and len(self.sets) >= self.mute_after_sets:

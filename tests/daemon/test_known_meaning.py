@@ -4,7 +4,7 @@ import pytest
 
 from onboard.core.settings import EstimatorSettings
 from onboard.daemon import learning as learning_module
-from onboard.daemon.learner import Learner
+from onboard.daemon.learner import Identity, Learner
 from onboard.daemon.learning import Learning
 from onboard.daemon.notices import Notices
 from onboard.daemon.store import Store
@@ -36,9 +36,12 @@ async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
     now, told = 0.0, False
     learning = Learning(
-        Learner(Store(directory), EstimatorSettings(), clock=lambda: now),
+        Learner(
+            Store(directory), EstimatorSettings(), clock=lambda: now, wall_clock=lambda: now
+        ),
         Notices(lambda: now),
         judging=lambda: False,
+        identity=lambda: Identity(1),
         ready=lambda: told,
         clock=lambda: now,
         wall_clock=lambda: now,

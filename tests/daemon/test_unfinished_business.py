@@ -166,7 +166,9 @@ async def test_a_proposal_outlives_the_service(document, daemon, port):
             diagnosis = service.snapshot().diagnosis
         async with daemon(document) as again:
             await until(lambda: again.snapshot().push.approval_needed)
-            assert again.snapshot().push.proposals == (proposed,)
+            (resumed,) = again.snapshot().push.proposals
+            assert resumed.changes == proposed.changes
+            assert resumed.held_back.keys() == {"approval", "unconfirmed"}
             assert again.snapshot().diagnosis == diagnosis
             found = [line for line in again.snapshot().journal if line.kind == "found"]
             assert len(found) == 1, "it was made once"
@@ -182,7 +184,7 @@ async def test_what_the_diagnosis_forbids_it_forbids_after_a_restart(document, d
             await until(lambda: "physics_missing" in held_back(service))
         async with daemon(document) as again:
             await until(lambda: "physics_missing" in held_back(again))
-            await until(lambda: held_back(again).keys() == {"physics_missing"})
+            await until(lambda: held_back(again).keys() == {"physics_missing", "unconfirmed"})
             assert vehicle.sets == []
 
 
