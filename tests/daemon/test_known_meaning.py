@@ -36,9 +36,7 @@ async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
     now, told = 0.0, False
     learning = Learning(
-        Learner(
-            Store(directory), EstimatorSettings(), clock=lambda: now, wall_clock=lambda: now
-        ),
+        Learner(Store(directory), EstimatorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
         judging=lambda: False,
         identity=lambda: Identity(1),

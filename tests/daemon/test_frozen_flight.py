@@ -1,0 +1,173 @@
+"""A flight is frozen when it ends, and none of its accelerometers is judged before all are."""
+
+from dataclasses import replace
+
+import pytest
+
+from onboard.answer import Answer, diagnosed
+from onboard.core.result import Status
+from onboard.core.samples import ImuSample, ParameterValue, VehicleState
+from onboard.core.settings import EstimatorSettings
+from onboard.daemon import examiner as examiner_module
+from onboard.daemon.learner import Identity, Learner
+from onboard.daemon.store import Store
+from onboard.mavlink.decode import Decoder
+from sitl.builtin.truth import ImuTruth
+from sitl.recording import FlightSpec, fly_messages
+
+BOARD = Identity(1, board="0a0b0c")
+TWO = (ImuTruth(scale=(1.02, 0.985, 1.015)), ImuTruth(offset=(0.2, -0.15, 0.3)))
+SETTINGS = EstimatorSettings(refine=False, buffer_s=60.0)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    decoder, out = Decoder(1, 1), []
+    for _, message in fly_messages(FlightSpec(vehicle="copter", duration=110.0, imus=TWO)):
+        out += decoder.decode(message)
+    told = [s for s in out if isinstance(s, ParameterValue)]
+    return told + [s for s in out if not isinstance(s, ParameterValue)]
+
+
+def learner(directory, there=BOARD):
+    made = Learner(Store(directory), SETTINGS, clock=lambda: 0.0, wall_clock=lambda: 1e9)
+    made.identify(there)
+    return made
+
+
+def until_disarmed(samples):
+    armed = [i for i, s in enumerate(samples) if isinstance(s, VehicleState) and s.armed]
+    return samples[: armed[-1] + 60], samples[armed[-1] + 60 :]
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """What each diagnosis was given, instead of making it."""
+    given = []
+
+    def looked_at(flight, imu, *, latest):
+        assert latest
+        chunks = flight.engine(imu).chunks
+        given.append((imu, chunks[0].fixes.t[0], chunks[-1].fixes.t[-1], flight.flown_s))
+        raise ArithmeticError("only looking")
+
+    monkeypatch.setattr(examiner_module, "answer", looked_at)
+    return given
+
+
+def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, tmp_path, seen):
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    assert one.examine().diagnosing == (1, 2), "none is judged before all are"
+    later = [replace(s, t=s.t + 150.0) for s in flight if s.t is not None]
+    ahead = [s for s in later if not isinstance(s, VehicleState)]
+    one.learn([VehicleState(151.0, True, False), *ahead], judging=False)  # it flies on meanwhile
+    assert one.examine().diagnosing == ()
+    assert [imu for imu, *_ in seen] == [1, 2]
+    assert seen[0][1:] == seen[1][1:]
+
+
+def test_being_armed_on_the_ground_is_no_flight_to_be_judged(flight, tmp_path, seen):
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    while one.examine().diagnosing:
+        pass
+    judged = len(seen)
+    end = max(s.t for s in flight if s.t is not None)
+    last = [s for s in flight if s.t is not None and s.t > end - 10.0]
+    for k in (1, 2, 3):
+        shifted = [replace(s, t=s.t + 10.0 * k) for s in last]
+        armed = [
+            replace(s, armed=k == 2) if isinstance(s, VehicleState) and s.armed is not None else s
+            for s in shifted
+        ]
+        learned = one.learn(armed, judging=False)
+        assert learned.diagnosing == ()
+    assert len(seen) == judged == 2
+
+
+def calibrated(flight, imu):
+    return replace(flight.calibration(imu), status=Status.CALIBRATED)
+
+
+@pytest.fixture
+def believed(monkeypatch):
+    """Diagnoses that find nothing, quickly."""
+
+    class Quick:
+        def __init__(self, flight, imu):
+            self.imu, self.calibration = imu, calibrated(flight, imu)
+            self.verdict = type("V", (), {"value": "clean"})
+            self.effects = ()
+
+    monkeypatch.setattr(
+        examiner_module, "answer", lambda flight, imu, *, latest: Answer(Quick(flight, imu))
+    )
+    monkeypatch.setattr(examiner_module, "diagnosed", lambda given, _: diagnosed(given, {}))
+    monkeypatch.setattr(examiner_module.Examiner, "_document", lambda *_: {})
+
+
+def judge(one):
+    learned = one.examine()
+    while learned.diagnosing:
+        learned = one.examine()
+    return learned
+
+
+def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path, believed):
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    before = judge(one).flight
+    assert before.current
+    assert set(before.imus) == {1, 2}
+    one.save(1e9)
+    two = learner(tmp_path)
+    told = [s for s in flight if isinstance(s, ParameterValue)]
+    two.learn(told, judging=False)
+    armed = [VehicleState(5.0, armed=True), VehicleState(15.0, armed=False)]
+    after = two.learn(armed, judging=False).flight
+    assert after.support == before.support
+    assert not after.current
+    assert {imu: j.diagnosed.calibration for imu, j in after.imus.items()} == {
+        imu: j.diagnosed.calibration for imu, j in before.imus.items()
+    }
+
+
+def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_path, believed):
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    judge(one)
+    one.gap()
+    told = [s for s in flight if isinstance(s, ParameterValue)]
+    one.identify(BOARD, told)
+    assert one.learn((), judging=False).flight.current, "the same board, the same values"
+    one.gap()
+    changed = [replace(s, value=0.5) if s.name == "INS_ACCOFFS_X" else s for s in told]
+    one.identify(BOARD, changed)
+    learned = one.learn(changed, judging=False)
+    assert not learned.flight.current
+    assert learned.trust.trusted_s == 0.0
+
+
+def test_another_board_begins_with_what_was_learned_of_it(flight, tmp_path, believed):
+    other = Identity(1, board="0d0e0f")
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    first = judge(one).flight
+    one.gap()
+    one.identify(other)
+    assert one.learn((), judging=False).flight is None
+    one.gap()
+    one.identify(BOARD)
+    back = one.learn((), judging=False).flight
+    assert back.support == first.support
+    assert not back.current
+
+
+def test_the_stand_is_not_in_the_frozen_flight(flight, tmp_path, seen):
+    one = learner(tmp_path)
+    one.learn(flight, judging=False)
+    one.examine()
+    one.examine()
+    flown = [s.t for s in flight if isinstance(s, ImuSample)]
+    assert seen[0][2] < max(flown) - 10.0, "the recording goes on after the landing"

@@ -1,0 +1,204 @@
+"""What was learned belongs to a board and to values in force: no other gets it unasked.
+
+Device identifiers are no help: they are the same on every board of one model.
+"""
+
+import pytest
+from daemons import calibration, convinced, until
+from standing_vehicle import Vehicle, ardupilot_parameters
+from test_unfinished_business import held_back, in_force, ticks
+
+from onboard.push.entries import Planned
+
+WANTED = calibration()
+ANOTHER = "0d0e0f"
+
+
+async def learned_but_not_written(service, vehicle):
+    """A flight has taught everything; the power goes before it could be written."""
+    vehicle.armed = True
+    convinced(service, WANTED)
+    await until(lambda: held_back(service).keys() == {"armed"})
+    vehicle.armed = False
+
+
+async def settled(service, number=20):
+    await until(lambda: service.learning.identified and service._parameters.complete)
+    await ticks(service, number)
+
+
+def becomes(vehicle, board, **parameters):
+    """Another board of the same model is in its place: other values, the same identifiers."""
+    vehicle.board = board
+    vehicle.parameters = ardupilot_parameters() | parameters
+
+
+async def test_another_board_does_not_get_it_after_a_restart(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            await learned_but_not_written(service, vehicle)
+        becomes(vehicle, ANOTHER, INS_ACCOFFS_X=-0.5)
+        async with daemon(document) as again:
+            await settled(again)
+            assert vehicle.sets == []
+            assert again.snapshot().push.proposals == ()
+
+
+async def test_another_board_does_not_get_it_while_the_daemon_is_on(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await learned_but_not_written(service, vehicle)
+        becomes(vehicle, ANOTHER)
+        vehicle.reboot()
+        await until(lambda: service.counters["autopilot_rebooted"] == 1)
+        await settled(service)
+        assert vehicle.sets == []
+        assert service.snapshot().push.proposals == ()
+
+
+@pytest.mark.parametrize("how", ["restart", "reboot"])
+async def test_a_board_that_does_not_say_which_it_is_waits_for_a_flight(
+    document, daemon, port, how
+):
+    async with Vehicle(port) as vehicle:
+        vehicle.board = ""
+        async with daemon(document) as service:
+            await learned_but_not_written(service, vehicle)
+            if how == "reboot":
+                vehicle.reboot()
+                await until(lambda: service.counters["autopilot_rebooted"] == 1)
+                await settled(service)
+                assert held_back(service).keys() == {"unconfirmed"}
+                assert vehicle.sets == []
+                return
+        async with daemon(document) as again:
+            await settled(again)
+            assert held_back(again).keys() == {"unconfirmed"}
+            assert vehicle.sets == []
+
+
+async def test_the_same_board_after_a_reboot_goes_on(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await learned_but_not_written(service, vehicle)
+        vehicle.reboot()
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+
+
+async def test_the_same_board_after_a_restart_waits_for_a_flight_or_a_person(
+    document, daemon, port
+):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            await learned_but_not_written(service, vehicle)
+        async with daemon(document) as again:
+            await settled(again)
+            assert "no flight has confirmed it" in held_back(again)["unconfirmed"]
+            assert vehicle.sets == []
+            convinced(again, WANTED)  # it has flown
+            await until(lambda: again.snapshot().push.can_roll_back == (1,))
+
+
+async def test_a_person_who_has_read_why_it_waits_may_approve(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            await learned_but_not_written(service, vehicle)
+        async with daemon(document) as again:
+            await settled(again)
+            await again.approve((1,))
+            await until(lambda: again.snapshot().push.can_roll_back == (1,))
+            (planned,) = [e for _, e in again._journal.entries if isinstance(e, Planned)]
+            assert planned.support.approved
+            assert planned.plan.vehicle.board == vehicle.board
+
+
+async def test_a_bench_calibration_while_the_daemon_was_off_stays(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            await learned_but_not_written(service, vehicle)
+        vehicle.parameters["INS_ACCOFFS_X"] = 0.25
+        async with daemon(document) as again:
+            await settled(again)
+            assert "unconfirmed" in held_back(again)
+            assert vehicle.sets == []
+
+
+async def test_values_that_somebody_has_changed_since_the_flight_stay(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await learned_but_not_written(service, vehicle)
+        vehicle.armed = True
+        await until(lambda: held_back(service).keys() == {"armed"})
+        vehicle.set_by_other("INS_ACCOFFS_Y", 0.25)
+        await until(lambda: "unconfirmed" in held_back(service))
+        vehicle.armed = False
+        await until(lambda: held_back(service).keys() == {"unconfirmed"})
+        why = held_back(service)["unconfirmed"]
+        assert "INS_ACCOFFS_Y from 0.06 to 0.25" in why
+        assert vehicle.sets == []
+
+
+@pytest.mark.parametrize("approval", [True, False])
+async def test_what_a_ground_station_sets_during_a_push_stays(document, daemon, port, approval):
+    document["push"]["approval"] = approval
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        if approval:
+            await until(lambda: service.snapshot().push.approval_needed)
+            await service.approve((1,))
+        await until(lambda: len(vehicle.sets) >= 6)
+        vehicle.set_by_other("INS_ACCOFFS_Y", 1.25)
+        await until(lambda: service.snapshot().push.last_outcome is not None)
+        assert "rolled back" in service.snapshot().push.last_outcome
+        service._proposals.standing(1).not_before = 0.0  # the pause of 30 s is over
+        vehicle.sets.clear()
+        await ticks(service, 20)
+        assert vehicle.sets == []
+        assert vehicle.parameters["INS_ACCOFFS_Y"] == 1.25
+        assert "unconfirmed" in held_back(service)
+        await service.approve((1,))  # now that a person has seen both values
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+
+
+async def test_an_approval_is_for_the_old_values_too(document, daemon, port):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.armed = True
+        convinced(service, WANTED)
+        await until(lambda: {"armed", "approval"} <= held_back(service).keys())
+        await service.approve((1,))
+        await until(lambda: held_back(service).keys() == {"armed"})
+        vehicle.set_by_other("INS_ACCSCAL_X", 1.0625)
+        await until(lambda: "approval" in held_back(service))
+        vehicle.armed = False
+        await ticks(service, 20)
+        assert vehicle.sets == []
+
+
+async def test_what_is_written_is_what_was_approved(document, daemon, port):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.armed = True
+        convinced(service, WANTED)
+        await until(lambda: {"armed", "approval"} <= held_back(service).keys())
+        await service.approve((1,))
+        moved = calibration(scale=(1.0205, 0.99, 1.01))  # half a sigma: the approval stands
+        convinced(service, moved)
+        await until(lambda: service.learning.learned.calibrations[1].scale == moved.scale)
+        vehicle.armed = False
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+
+
+async def test_a_push_of_another_board_is_neither_audited_nor_rolled_back_on_this_one(
+    document, daemon, port
+):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        vehicle.sets.clear()
+        six = dict(zip(vehicle.parameters, vehicle.parameters.values(), strict=True))
+        becomes(vehicle, ANOTHER, INS_ACCSCAL_X=six["INS_ACCSCAL_X"])
+        vehicle.reboot()
+        await until(lambda: service.counters["autopilot_rebooted"] == 1)
+        await settled(service)
+        assert vehicle.sets == []
+        assert service.snapshot().push.can_roll_back == ()
