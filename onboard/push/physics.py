@@ -131,7 +131,7 @@ def moved_most(plain: Calibration, fuller: Calibration) -> tuple[str, float, flo
 def _cured(effects: list[Effect]) -> str:
     """What is missing and what to do about it."""
     cures = [
-        f"set {', '.join(f'{n} {v:.2f}' for n, v in e.parameters.items())}"
+        f"set {', '.join(f'{n} {v:.4g}' for n, v in e.parameters.items())}"
         if e.parameters
         else e.cure
         for e in effects

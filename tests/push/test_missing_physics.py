@@ -63,7 +63,7 @@ def test_a_lever_arm_that_moves_a_number_past_its_claim_is_said_and_its_model_of
     fuller = moved(3.8)
     found = judge_physics(PLAIN, diagnosis(fuller, ARM), {})
     assert "antenna is 0.6 m away" in found.missing
-    assert "GPS1_POS_X 0.60" in found.missing
+    assert "set GPS1_POS_X 0.6;" in found.missing
     assert "x scale" in found.missing
     assert found.modelled
     assert found.calibration is fuller
