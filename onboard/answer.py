@@ -161,7 +161,7 @@ def _noted(diagnosis: Diagnosis, said: str) -> Diagnosis:
 def _cured(effects: Sequence[Effect]) -> str:
     """What is missing and what to do about it."""
     cures = [
-        f"set {', '.join(f'{n} {v:.2f}' for n, v in e.parameters.items())}"
+        f"set {', '.join(f'{n} {v:.4g}' for n, v in e.parameters.items())}"
         if e.parameters
         else e.cure
         for e in effects

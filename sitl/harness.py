@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 from sitl.ardupilot.process import ArdupilotProcess, find_binary
@@ -68,6 +68,7 @@ async def simulator(
     seed: int = 1,
     imus: int = 1,
     impairment: Impairment | None = None,
+    parameters: Mapping[str, float] | None = None,
 ) -> AsyncIterator[Simulator]:
     """Starts a simulator and stops it in the end.
 
@@ -78,6 +79,7 @@ async def simulator(
         seed: of manoeuvres and noise.
         imus: accelerometers of the built-in autopilot; ArduPilot SITL has two.
         impairment: of the built-in autopilot's links.
+        parameters: what it is switched on with, beside its defaults.
 
     Raises:
         NoBinaryError: no ArduPilot binary is to be found.
@@ -85,7 +87,8 @@ async def simulator(
     """
     if kind == "builtin":
         hardware = Truth(imus=(ImuTruth(),) * imus, seed=seed)
-        server = Server(Autopilot(vehicle, hardware), speedup=speedup, impairment=impairment)
+        autopilot = Autopilot(vehicle, hardware, parameters=parameters)
+        server = Server(autopilot, speedup=speedup, impairment=impairment)
         port = await server.listen_udp()
         task = asyncio.create_task(server.run(), name="built-in autopilot")
         try:
@@ -97,7 +100,7 @@ async def simulator(
         return
     from sitl.pilot import Pilot  # noqa: PLC0415 - MAVSDK is an extra that only this needs
 
-    process = ArdupilotProcess(vehicle, speedup=speedup)
+    process = ArdupilotProcess(vehicle, speedup=speedup, parameters=parameters)
     try:
         await process.start()
         url = f"tcpout://127.0.0.1:{process.ports[0]}"

@@ -41,7 +41,6 @@ from onboard.core.physics.gains import Gain, ScaleNonlinearity
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
 from onboard.core.report import timing_of
-from onboard.core.samples import Vector3
 from onboard.core.screening import false_fixes, unclipped
 from onboard.core.search import searched
 from onboard.core.selection import Fitter
@@ -88,6 +87,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     origin = Origin(
         t0=first,
         antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
+        trim=calibrator.parameters.trim,
     )
     rail = saturation_effect(flight, origin.t0, imu)
     chunks = flight
@@ -110,16 +110,15 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     if fault is not None:
         full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
     full.doubting_attitude()
-    trim = calibrator.parameters.trim
-    choice = _chosen(full, testable, trim)
+    choice = _chosen(full, testable)
     jumped = _with_jump(full, testable, choice)
     if jumped is not None:
         # Which change of the offset it is must not be decided by an attitude that it has tilted.
         kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
-        other = _chosen(jumped[0].doubting(), jumped[1], trim, kept)
+        other = _chosen(jumped[0].doubting(), jumped[1], kept)
         if _wanders(choice) or _wanders(other):
             full, testable, choice = *jumped, other
-    standing, doubts = _second_thoughts(choice, full, calibrator)
+    standing, doubts = _second_thoughts(choice, full, calibrator, imu)
     families = _families(choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
         families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
@@ -197,7 +196,6 @@ def _wanders(choice: Choice) -> bool:
 def _chosen(
     full: Examination,
     testable: Sequence[EffectColumns],
-    trim: Vector3,
     kept: Sequence[EffectColumns] = (),
 ) -> Choice:
     """Selection on the sums of the whole catalogue; ``kept`` are in it to begin with."""
@@ -218,21 +216,21 @@ def _chosen(
     ]
     index = full.model.index
     errors = [c for name in ATTITUDE_ERRORS for c in STANDING[name]]
-    held = without(errors, index, full.point, full.absent, told=0.0, trim=trim)
+    held = without(errors, index, full.point, full.absent, told=0.0)
     gone = {index[c] for c in errors}
     nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
     return choose(fitter, base, candidates, nothing, [c for c in candidates if c.columns in kept])
 
 
 def _second_thoughts(
-    choice: Choice, full: Examination, calibrator: Calibrator
+    choice: Choice, full: Examination, calibrator: Calibrator, imu: int
 ) -> tuple[set[str], dict[str, list[str]]]:
     """Timing and attitude errors that would be reported must be better than any other cause.
 
     Returns:
         Those that are large enough; of them, those beside which another effect could stand.
     """
-    told, trim = calibrator.parameters.gps_delay_told, calibrator.parameters.trim
+    told = calibrator.parameters.gps_delay_told
     index = choice.fitter.model.index
     standing: Standing = {}
     for _ in range(len(STANDING)):
@@ -241,11 +239,11 @@ def _second_thoughts(
             fit.theta, fit.covariance, choice.fitter.sums.N, choice.fitter.weaken, 1.0, 1.0
         )
         timing = timing_of(full, solution)
-        standing = standing_effects(timing, solution, index, full.point, told, trim)
+        standing = standing_effects(timing, solution, index, full.point, calibrator.parameters, imu)
         taken = False
         for name in standing:
             target = Candidate(name, tuple(index[c] for c in STANDING[name]), ())
-            held = without(STANDING[name], index, full.point, choice.fitter.absent, told, trim)
+            held = without(STANDING[name], index, full.point, choice.fitter.absent, told)
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
             break

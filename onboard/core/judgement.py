@@ -29,6 +29,7 @@ from onboard.core.findings import (
 from onboard.core.laws import law_of
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
+from onboard.core.physics.mount import trim_in_words
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
 from onboard.core.plain import plain_six
@@ -38,7 +39,6 @@ from onboard.core.result import Calibration
 from onboard.core.selection import Fit, Fitter
 from onboard.core.timing_effects import (
     STANDING,
-    TRIM_RAD,
     standing_effects,
     without,
 )
@@ -111,21 +111,24 @@ class Judge:
             self.solution,
             self.index,
             self.engine.point,
-            self.told,
-            self.calibrator.parameters.trim,
+            self.calibrator.parameters,
+            self.imu,
         )
+        # A name has one effect: what stands beside columns of its own is their consequence.
+        named = {f.effect for f in self.families}
         ladder, fits = self._ladder()
         before, after = fits[0], fits[-1]
         effects = [
             self._standing(n, q, cure, p)
             for n, (q, cure, p) in standing.items()
-            if n not in self.doubts and self._holds(n)
+            if n not in self.doubts and n not in named and self._holds(n)
         ]
         effects += [self._effect(f) for f in self.families]
         effects += self.excluded
         insufficient = not self.engine.moving
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, insufficient=insufficient)
+        note = " ".join(x for x in (note, trim_in_words(self.calibrator.parameters)) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
@@ -147,8 +150,7 @@ class Judge:
 
     def _held(self, names: Sequence[str]) -> Array:
         """Unknowns of ``names`` at the value that means *not in the model*."""
-        trim = self.calibrator.parameters.trim
-        return without(names, self.index, self.engine.point, self.engine.absent, self.told, trim)
+        return without(names, self.index, self.engine.point, self.engine.absent, self.told)
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
         """Six numbers only, + timing, + constant attitude errors, + each effect."""
@@ -214,12 +216,8 @@ class Judge:
         With the antenna's place free, or with the antenna where it was told to be: a few
         centimetres of it could do instead on some flights, which is said besides.
         """
-        trim = self.calibrator.parameters.trim
-        # Whoever levelled the autopilot has seen the tilt, too: it needs no margin beyond BIC's.
-        levelled = name == "mount_tilt" and float(np.hypot(*trim[:2])) > TRIM_RAD
-        least = 0.0 if levelled else MARGIN
         every = (self._evidence(name, among) for among in (self.all, self._told_antenna()))
-        return any(bic >= least and held >= HELD_OUT_GAIN for bic, held in every)
+        return any(bic >= MARGIN and held >= HELD_OUT_GAIN for bic, held in every)
 
     def _told_antenna(self) -> list[int]:
         place = self.engine.model.slices.get(AntennaPlace.name, slice(0, 0))
@@ -230,8 +228,7 @@ class Judge:
         choice, full = self.choice, self.choice.fitter.model.index
         target = Candidate(name, tuple(full[c] for c in columns), ())
         rest = [i for i in choice.free if i not in target.index]
-        trim = self.calibrator.parameters.trim
-        held = without(columns, full, self.full_point, choice.fitter.absent, self.told, trim)
+        held = without(columns, full, self.full_point, choice.fitter.absent, self.told)
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(rivals_of(choice.fitter, rest, target, others, held))
 
@@ -249,7 +246,8 @@ class Judge:
             quantities = {"time": Quantity(f.at - self.origin.t0, 0.5, "s"), **quantities}
         values = {k: q.value for k, q in quantities.items()}
         held = self.engine.absent
-        made = self._record(f.effect, quantities, index, held, f.parameters(values), f.cure)
+        cure, parameters = f.advice(values)
+        made = self._record(f.effect, quantities, index, held, parameters, cure)
         made = replace(made, rivals=self._rivals(f))
         if isinstance(f, Product):
             made = replace(made, formula=f.written([q.value for q in quantities.values()]))

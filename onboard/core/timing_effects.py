@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from onboard.core.findings import Quantity
 from onboard.core.linearisation import Linearisation
+from onboard.core.parameters import ParametersInForce
+from onboard.core.physics.mount import attitude_advice
 from onboard.core.result import Estimate
-from onboard.core.samples import Vector3
 from onboard.core.solution import Solution
 
 Array = NDArray[np.float64]
 
 LATENCY_S, WINDOW_S, IMU_DELAY_S = 0.05, 0.15, 0.03
-TRIM_RAD = np.deg2rad(0.5)
 TILT_RAD, HEADING_RAD = np.deg2rad(1.0), np.deg2rad(2.5)
 SURE = 4.0
 EKF_FLOOR = {"tilt_roll": 0.003, "tilt_pitch": 0.006, "heading": 0.005}
@@ -48,14 +48,40 @@ def standing_effects(
     solution: Solution,
     index: Mapping[str, int],
     point: Linearisation,
-    told: float,
-    trim: Vector3,
+    parameters: ParametersInForce,
+    imu: int,
 ) -> Standing:
-    """Timing and constant attitude errors that are large enough and sure enough to report.
+    """Timing and constant attitude errors that are large enough and sure enough to report."""
+    out = _timing(timing, parameters.gps_delay_told)
+    sigma = np.sqrt(np.diag(solution.covariance)).copy()
+    for name, floor in EKF_FLOOR.items():
+        sigma[index[name]] = np.hypot(sigma[index[name]], floor)
+    tilt = [index["tilt_roll"], index["tilt_pitch"]]
+    extra = solution.theta[tilt]
+    # As it is reported: a trim that makes it right again is its cure, whatever was meant by it.
+    reported = extra - np.array(parameters.trim[:2])
+    if min(np.hypot(*extra), np.hypot(*reported)) > TILT_RAD and (
+        float(np.max(np.abs(extra) / sigma[tilt])) > SURE
+    ):
+        out["mount_tilt"] = (
+            {
+                key: Quantity(float(solution.theta[i]), float(sigma[i]), "rad")
+                for key, i in zip(("roll", "pitch"), tilt, strict=True)
+            },
+            *attitude_advice(extra, solution.theta[:6], parameters, imu),
+        )
+    yaw = index["heading"]
+    heading = point.heading + float(solution.theta[yaw])
+    if abs(heading) > HEADING_RAD and abs(heading) > SURE * sigma[yaw]:
+        out["heading_error"] = (
+            {"yaw": Quantity(heading, float(sigma[yaw]), "rad")},
+            "calibrate the compass; check COMPASS_DEC and COMPASS_ORIENT",
+            {},
+        )
+    return out
 
-    The tilt is that of the attitude *as recorded*: AHRS_TRIM, which was taken out of it before,
-    is part of it, and a trim that is set makes half a degree worth mentioning.
-    """
+
+def _timing(timing: Mapping[str, Estimate], told: float) -> Standing:
     out: Standing = {}
     delay = timing["gps_delay_s"]
     if abs(delay.value - told) > LATENCY_S and abs(delay.value - told) > SURE * delay.sigma:
@@ -78,40 +104,6 @@ def standing_effects(
             "look at the stream set-up and at INS_ACCEL_FILTER",
             {},
         )
-    sigma = np.sqrt(np.diag(solution.covariance)).copy()
-    for name, floor in EKF_FLOOR.items():
-        sigma[index[name]] = np.hypot(sigma[index[name]], floor)
-    roll, pitch, yaw = (index[n] for n in ("tilt_roll", "tilt_pitch", "heading"))
-    extra_roll, extra_pitch = float(solution.theta[roll]), float(solution.theta[pitch])
-    extra, known = float(np.hypot(extra_roll, extra_pitch)), float(np.hypot(*trim[:2]))
-    whole = float(np.hypot(extra_roll - trim[0], extra_pitch - trim[1]))
-    sure = max(abs(extra_roll) / sigma[roll], abs(extra_pitch) / sigma[pitch])
-    surely_whole = max(
-        abs(extra_roll - trim[0]) / sigma[roll], abs(extra_pitch - trim[1]) / sigma[pitch]
-    )
-    missing = extra > TILT_RAD and sure > SURE
-    trimmed = known > TRIM_RAD and whole > TRIM_RAD and surely_whole > 3.0
-    if missing or trimmed:
-        cure = "level the autopilot again, or set AHRS_TRIM"
-        if not missing:
-            cure = "none: AHRS_TRIM holds this tilt already and was added back"
-        out["mount_tilt"] = (
-            {
-                "roll": Quantity(extra_roll - trim[0], float(sigma[roll]), "rad"),
-                "pitch": Quantity(extra_pitch - trim[1], float(sigma[pitch]), "rad"),
-            },
-            cure,
-            {"AHRS_TRIM_X": trim[0] - extra_roll, "AHRS_TRIM_Y": trim[1] - extra_pitch}
-            if missing
-            else {"AHRS_TRIM_X": trim[0], "AHRS_TRIM_Y": trim[1]},
-        )
-    heading = point.heading + float(solution.theta[yaw])
-    if abs(heading) > HEADING_RAD and abs(heading) > SURE * sigma[yaw]:
-        out["heading_error"] = (
-            {"yaw": Quantity(heading, float(sigma[yaw]), "rad")},
-            "calibrate the compass; check COMPASS_DEC and COMPASS_ORIENT",
-            {},
-        )
     return out
 
 
@@ -121,20 +113,14 @@ def without(
     point: Linearisation,
     absent: Array,
     told: float,
-    trim: Vector3,
 ) -> Array:
-    """(m,) values at which the unknowns ``names`` are not in the model.
-
-    A tilt is that of the attitude as recorded: without it the trim would not have been taken out.
-    """
+    """(m,) values at which the unknowns ``names`` are not in the model."""
     at = absent.copy()
     taken = {
         "gps_delay": told - point.delay,
         "window_squared": -(point.window**2),
         "attitude_delay": -point.attitude_delay,
         "heading": -point.heading,
-        "tilt_roll": trim[0],
-        "tilt_pitch": trim[1],
     }
     for name in names:
         at[index[name]] = taken.get(name, 0.0)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from onboard.daemon.snapshot import ImuView, Snapshot
+from onboard.outage import Outage
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -149,6 +150,7 @@ class History:
         self._flying = False
         self._resets: int | None = None
         self._dirty = False
+        self._disk = Outage(settle_s=0.0)
         self._next_save = clock() + SAVE_S
 
     def take(self, snapshot: Snapshot) -> None:
@@ -197,7 +199,14 @@ class History:
             temporary.write_bytes(msgspec.msgpack.encode(self._kept))
             temporary.replace(path)
         except OSError as error:
-            logger.warning("%s: %s: charts begin anew after a restart", path, error.strerror)
+            why = error.strerror or str(error)
+            if self._disk.failed(why, self._clock()):
+                logger.warning("%s: %s: charts begin anew after a restart", path, why)
+            return
+        self._disk.works(self._clock())
+        over = self._disk.over(self._clock())
+        if over is not None:
+            logger.info("%s: charts are kept again, after %s", path, over)
 
     def page(self, application: web.Application) -> None:
         """Serve it at ``/api/history``."""

@@ -15,6 +15,7 @@ from onboard.daemon.worker import Worker
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
+from onboard.outage import Outage
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -79,6 +80,7 @@ class Learning:
         self._arrived: float | None = None
         self._taken: float | None = None
         self._behind = False
+        self._disk = Outage(settle_s=0.0)
         self._worker: Worker | None = None
         self._busy_since: float | None = None
         self._closing = False
@@ -182,11 +184,18 @@ class Learning:
 
     async def save(self) -> None:
         """Put the sums on disk; a disk that does not take them is told and tried again."""
+        now = self._clock()
         try:
             await self._call(self._learner.save, self._wall_clock())
         except StateError as error:
             self.counters["save_failed"] += 1
-            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            if self._disk.failed(str(error), now):
+                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            return
+        self._disk.works(now)
+        over = self._disk.over(now)
+        if over is not None:
+            logger.info("what was learned is on the disk again, after %s", over)
 
     def keeps_up(self, now: float) -> bool:
         """Whether the learner is not stuck in a batch."""

@@ -36,6 +36,7 @@ REQUIRED = tuple(
 FIRST = REQUIRED[:7]
 MEANING = (
     "AHRS_ORIENTATION",
+    "AHRS_EKF_TYPE",
     "AHRS_TRIM_X",
     "AHRS_TRIM_Y",
     "AHRS_TRIM_Z",
@@ -50,8 +51,10 @@ KNOWLEDGE = (
     *(f"GPS1_POS_{axis}" for axis in "XYZ"),
     *(f"GPS_POS1_{axis}" for axis in "XYZ"),
     *(f"INS_POS{imu}_{axis}" for imu in IMUS for axis in "XYZ"),
+    "FLIGHT_OPTIONS",
+    "PTCH_TRIM_DEG",
 )
-"""Good to have, in a recording too; under one of two names, by version."""
+"""Good to have, in a recording too; under one of two names, by version; the last two of planes."""
 
 
 class ParameterWatch:

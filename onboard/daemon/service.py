@@ -44,6 +44,8 @@ from onboard.mavlink.autopilot import (
     AutopilotSilent,
     AutopilotState,
     ConnectionChanged,
+    ConnectionRestored,
+    ConnectionTrouble,
     LinkEvent,
 )
 from onboard.mavlink.board import Board
@@ -52,6 +54,7 @@ from onboard.mavlink.dialect import Message
 from onboard.mavlink.link import Link
 from onboard.mavlink.streams import Streams
 from onboard.mavlink.timesync import TimeSync
+from onboard.outage import Outage
 from onboard.push.journal import Journal
 from onboard.push.policy import Mode
 from onboard.web.page import status_page
@@ -100,6 +103,7 @@ class Service:
         self._stopping = asyncio.Event()
         self._learner_task: asyncio.Task[None] | None = None
         self._observed = Observed()
+        self._silence, self._reboots = Outage(), Outage()
         self.notices = Notices(wall_clock)
         link = configuration.link
         endpoints = settings.endpoints(link)
@@ -236,6 +240,7 @@ class Service:
         """Judge, save, tell; the watchdog is fed last, when all that worked."""
         condition = self._observed.condition(now)
         self._traffic.tick(now)
+        self._tell_of_recovery(now)
         self._pusher.judge(self._witness.report(condition, now))
         self.learning.tell_of_lag(now)
         learned = self.learning.learned
@@ -337,18 +342,36 @@ class Service:
                 self.counters["autopilot_silent"] += 1
                 self._observed.forget()
                 self.learning.gap()
-                post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
+                if self._silence.lost("no heartbeat", now):
+                    post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
             case AutopilotReturned():
                 self.learning.gap()
-                post("autopilot_returned", "heartbeats are back")
+                self._silence.works(now)
             case AutopilotRebooted():
                 self.counters["autopilot_rebooted"] += 1
                 self._observed.forget()
                 self.learning.gap()
-                post("autopilot_rebooted", "the autopilot rebooted", warning=True)
+                if self._reboots.lost("rebooted", now):
+                    post("autopilot_rebooted", "the autopilot rebooted", warning=True)
+                self._reboots.works(now)
+            case ConnectionTrouble(endpoint, reason):
+                text = f"{endpoint}: {reason}; tried again until it answers"
+                post("connection_lost", text, warning=True)
+            case ConnectionRestored(endpoint, over):
+                post("connection_back", f"{endpoint}: back after {over}")
             case ConnectionChanged(endpoint, state, reason):
-                logger.info("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
+                logger.debug("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
         self._pusher.on_event(now, event)
+
+    def _tell_of_recovery(self, now: float) -> None:
+        """Say that heartbeats are back, and how often it rebooted, once it has settled."""
+        over = self._silence.over(now)
+        if over is not None:
+            self.notices.post("autopilot_returned", f"heartbeats are back after {over}")
+        times = self._reboots.times
+        if self._reboots.over(now) is not None and times > 1:
+            text = f"the autopilot rebooted {times} times in a row; now it keeps running"
+            self.notices.post("autopilot_runs", text)
 
     def _advise_only(self, reason: str) -> None:
         self.notices.post("advise_only", f"advise-only: {reason}", warning=True)

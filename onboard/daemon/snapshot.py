@@ -30,11 +30,15 @@ class MessageRate(Record, frozen=True, kw_only=True):
 
 
 class EndpointView(Record, frozen=True, kw_only=True):
-    """One endpoint: its connection's state and the last error, empty if there was none."""
+    """One endpoint: its connection's state and the last error, empty if there was none.
+
+    ``tries``: how many were in vain since it was lost; 0 while it works.
+    """
 
     endpoint: str
     state: str
     reason: str
+    tries: int = 0
 
 
 class LinkView(Record, frozen=True, kw_only=True):

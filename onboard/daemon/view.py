@@ -214,7 +214,8 @@ def link_view(
         for source in statistics.sources.values():
             for name in ("lost", "late", "duplicated"):
                 counters[name] = counters.get(name, 0) + getattr(source, name)
-        counters["dropped"] = counters.get("dropped", 0) + connection.dropped
+        for name in ("dropped", "connects", "failures"):
+            counters[name] = counters.get(name, 0) + getattr(connection, name)
     return LinkView(
         state=link.state.value,
         endpoints=tuple(
@@ -222,6 +223,7 @@ def link_view(
                 endpoint=str(connection.endpoint),
                 state=connection.state.value,
                 reason=connection.last_error,
+                tries=connection.outage.tries,
             )
             for connection in link.connections
         ),

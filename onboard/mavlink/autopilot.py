@@ -10,6 +10,7 @@ from typing import Protocol, TypeAlias
 from onboard.mavlink.connection import ConnectionState
 from onboard.mavlink.dialect import Message, mavlink
 from onboard.mavlink.endpoint import Endpoint
+from onboard.outage import Over
 
 _COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 _PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})
@@ -93,8 +94,30 @@ class ConnectionChanged:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class ConnectionTrouble:
+    """A connection was lost or cannot be made: once for each reason of an outage."""
+
+    endpoint: Endpoint
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionRestored:
+    """A connection has held again for some seconds."""
+
+    endpoint: Endpoint
+    over: Over
+
+
 LinkEvent: TypeAlias = (
-    AutopilotFound | AutopilotSilent | AutopilotReturned | AutopilotRebooted | ConnectionChanged
+    AutopilotFound
+    | AutopilotSilent
+    | AutopilotReturned
+    | AutopilotRebooted
+    | ConnectionChanged
+    | ConnectionTrouble
+    | ConnectionRestored
 )
 
 

@@ -10,6 +10,7 @@ from enum import Enum
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
 from onboard.mavlink.transport import DEFAULT_LINGER_S, Transport, open_transport
+from onboard.outage import Outage, Over
 
 BACKOFF_BASE_S = 0.5
 BACKOFF_CAP_S = 15.0
@@ -70,6 +71,8 @@ class Connection:
         codec: framing for this connection.
         receive: called with (connection, bytes).
         changed: called with (connection, reason) after each change of state.
+        tell: called with (connection, news) when trouble begins or has another reason (that
+            reason), and when it is over.
         clock: monotonic time, s.
         rng: source of the jitter.
         linger: see :mod:`onboard.mavlink.transport`.
@@ -82,6 +85,7 @@ class Connection:
         *,
         receive: Callable[[Connection, bytes], None],
         changed: Callable[[Connection, str], None],
+        tell: Callable[[Connection, str | Over], None],
         clock: Callable[[], float],
         rng: random.Random,
         linger: float = DEFAULT_LINGER_S,
@@ -91,10 +95,13 @@ class Connection:
         self.state = ConnectionState.IDLE
         self.last_error = ""
         self.connects = 0
+        self.failures = 0
+        self.outage = Outage(STABLE_S)
         self._dropped = 0
         self.last_received: float | None = None
         self._receive = receive
         self._changed = changed
+        self._tell = tell
         self._clock = clock
         self._linger = linger
         self._backoff = Backoff(rng)
@@ -119,9 +126,12 @@ class Connection:
             self._transport.write(data)
 
     def check(self, now: float) -> None:
-        """Break a TCP or serial line that has been silent for too long."""
+        """See whether trouble is over; break a TCP or serial line that is silent for too long."""
+        over = self.outage.over(now)
+        if over is not None:
+            self._tell(self, over)
         if (
-            self.endpoint.kind in (EndpointKind.TCP, EndpointKind.SERIAL)
+            self._is_stream
             and self.last_received is not None
             and self.is_up
             and now - self.last_received > SILENCE_S
@@ -138,6 +148,7 @@ class Connection:
             while True:
                 reason = await self._connect_once()
                 self.last_error = reason
+                self._troubled(reason)
                 self._enter(ConnectionState.WAITING, reason)
                 await asyncio.sleep(self._backoff.next())
         finally:
@@ -163,6 +174,8 @@ class Connection:
         self.connects += 1
         since = self.last_received = self._clock()
         self._enter(ConnectionState.UP, "")
+        if not self._is_stream:
+            self.outage.works(since)
         try:
             reason: str = await broken
         finally:
@@ -171,8 +184,25 @@ class Connection:
             self._backoff.reset()
         return reason
 
+    @property
+    def _is_stream(self) -> bool:
+        return self.endpoint.kind in (EndpointKind.TCP, EndpointKind.SERIAL)
+
+    def _troubled(self, reason: str) -> None:
+        """Tell it, if it is news."""
+        now = self._clock()
+        if self.is_up:
+            news = self.outage.lost(reason, now)
+        else:
+            self.failures += 1
+            news = self.outage.failed(reason, now)
+        if news:
+            self._tell(self, reason)
+
     def _received(self, data: bytes) -> None:
         self.last_received = self._clock()
+        # A line that opens and stays dumb is no better than one that does not open.
+        self.outage.works(self.last_received)
         self._receive(self, data)
 
     def _lost(self, reason: str) -> None:

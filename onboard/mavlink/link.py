@@ -18,6 +18,8 @@ from onboard.mavlink.autopilot import (
     AutopilotSilent,
     AutopilotState,
     ConnectionChanged,
+    ConnectionRestored,
+    ConnectionTrouble,
     LinkEvent,
     Participant,
 )
@@ -30,6 +32,7 @@ from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.signing import Signing
 from onboard.mavlink.transport import DEFAULT_LINGER_S
+from onboard.outage import Over
 
 Handler: TypeAlias = Callable[[float, Message], None]
 EventHandler: TypeAlias = Callable[[float, LinkEvent], None]
@@ -95,6 +98,7 @@ class Link:
                 Codec(system=system or 1, wanted=self._wanted, signing=signing, link_id=number),
                 receive=self._received,
                 changed=self._connection_changed,
+                tell=self._connection_told,
                 clock=clock,
                 rng=jitter,
                 linger=linger,
@@ -360,6 +364,13 @@ class Link:
         if connection.is_up:
             self._next_beat = self._clock()
         self._emit(self._clock(), ConnectionChanged(connection.endpoint, connection.state, reason))
+
+    def _connection_told(self, connection: Connection, news: str | Over) -> None:
+        now, endpoint = self._clock(), connection.endpoint
+        if isinstance(news, Over):
+            self._emit(now, ConnectionRestored(endpoint, news))
+        else:
+            self._emit(now, ConnectionTrouble(endpoint, news))
 
     def _emit(self, now: float, event: LinkEvent) -> None:
         for handler in self._event_handlers:

@@ -32,6 +32,7 @@ from onboard.mqtt.payloads import (
     event_message,
     read_command,
 )
+from onboard.outage import Outage
 
 if TYPE_CHECKING:
     from onboard.daemon.control import Actions
@@ -100,7 +101,8 @@ class Publisher:
             self._named.set()
         self._journal: tuple[JournalLine, ...] | None = None
         self._next_state = 0.0
-        self._told_lost = False
+        self._outage = Outage(STABLE_S)
+        self._refused = self._retained = False
         self._closing = asyncio.Event()
         self._diagnosed = False
         self._task: asyncio.Task[None] | None = None
@@ -121,6 +123,7 @@ class Publisher:
                 self._outbox.event("event", event_message(line))
         self._journal = journal
         now = self._clock()
+        self._tell_of_recovery(now)
         if now >= self._next_state or self._closing.is_set():
             self._next_state = now + self._settings.state_interval_s
             self._outbox.retain("state", snapshot.to_json())
@@ -147,8 +150,8 @@ class Publisher:
                 self._lost(_reason(error))
             except Exception as error:
                 # Whatever it is, calibrating goes on without a broker.
-                logger.exception("MQTT failed")
-                self._lost(str(error))
+                if self._lost(str(error)):
+                    logger.exception("MQTT failed")
             finally:
                 self.connected = False
             if self._closing.is_set():
@@ -205,8 +208,9 @@ class Publisher:
             await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
             self.counters["mqtt_connects"] += 1
             self.connected = True
-            self._told_lost = False
-            self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
+            if self._outage.since is None:
+                self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
+            self._outage.works(self._clock())
             try:
                 await self._speak(client)
             finally:
@@ -234,12 +238,14 @@ class Publisher:
     async def _subscribe(self, client: aiomqtt.Client) -> None:
         granted = await client.subscribe(self._topic("command"), qos=1)
         for code in granted:
-            if (code if isinstance(code, int) else code.value) >= 0x80:
+            refused = (code if isinstance(code, int) else code.value) >= 0x80
+            if refused and not self._refused:
                 self._notices.post(
                     "mqtt_commands_refused",
                     f"broker {self._where} does not let us subscribe to commands",
                     warning=True,
                 )
+            self._refused = refused
 
     async def _send(self, client: aiomqtt.Client) -> None:
         """Send what is due; ends when closing and nothing is left."""
@@ -261,7 +267,9 @@ class Publisher:
             if message.retain:
                 # Somebody's mistake: it would be carried out anew at every connection.
                 self.counters["mqtt_commands_ignored"] += 1
-                logger.warning("a retained command is ignored")
+                if not self._retained:
+                    logger.warning("a retained command is ignored, and all further ones")
+                self._retained = True
                 continue
             reply = await self._carry_out(payload)
             self._outbox.event("command/reply", document(reply))
@@ -292,18 +300,24 @@ class Publisher:
     def _topic(self, name: str) -> str:
         return f"{self._prefix}/{name}"
 
-    def _lost(self, reason: str) -> None:
-        """Say so once; every further try only counts."""
+    def _lost(self, reason: str) -> bool:
+        """Say so once for each reason, and whether that was now; every further try only counts."""
         self.counters["mqtt_failures"] += 1
-        if not self._told_lost:
-            self._told_lost = True
-            self._notices.post(
-                "mqtt_lost",
-                f"broker {self._where}: {reason}; tried again until it answers",
-                warning=True,
-            )
+        happened = self._outage.lost if self.connected else self._outage.failed
+        told = happened(reason, self._clock())
+        if told:
+            text = f"broker {self._where}: {reason}; tried again until it answers"
+            self._notices.post("mqtt_lost", text, warning=True)
         else:
             logger.debug("broker %s: %s", self._where, reason)
+        return told
+
+    def _tell_of_recovery(self, now: float) -> None:
+        over = self._outage.over(now)
+        if over is not None:
+            self._notices.post(
+                "mqtt_connected", f"broker {self._where}: publishing again after {over}"
+            )
 
 
 def tls_context(settings: MqttSettings) -> ssl.SSLContext | None:

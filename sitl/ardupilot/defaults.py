@@ -82,10 +82,11 @@ PLANE: Mapping[str, float] = {
 }
 
 
-def defaults_text(vehicle: str) -> str:
-    """A defaults file for ``--defaults``."""
+def defaults_text(vehicle: str, more: Mapping[str, float] | None = None) -> str:
+    """A defaults file for ``--defaults``; ``more`` counts before what stands here."""
     values = {**COMMON, **(PLANE if vehicle == "plane" else COPTER)}
     for channel in range(1, 9):
         values |= {f"RC{channel}_MIN": 1000, f"RC{channel}_MAX": 2000}
         values[f"RC{channel}_TRIM"] = 1000 if (vehicle, channel) == ("plane", 3) else 1500
+    values |= more or {}
     return "".join(f"{name} {value:g}\n" for name, value in values.items())

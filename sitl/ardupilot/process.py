@@ -8,6 +8,7 @@ import os
 import shutil
 import socket
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from sitl.ardupilot.defaults import defaults_text
@@ -49,9 +50,17 @@ class ArdupilotProcess:
     Args:
         vehicle: ``plane`` or ``copter``.
         speedup: simulated seconds a second, as far as the machine can follow.
+        parameters: beside the defaults that make it fly.
     """
 
-    def __init__(self, vehicle: str, *, speedup: float = 5.0) -> None:
+    def __init__(
+        self,
+        vehicle: str,
+        *,
+        speedup: float = 5.0,
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:
+        self._parameters = parameters or {}
         self.vehicle = vehicle
         self._binary = find_binary(vehicle)
         self._speedup = speedup
@@ -73,7 +82,7 @@ class ArdupilotProcess:
         """
         folder = Path(self._folder.name)
         defaults = folder / "defaults.parm"
-        defaults.write_text(defaults_text(self.vehicle))
+        defaults.write_text(defaults_text(self.vehicle, self._parameters))
         self._instance = _free_instance()
         with (folder / "output.txt").open("wb") as output:
             self._process = await asyncio.create_subprocess_exec(

@@ -33,6 +33,7 @@ def initial_parameters(vehicle: str, truth: Truth, loop_rate: int | None = None)
         Parameter("ARMING_ACCTHRESH", 0.75),
         Parameter("ARMING_REQUIRE", 1, Kind.INT8),
         Parameter("AHRS_ORIENTATION", truth.orientation, Kind.INT8),
+        Parameter("AHRS_EKF_TYPE", 3, Kind.INT8),
         Parameter("AHRS_TRIM_X", 0.0),
         Parameter("AHRS_TRIM_Y", 0.0),
         Parameter("AHRS_TRIM_Z", 0.0),

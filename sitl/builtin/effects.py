@@ -84,6 +84,33 @@ class MountTilt(Effect):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AccelerometerTilt(Effect):
+    """The accelerometers alone are turned: gyroscopes and attitude stay as they are.
+
+    As ArduPilot's SIM_ACC_TRIM of ``(-roll, -pitch)``: the force that is read is the true one
+    turned by ``from_euler(-roll, -pitch, 0)`` transposed.  In the catalogue's sign: by how much
+    the recorded attitude is too large for the accelerometer (rad).
+    """
+
+    name: ClassVar[str] = "mount_tilt"
+    roll: float = 0.0
+    pitch: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardTilt(Effect):
+    """The whole autopilot is turned in the airframe by (roll, pitch), rad: both sensors alike.
+
+    No name of the catalogue: its own attitude fits its own sensors, and no flight shows it.  It is
+    what AHRS_TRIM is for: a trim of the same angles makes the airframe's attitude of the board's.
+    """
+
+    name: ClassVar[str] = "board_tilt"
+    roll: float = 0.0
+    pitch: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingError(Effect):
     """Recorded yaw is too large by ``yaw`` (rad)."""
 

@@ -29,8 +29,7 @@ class Corrections:
         for stem in ACCEL_STEMS[:imus]:
             self.matrix.append(R_bs * np.array(parameters.vector(stem + "SCAL_")))
             self.offset.append(np.array(parameters.vector(stem + "OFFS_")))
-        trim = np.array(parameters.vector("AHRS_TRIM_"))
-        self.trim = rotation.from_euler(*trim.reshape(3, 1))[0]
+        self.trim = np.array(parameters.vector("AHRS_TRIM_"))
 
     def apply(self, imu: int, raw: Array) -> Array:
         """Raw sensor reading (3,) of IMU ``imu`` (from 0) to body axes, m/s^2."""
@@ -108,6 +107,8 @@ class Instant:
         yaw = 0.0
         for effect in self.world.truth.effects:
             match effect:
+                case fx.BoardTilt(roll=roll, pitch=pitch):
+                    R = R @ rotation.from_euler(*np.array([[roll], [pitch], [0.0]]))[0]
                 case fx.MountTilt(roll=roll, pitch=pitch):
                     R = R @ rotation.one_from_vector(np.array([roll, pitch, 0.0]))
                 case fx.HeadingError(yaw=error):
@@ -116,7 +117,8 @@ class Instant:
                     yaw += error * float(piece.trajectory.throttle[row])
                 case _:
                     pass
-        euler = rotation.one_to_euler(R @ self.corrections.trim.T)
+        # Angle by angle, as EKF3 does (getEulerAngles); that is no rotation of the body.
+        euler: Array = rotation.one_to_euler(R) - self.corrections.trim
         if yaw:
             euler[2] = (euler[2] + yaw + np.pi) % (2.0 * np.pi) - np.pi
         return euler

@@ -150,7 +150,8 @@ def read_imu(
         level=level,
     )
     R_bs = board_rotation(truth.orientation)
-    f_s = (f_b + shake) @ R_bs
+    board = board_axes(truth)
+    f_s = (f_b + shake) @ board @ R_bs
     raw = f_s / np.array(imu.scale) + np.array(imu.offset)
     raw += stream(2).standard_normal((n, 3)) * (imu.accel_noise * np.sqrt(RATE / 2.0))
     raw += np.cumsum(stream(3).standard_normal((n, 3)), axis=0) * (imu.bias_walk * np.sqrt(DT))
@@ -161,7 +162,7 @@ def read_imu(
     raw = np.round(raw / RESOLUTION) * RESOLUTION
     rail = np.any(np.abs(raw) >= limit, axis=1)
     raw = np.clip(raw, -limit, limit)
-    gyro = _gyro(trajectory, imu, stream(4), stream(5), t)
+    gyro = _gyro(trajectory.w_b @ board, imu, stream(4), stream(5), t)
     return ImuReadings(
         raw=raw,
         filtered=low_pass(raw, accel_filter_hz),
@@ -243,6 +244,8 @@ def _deterministic(
                 extra += np.array((x, y, z)) * level**2
             case fx.ThrottleCoupling(x=x, y=y, z=z):
                 extra += np.outer(trajectory.throttle, (x, y, z))
+            case fx.AccelerometerTilt(roll=roll, pitch=pitch):
+                extra += f_b @ _turned(-roll, -pitch) - f_b
             case fx.LoadFlex(roll=roll, pitch=pitch):
                 load = -f_b[:, 2] / STANDARD_GRAVITY - 1.0
                 flex = rotation.from_vector(np.outer(load, (roll, pitch, 0.0)))
@@ -252,6 +255,18 @@ def _deterministic(
             case _:
                 pass
     return extra
+
+
+def _turned(roll: float, pitch: float) -> Array:
+    """(3, 3) axes turned by roll and pitch (rad): their components times it are the old ones."""
+    out: Array = rotation.from_euler(np.array([roll]), np.array([pitch]), np.zeros(1))[0]
+    return out
+
+
+def board_axes(truth: Truth) -> Array:
+    """(3, 3) axes of the autopilot in the airframe: ``f_b @ board_axes`` is what it feels."""
+    tilts = [e for e in truth.effects if isinstance(e, fx.BoardTilt)]
+    return _turned(tilts[0].roll, tilts[0].pitch) if tilts else np.eye(3)
 
 
 def _nameless(term: str, trajectory: Trajectory, elapsed: Array) -> Array:
@@ -266,17 +281,17 @@ def _nameless(term: str, trajectory: Trajectory, elapsed: Array) -> Array:
 
 
 def _gyro(
-    trajectory: Trajectory,
+    w_b: Array,
     imu: ImuTruth,
     white: np.random.Generator,
     wander: np.random.Generator,
     t: Array,
 ) -> Array:
-    n = trajectory.n
+    n = len(w_b)
     noise = white.standard_normal((n, 3)) * (imu.gyro_noise * np.sqrt(RATE / 2.0))
     walk = np.cumsum(wander.standard_normal((n, 3)), axis=0) * (imu.gyro_walk * np.sqrt(DT))
     drift = np.outer(np.sin(2.0 * np.pi * t / 600.0), imu.gyro_bias)
-    out: Array = trajectory.w_b * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
+    out: Array = w_b * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
     return out
 
 

@@ -11,7 +11,7 @@ from sitl.builtin.copter import CopterFlight, copter_trajectory
 from sitl.builtin.gps import Fix, Receiver
 from sitl.builtin.plane import PlaneFlight, plane_trajectory
 from sitl.builtin.rotation import rotate
-from sitl.builtin.sensors import ImuReadings, read_imu
+from sitl.builtin.sensors import ImuReadings, board_axes, read_imu
 from sitl.builtin.smoothing import RATE, Array
 from sitl.builtin.trajectory import Environment, Start, Trajectory, parked, whole_samples
 from sitl.builtin.truth import Truth
@@ -30,7 +30,10 @@ class Filters:
 
 @dataclass(frozen=True, slots=True)
 class Blocks:
-    """Means over the attitude filter's steps: what it integrates, rows of ``STEP`` seconds."""
+    """Means over the attitude filter's steps: what it integrates, rows of ``STEP`` seconds.
+
+    Body axes are those of the autopilot, however it sits in the airframe.
+    """
 
     R_nb: Array
     f_n: Array
@@ -38,6 +41,17 @@ class Blocks:
     w_b: Array
     raw: Array
     gyro: Array
+
+    def first(self, n: int) -> Blocks:
+        """The first ``n`` steps."""
+        return Blocks(
+            R_nb=self.R_nb[:n],
+            f_n=self.f_n[:n],
+            f_b=self.f_b[:n],
+            w_b=self.w_b[:n],
+            raw=self.raw[:n],
+            gyro=self.gyro[:n],
+        )
 
 
 @dataclass(slots=True)
@@ -61,7 +75,7 @@ class Piece:
         self.trajectory = self.trajectory.first(n)
         self.imus = tuple(imu.first(n) for imu in self.imus)
         self.fixes = [fix for fix in self.fixes if fix.t_valid < self.end]
-        self.blocks = _blocks(self.trajectory, self.imus[0])
+        self.blocks = self.blocks.first(n // BLOCK)
 
     def index(self, t: float) -> int:
         """Row of the last sample at or before boot time ``t``."""
@@ -174,14 +188,14 @@ class World:
         start = self.end
         imus = self._read(trajectory, start)
         fixes = self._receiver.read(trajectory, self.truth, start=start, origin=self.origin)
-        blocks = _blocks(trajectory, imus[0])
+        blocks = _blocks(trajectory, imus[0], board_axes(self.truth))
         self.pieces.append(Piece(start, trajectory, imus, fixes, blocks, flight))
 
     def _measure_again(self, piece: Piece, trajectory: Trajectory, truth: Truth) -> None:
         piece.trajectory = trajectory
         piece.imus = self._read(trajectory, piece.start)
         piece.fixes = self._receiver.read(trajectory, truth, start=piece.start, origin=self.origin)
-        piece.blocks = _blocks(trajectory, piece.imus[0])
+        piece.blocks = _blocks(trajectory, piece.imus[0], board_axes(truth))
 
     def _read(self, trajectory: Trajectory, start: float) -> tuple[ImuReadings, ...]:
         return tuple(
@@ -198,16 +212,16 @@ class World:
         )
 
 
-def _blocks(trajectory: Trajectory, imu: ImuReadings) -> Blocks:
+def _blocks(trajectory: Trajectory, imu: ImuReadings, board: Array) -> Blocks:
     def mean(x: Array) -> Array:
         out: Array = x.reshape(-1, BLOCK, x.shape[1]).mean(axis=1)
         return out
 
     return Blocks(
-        R_nb=trajectory.R_nb[BLOCK // 2 :: BLOCK],
+        R_nb=trajectory.R_nb[BLOCK // 2 :: BLOCK] @ board,
         f_n=mean(rotate(trajectory.R_nb, trajectory.f_b)),
-        f_b=mean(trajectory.f_b),
-        w_b=mean(trajectory.w_b),
+        f_b=mean(trajectory.f_b) @ board,
+        w_b=mean(trajectory.w_b) @ board,
         raw=mean(imu.raw),
         gyro=mean(imu.gyro),
     )

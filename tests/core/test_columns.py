@@ -23,7 +23,8 @@ from onboard.core.earth import STANDARD_GRAVITY
 from onboard.core.frames import rotation_from_vector
 from onboard.core.nodes import NodeMaker
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.gains import CrossAxis, ForceTilt, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.mount import ForceTilt
 from onboard.core.physics.offsets import BiasRamp, Gravity, TemperatureDrift, ThrottleCoupling
 from onboard.core.physics.receiver import ClockSkew, LeverArm
 from onboard.core.stretch import Stretch

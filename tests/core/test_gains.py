@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.gains import CrossAxis, ForceTilt, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.mount import ForceTilt
 from onboard.core.physics.offsets import BiasRamp
 from onboard.core.regimes import axis_of
 

@@ -3,7 +3,9 @@
 import asyncio
 import contextlib
 import random
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from broker import Broker
@@ -11,6 +13,9 @@ from published import Obedient, noticeboard, settings
 
 from onboard.mqtt import publisher as publisher_module
 from onboard.mqtt.publisher import Publisher
+
+# Time that jumps is shared with the link's tests.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mavlink"))
 
 
 @pytest.fixture(autouse=True)

@@ -256,6 +256,29 @@ def test_mount_tilt_is_fixed_in_the_body():
     )
 
 
+def test_accelerometer_tilt_turns_the_accelerometers_alone():
+    """As SIM_ACC_TRIM: levelling (trim = atan2(-f_y, -f_z), atan2(f_x, |f_yz|)) gives it back."""
+    readings = {}
+    for effects in ((), (fx.AccelerometerTilt(roll=-0.03, pitch=0.025),)):
+        world = World("copter", truth(*effects), dull=True)
+        world.park(2.0)
+        readings[bool(effects)] = world.pieces[0].imus[0]
+    x, y, z = readings[True].raw.mean(axis=0)
+    assert np.arctan2(-y, -z) == pytest.approx(0.03, abs=1e-3)
+    assert np.arctan2(x, np.hypot(y, z)) == pytest.approx(-0.025, abs=1e-3)
+    assert np.array_equal(readings[True].gyro, readings[False].gyro)
+
+
+def test_board_tilt_turns_both_sensors_and_the_attitude_alike():
+    reported, now = attitudes(fx.BoardTilt(roll=0.03, pitch=-0.025))
+    straight, then = attitudes()
+    board = rotation.from_euler(np.array([0.03]), np.array([-0.025]), np.zeros(1))[0]
+    assert np.allclose(reported, straight @ board, atol=1e-9)
+    row, one, other = now.row, now.piece.imus[0], then.piece.imus[0]
+    assert np.allclose(one.raw[row], other.raw[row] @ board, atol=0.02)
+    assert np.allclose(one.gyro[row], other.gyro[row] @ board, atol=1e-6 + 0.005 * 0.03)
+
+
 def test_imu_delay_is_an_attitude_stamped_late():
     reported, now = attitudes(fx.ImuDelay(delay=0.05))
     assert np.allclose(reported, now.piece.trajectory.R_nb[now.row - 50], atol=1e-9)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from onboard.core.physics.attitude import HeadingByThrottle
 from onboard.core.physics.effect import EffectColumns, Origin
-from onboard.core.physics.gains import CrossAxis, ForceTilt, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.mount import ForceTilt
 from onboard.core.physics.offsets import (
     BiasRamp,
     Gravity,

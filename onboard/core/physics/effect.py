@@ -18,11 +18,12 @@ AXES = "xyz"
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What effects count from: times, temperatures, and places as the autopilot was told them."""
+    """What effects count from: times, temperatures; places and trim as the autopilot has them."""
 
     t0: float
     temperature: float = 35.0
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class EffectColumns(Family):
@@ -56,6 +57,10 @@ class EffectColumns(Family):
     def parameters(self, values: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002
         """ArduPilot parameters that cure it, by the values of its unknowns."""
         return {}
+
+    def advice(self, values: Mapping[str, float]) -> tuple[str, dict[str, float]]:
+        """What to do about it, in words and in parameters, by the values of its unknowns."""
+        return self.cure, self.parameters(values)
 
     def _three(self, unit: str, bound: float) -> None:
         """Unknowns x, y, z of one unit, bounded alike."""

@@ -72,35 +72,6 @@ class CrossAxis(Gain):
         return out
 
 
-class ForceTilt(Gain):
-    """Accelerometer tilted against gyroscope and body: ``measured = true + tilt x ...``."""
-
-    name = "force_tilt"
-    effect = "mount_tilt"
-    source = "small rotation about x and y, fixed in the body"
-    cure = "level the autopilot again (accelerometer level calibration), or set AHRS_TRIM"
-    apart = "turn through all headings with bank and pitch"
-    keys = ("roll", "pitch")
-    plausible = (0.3, 0.3)
-    unknowns = (
-        Unknown("force_tilt_roll", "rad", 0.0, 0.15),
-        Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
-    )
-
-    def amount(self, f_b: Array) -> Array:
-        """``e x f`` and so on: the recorded attitude is ``tilt`` too large.
-
-        An attitude that reads ``tilt`` too large turns the force by ``tilt`` too much; the
-        accelerometer's own rotation by minus ``tilt`` is the same thing.
-        """
-        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        return np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
-
-    def parameters(self, values: dict[str, float]) -> dict[str, float]:  # type: ignore[override] # narrower on purpose
-        """The trim that takes the tilt out again."""
-        return {"AHRS_TRIM_X": values["roll"], "AHRS_TRIM_Y": values["pitch"]}
-
-
 class ScaleNonlinearity(Gain):
     """Scale that changes with the load: second-order coefficient, per g."""
 

@@ -1,0 +1,150 @@
+"""Which is turned against which: accelerometer, gyroscope, recorded attitude, airframe.
+
+Four triads, three small turns between them, all fixed in the body (ArduPilot 4.7, EKF3):
+
+accelerometer against gyroscope
+    :class:`ForceTilt`.  The attitude is integrated from the gyroscope and held upright by GPS, so
+    in flight it is right: what the accelerometer reads askew goes into the EKF's accelerometer
+    bias (``g`` times the tilt at level).  No parameter turns one of the two alone: board
+    orientation and custom rotations turn both, INS_ACCOFFS holds ``g`` times the tilt only as long
+    as the force stays where it is at level.  **AHRS_TRIM makes it worse**: what is reported, and
+    what is steered by, is the EKF's attitude *less* AHRS_TRIM (getEulerAngles in
+    AP_NavEKF3_Outputs.cpp), so it turns an attitude that is right.  Levelling on the ground (also
+    the first pose of a six-position calibration: INS_TRIM_OPTION) does just that: it takes
+    gravity's direction in the accelerometer for the board's tilt
+    (``AP_InertialSensor::_calculate_trim``: ``trim = (atan2(-f_y, -f_z), atan2(f_x, ...))``),
+    which is *minus* the unknowns here.
+board against airframe
+    Both sensors alike.  The board's attitude fits the board's accelerometer, so that velocity
+    residuals do not show it.  This is what AHRS_TRIM is for, and a trim that is set says nothing
+    of what is missing: it is put back into the recorded attitude (:mod:`onboard.core.assembly`)
+    and the flight is judged in the board's axes.
+recorded attitude against both sensors
+    Unknowns ``tilt_roll``, ``tilt_pitch`` of every model.  An EKF that integrates the gyroscope is
+    not off like that for long, but one that levels with an accelerometer (DCM; an EKF that
+    has not learned) is off by the tilt that the accelerometer's error makes at level; so is the
+    attitude of another board's sensors, or a trim that the recording does not tell.
+
+An attitude that reads ``tilt`` too large turns the force by ``tilt`` too much; the accelerometer's
+own rotation by minus ``tilt`` does the same to the force.  They differ in what the gyroscope sees
+of a turn.  Where the accelerometer is turned against the gyroscope, an attitude that is off
+beside is its consequence: both are one effect, ``mount_tilt``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.columns import Unknown
+from onboard.core.earth import STANDARD_GRAVITY
+from onboard.core.parameters import ParametersInForce
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.gains import Gain
+
+Array = NDArray[np.float64]
+Advice = tuple[str, dict[str, float]]
+
+TRIM_RAD = float(np.deg2rad(0.5))
+"""A trim worth a word, and what levelling by hand is good for (a bubble's width, 0.09 m/s^2 of
+offset).  A board that sits up to 2 deg askew, anyhow, comes as near to a given tilt or its
+negative one time of eight; the price is a trim offered that a hover shows to be wrong."""
+
+ALONE = "replace the sensor or its board, no parameter turns an accelerometer against its gyroscope"
+LEAVE = "leave AHRS_TRIM and do not level on the ground: the attitude is right in flight"
+TAKE_OUT = "AHRS_TRIM was set for this tilt: take it out, the attitude in flight is right without"
+IF_LEVELLED = "if AHRS_TRIM is from levelling on the ground, it holds this tilt, too; without it:"
+
+
+class ForceTilt(Gain):
+    """Accelerometer turned against gyroscope and attitude: ``measured = true - tilt x ...``.
+
+    The unknowns are by how much the attitude is too large *for the accelerometer*: minus the angles
+    by which it is turned itself.
+    """
+
+    name = "force_tilt"
+    effect = "mount_tilt"
+    source = "small rotation about x and y, fixed in the body"
+    cure = ALONE
+    apart = "turn through all headings with bank and pitch"
+    keys = ("roll", "pitch")
+    plausible = (0.3, 0.3)
+    unknowns = (
+        Unknown("force_tilt_roll", "rad", 0.0, 0.15),
+        Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
+    )
+
+    def __init__(self, origin: Origin) -> None:
+        """Take the trim that is in force."""
+        super().__init__(origin)
+        self._trim = np.array(origin.trim[:2])
+
+    def amount(self, f_b: Array) -> Array:
+        """``f x e``: what one unit of each unknown takes off the force."""
+        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        return np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
+
+    def advice(self, values: Mapping[str, float]) -> Advice:
+        """To leave AHRS_TRIM alone, or to take out of it what was put there for this tilt.
+
+        A trim of this tilt comes from levelling on the ground (minus the unknowns), or from a
+        mistaken cure (the unknowns): the attitude in flight is right without either.
+        """
+        tilt, trim = np.array([values["roll"], values["pitch"]]), self._trim
+        if np.hypot(*trim) <= TRIM_RAD:
+            return f"{ALONE}; {LEAVE}", {}
+        if min(np.hypot(*(trim - tilt)), np.hypot(*(trim + tilt))) < TRIM_RAD:
+            return f"{ALONE}; {TAKE_OUT}", {"AHRS_TRIM_X": 0.0, "AHRS_TRIM_Y": 0.0}
+        return f"{ALONE}; {IF_LEVELLED} {_pair(trim + tilt)}", {}
+
+
+def attitude_advice(extra: Array, six: Array, parameters: ParametersInForce, imu: int) -> Advice:
+    """What to do about a recorded attitude that is off by ``extra`` against both sensors.
+
+    Args:
+        extra: (2,) roll, pitch, rad, by which it is too large with AHRS_TRIM put back.
+        six: (6,) scale and ``beta = -scale * offset`` that were found.
+        parameters: in force when it was recorded.
+        imu: which accelerometer.
+    """
+    if np.hypot(*(extra - levelled(six, parameters, imu))) < 0.5 * np.hypot(*extra):
+        return "set the calibration that was found: the autopilot levels with this sensor", {}
+    if imu != 1:
+        return "mount the boards alike: the recorded attitude is that of another one's sensors", {}
+    if "AHRS_TRIM_X" not in parameters.values:
+        return f"none, if AHRS_TRIM is {_pair(-extra)}: the recording does not have it", {}
+    trim = np.array(parameters.trim[:2])
+    if np.hypot(*trim) > TRIM_RAD:
+        return f"if AHRS_TRIM holds the board's tilt alone, set {_pair(trim + extra)} in all", {}
+    x, y = (float(a) for a in trim + extra)
+    return "take it off the attitude with AHRS_TRIM", {"AHRS_TRIM_X": x, "AHRS_TRIM_Y": y}
+
+
+def levelled(six: Array, parameters: ParametersInForce, imu: int) -> Array:
+    """(2,) roll, pitch, rad, that an autopilot at level reads off its accelerometer.
+
+    Args:
+        six: (6,) what is true of the sensor; what is in force differs from it.
+        parameters: in force.
+        imu: which accelerometer.
+    """
+    R_bs, force = parameters.R_bs, parameters.six(imu)
+    raw = (R_bs.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY]) - six[3:]) / six[:3]
+    f_b = R_bs @ (np.array(force.scale) * (raw - np.array(force.offset)))
+    return np.array([-f_b[1], f_b[0]]) / STANDARD_GRAVITY
+
+
+def trim_in_words(parameters: ParametersInForce) -> str:
+    """That a trim worth a word was put back into the recorded attitude; else nothing."""
+    trim = np.array(parameters.trim[:2])
+    if np.hypot(*trim) <= TRIM_RAD:
+        return ""
+    return f"AHRS_TRIM ({_pair(trim)} rad) was put back into the recorded attitude."
+
+
+def _pair(angles: Array) -> str:
+    x, y = (round(float(a), 3) + 0.0 for a in angles)  # no minus before a zero
+    return f"X {x:.3f}, Y {y:.3f}"
