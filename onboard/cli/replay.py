@@ -66,11 +66,12 @@ def replay(
     if param_file is not None:
         from onboard.report.parameters import calibration_text, is_qgc
 
-        if result.autopilot != "ardupilot":
+        advice = [its for its in result.advice if its is not None]
+        if not advice:
             raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
         names = [recording.path.name for recording in result.recordings]
         qgc = is_qgc(param_file)
-        write_text(calibration_text(result.calibrations, names, qgc=qgc), param_file)
+        write_text(calibration_text(result.answers, advice, names, qgc=qgc), param_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file):
