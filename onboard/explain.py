@@ -81,8 +81,7 @@ def explain(
         RecordingError: a file that cannot be used.
         UsageError: there is no such accelerometer.
     """
-    wanted = (1,) if imu is None else (1, imu)
-    recorded = Recorded(wanted)
+    recorded = Recorded((imu or 1,))
     source = read(paths, recorded, imu=imu, progress=progress)
     if imu is None and 1 not in recorded.imus:
         recorded = Recorded()

@@ -55,7 +55,7 @@ def replay(
     Several LOGs of one vehicle are merged: what a single flight does not show, several may.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    recorded = Recorded(() if imu is None else (1, imu), watched=report_file is not None)
+    recorded = Recorded(() if imu is None else (imu,), watched=report_file is not None)
     with reading(logs, then="comparing models") as progress:
         result = replay_recordings(logs, recorded, imu=imu, progress=progress)
     if report_file is not None and recorded.chronicle is not None:

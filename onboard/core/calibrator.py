@@ -9,6 +9,7 @@ stream and of its recording are the same numbers.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,9 +80,18 @@ Event = WindowOpened | WindowClosed | Restarted | Advanced | FlightEnded
 class Calibrator:
     """Estimates the six numbers of every accelerometer from a stream of samples."""
 
-    def __init__(self, settings: EstimatorSettings | None = None) -> None:
-        """Take the settings."""
+    def __init__(
+        self, settings: EstimatorSettings | None = None, only: Collection[int] = ()
+    ) -> None:
+        """Take the settings.
+
+        Args:
+            settings: how it works.
+            only: accelerometers to estimate, none named: all; nothing about one of them depends
+                on whether others are estimated, too.
+        """
         self.settings = settings = settings or EstimatorSettings()
+        self._only = frozenset(only)
         self.parameters = ParametersInForce()
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings)
@@ -323,6 +333,8 @@ class Calibrator:
         made: dict[int, list[Chunk]] = self._assembly.take(self.parameters, everything=everything)
         newest = -np.inf
         for imu, chunks in made.items():
+            if self._only and imu not in self._only:
+                continue
             saved = self._waiting.get(imu)
             if saved is not None and saved.device_id is not None and not self.parameters.known(imu):
                 self._counts["before_parameters"] += len(chunks)
