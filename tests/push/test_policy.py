@@ -112,7 +112,7 @@ class TestEstimate:
     @pytest.mark.parametrize("i", range(6))
     def test_each_number_must_be_sharp(self, i):
         sigmas = [0.001] * 3 + [0.008] * 3
-        sigmas[i] *= 6
+        sigmas[i] *= 7
         assert objections(calibration(covariance=covariance(sigmas))) == {Objection.SIGMA_TOO_LARGE}
 
     def test_value_that_is_already_there_is_not_written_again(self):
