@@ -1,4 +1,4 @@
-"""Errors of the six numbers and of the latency on recordings whose answers are known.
+"""Errors of what replay answers on recordings whose answers are known: the six, the latency.
 
 Looks for ``answers.json`` in ONBOARD_RECORDINGS/sitl or in ``../shared/recordings/sitl`` beside the
 project, and prints the table of the README.
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.recorded import WHERE, clean, error_of, fed, limits, recorded
+from benchmarks.recorded import WHERE, clean, error_of, flown, limits, recorded
 
 HEADS = (
     "recording",
@@ -35,10 +35,10 @@ def lines() -> Iterator[str]:
     for file in clean():
         flight = recorded(file)
         began = time.process_time()
-        made = fed(flight.samples)
+        made = flown(flight.samples)
+        answers = {imu: made.calibration(imu) for imu in made.imus}
         spent = time.process_time() - began
-        for imu in made.imus:
-            c = made.calibration(imu)
+        for imu, c in answers.items():
             e = error_of(c, flight)
             z = np.abs(e) / np.array(c.scale_sigma + c.offset_sigma)
             share = np.abs(e) / limits(flight.vehicle)

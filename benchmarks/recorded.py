@@ -16,6 +16,7 @@ from onboard.core.calibrator import Calibrator
 from onboard.core.result import Calibration
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.mavlink.decode import Decoder
+from onboard.recorded import Recorded
 from onboard.recordings.opening import open_recording
 from sitl.recording import FlightSpec, fly_messages, truth_record
 
@@ -94,8 +95,17 @@ def simulated(spec: FlightSpec) -> Flight:
 
 
 def fed(samples: Iterable[Sample]) -> Calibrator:
-    """The estimator at the end of the samples."""
+    """The estimator of the live service at the end of the samples."""
     made = Calibrator()
+    for sample in samples:
+        made.feed(sample)
+    made.finish()
+    return made
+
+
+def flown(samples: Iterable[Sample]) -> Recorded:
+    """The samples as a recording that can be asked: what replay, explain and fleet answer from."""
+    made = Recorded()
     for sample in samples:
         made.feed(sample)
     made.finish()

@@ -11,7 +11,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from onboard.advice import Advice
 from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.findings import Effect
 from onboard.core.result import SIX_NAMES, Calibration, Estimate
 
 REPLAY_SCHEMA = "onboard.replay/1"
@@ -89,6 +91,19 @@ class PushedDocument(msgspec.Struct, frozen=True, kw_only=True):
     read_back: float | None
 
 
+class AdviceDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """What the push policy lets be set of a recording's answer, for ArduPilot.
+
+    ``set`` has the six and the cures of effects by name; ``held_back`` says why there are no more:
+    for the six by the policy's objection, for a cure by its effect.  ``conditions`` says when an
+    offset holds that is not one number for the whole flight.
+    """
+
+    set: dict[str, float]
+    held_back: dict[str, str]
+    conditions: dict[str, str]
+
+
 class ResidualDocument(msgspec.Struct, frozen=True, kw_only=True):
     """Residuals with the parameters in force and with the estimate.
 
@@ -105,7 +120,11 @@ class ResidualDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ImuDocument(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One accelerometer.  ``truth`` and ``pushed`` are there in the demo only."""
+    """One accelerometer.
+
+    ``advice`` is there where a recording of an ArduPilot was read; ``truth`` and ``pushed`` are
+    there in the demo only.
+    """
 
     imu: int
     status: str
@@ -120,6 +139,7 @@ class ImuDocument(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     dead_reckoning: DeadReckoningDocument | None
     coverage: CoverageDocument
     temperature: Number | None
+    advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
     truth: SixDocument | msgspec.UnsetType = msgspec.UNSET
     pushed: list[PushedDocument] | msgspec.UnsetType = msgspec.UNSET
 
@@ -188,6 +208,7 @@ def imu_document(
     calibration: Calibration,
     autopilot: str = "ardupilot",
     *,
+    advice: AdviceDocument | None = None,
     truth: SixParameters | None = None,
     pushed: Sequence[PushedDocument] | None = None,
 ) -> ImuDocument:
@@ -219,10 +240,30 @@ def imu_document(
             advice=c.coverage.advice,
         ),
         temperature=None if c.temperature is None else number(c.temperature),
+        advice=msgspec.UNSET if advice is None else advice,
         truth=msgspec.UNSET
         if truth is None
         else SixDocument(scale=_numbers(truth.scale), offset=_numbers(truth.offset)),
         pushed=msgspec.UNSET if pushed is None else list(pushed),
+    )
+
+
+def advice_document(advice: Advice | None, effects: Sequence[Effect] = ()) -> AdviceDocument | None:
+    """The advice as other programs read it; None where there is none.
+
+    Args:
+        advice: for one accelerometer.
+        effects: whose cures it judges.
+    """
+    if advice is None:
+        return None
+    held_back: dict[str, str] = {}
+    for refusal in advice.refusals:
+        held_back.setdefault(refusal.objection.value, refusal.sentence)
+    return AdviceDocument(
+        set=advice.to_set(effects),
+        held_back=held_back | dict(advice.against),
+        conditions=dict(advice.conditions),
     )
 
 

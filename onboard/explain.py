@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from onboard.advice import Advice, advise
 from onboard.answer import Answer
 from onboard.core.findings import Diagnosis
 from onboard.explain_document import ExplainDocument, explain_document
@@ -32,6 +33,13 @@ class Explanation:
         return self.answer.imu
 
     @property
+    def advice(self) -> Advice | None:
+        """What to set; None for another autopilot than ArduPilot."""
+        if self.source.autopilot != "ardupilot":
+            return None
+        return advise((self.answer,), self.parameters)[0]
+
+    @property
     def files(self) -> list[str]:
         """Names of the recordings."""
         return [r.path.name for r in self.source.recordings]
@@ -52,6 +60,7 @@ class Explanation:
                 "imu": self.source.vehicle.counts.get(f"imu {self.imu}", 0),
                 "gps": self.source.vehicle.counts.get("gps", 0),
             },
+            advice=self.advice,
         )
 
 
@@ -72,8 +81,7 @@ def explain(
         RecordingError: a file that cannot be used.
         UsageError: there is no such accelerometer.
     """
-    wanted = (1,) if imu is None else (1, imu)
-    recorded = Recorded(wanted)
+    recorded = Recorded((imu or 1,))
     source = read(paths, recorded, imu=imu, progress=progress)
     if imu is None and 1 not in recorded.imus:
         recorded = Recorded()

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 
 import msgspec
 
+from onboard.advice import Advice
 from onboard.core.findings import Diagnosis, Effect, Where
 from onboard.document import (
+    AdviceDocument,
     CalibrationDocument,
     Number,
+    advice_document,
     calibration_document,
     finite,
     timing_document,
@@ -137,6 +140,7 @@ class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
     ambiguous: list[AmbiguityDocument]
     not_testable: list[NotTestableDocument]
     ladder: list[RungDocument]
+    advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
     schema: str = EXPLAIN_SCHEMA
 
     def to_json(self) -> bytes:
@@ -151,8 +155,9 @@ def explain_document(
     autopilot: str,
     duration_s: float,
     samples: dict[str, int],
+    advice: Advice | None = None,
 ) -> ExplainDocument:
-    """The document of one diagnosis."""
+    """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
     m = diagnosis.mismatch
     sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
     return ExplainDocument(
@@ -198,6 +203,7 @@ def explain_document(
             )
             for r in diagnosis.ladder
         ],
+        advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
     )
 
 

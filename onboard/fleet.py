@@ -119,7 +119,7 @@ def fly(
         watching: told of what is going on.
     """
     for number, (path, name) in enumerate(files, start=1):
-        recorded = Recorded(() if imu is None else (1, imu), watched=watched)
+        recorded = Recorded(() if imu is None else (imu,), watched=watched)
         try:
             with watching(path, number, len(files)) as progress:
                 result = replay([path], recorded, imu=imu, progress=progress)

@@ -19,7 +19,7 @@ from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import examine
 from onboard.core.findings import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.result import Calibration, Status
-from onboard.core.samples import ImuSample, Sample
+from onboard.core.samples import Sample
 from onboard.core.settings import EstimatorSettings
 
 PAUSE_S = 10.0
@@ -34,13 +34,12 @@ class Recorded:
         """Take what to read.
 
         Args:
-            wanted: accelerometers to feed (none named: all); each costs as much as another.
+            wanted: accelerometers to ask about (none named: all); each costs as much as another.
             watched: keep what a report draws.
         """
-        self.calibrator = Calibrator(KEEPING_ALL)
+        self.calibrator = Calibrator(KEEPING_ALL, only=wanted)
         self.chronicle = Chronicle(self.calibrator) if watched else None
         self._reader = self.chronicle or self.calibrator
-        self._wanted = frozenset(wanted)
         self._answers: dict[int, Answer] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
 
@@ -68,8 +67,6 @@ class Recorded:
             if self._shift:
                 sample = replace(sample, t=t + self._shift)
             self._newest = max(self._newest, t + self._shift)
-        if self._wanted and isinstance(sample, ImuSample) and sample.imu not in self._wanted:
-            return ()
         return self._reader.feed(sample)
 
     def finish(self) -> object:

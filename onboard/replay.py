@@ -9,11 +9,17 @@ from typing import Protocol
 
 import numpy as np
 
+from onboard.advice import Advice, advise
 from onboard.answer import Answer
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Calibration, Coverage, Status
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample, Vector3
-from onboard.document import RecordingDocument, ReplayDocument, imu_document
+from onboard.document import (
+    RecordingDocument,
+    ReplayDocument,
+    advice_document,
+    imu_document,
+)
 from onboard.errors import RecordingError, UsageError
 from onboard.recorded import unanswered
 from onboard.recordings.opening import open_recording
@@ -92,6 +98,13 @@ class Replay:
         return tuple(answer.calibration for answer in self.answers)
 
     @property
+    def advice(self) -> tuple[Advice | None, ...]:
+        """What to set of each answer; None for another autopilot than ArduPilot."""
+        if self.autopilot != "ardupilot":
+            return (None,) * len(self.answers)
+        return advise(self.answers, self.parameters)
+
+    @property
     def autopilot(self) -> str:
         """The kind of autopilot that all of them come from."""
         return self.recordings[0].autopilot
@@ -113,7 +126,10 @@ class Replay:
                 notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes]
                 + list(self.notes),
             ),
-            imus=[imu_document(c, self.autopilot) for c in self.calibrations],
+            imus=[
+                imu_document(c, self.autopilot, advice=advice_document(advice))
+                for c, advice in zip(self.calibrations, self.advice, strict=True)
+            ],
         )
 
 

@@ -10,6 +10,7 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from onboard.advice import Advice
 from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.findings import Diagnosis, Effect, Verdict
@@ -71,12 +72,14 @@ def explain(
             files=result.files,
             autopilot=result.source.autopilot,
             duration_s=result.duration_s,
+            advice=result.advice,
         )
         write_text(page, report_file)
     if param_file is not None:
-        if result.source.autopilot != "ardupilot":
+        if result.advice is None:
             raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
-        text = parameter_text(result.diagnosis, result.files, qgc=is_qgc(param_file))
+        qgc = is_qgc(param_file)
+        text = parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
         write_text(text, param_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file):
         console = Console(highlight=False)
@@ -89,7 +92,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
-    yield _answers(d, parameters=result.source.autopilot == "ardupilot")
+    yield _answers(d, result.advice)
     if d.verdict is Verdict.INSUFFICIENT:
         return
     yield ""
@@ -97,7 +100,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     yield from _limits(d)
 
 
-def _answers(d: Diagnosis, *, parameters: bool) -> Table:
+def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     """What, how sure, what to do: the same words as on the page."""
     refused = d.verdict is Verdict.INSUFFICIENT
     table = Table.grid(padding=(0, 2))
@@ -110,7 +113,7 @@ def _answers(d: Diagnosis, *, parameters: bool) -> Table:
     rows = [
         ("Missing", found),
         ("Proof", [verdict.proof(d)]),
-        ("To fly" if refused else "To do", verdict.cures(d, parameters=parameters)),
+        ("To fly" if refused else "To do", verdict.cures(d, advice)),
         ("Note", verdict.remarks(d)),
     ]
     for label, sentences in rows:

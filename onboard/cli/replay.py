@@ -55,7 +55,7 @@ def replay(
     Several LOGs of one vehicle are merged: what a single flight does not show, several may.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    recorded = Recorded(() if imu is None else (1, imu), watched=report_file is not None)
+    recorded = Recorded(() if imu is None else (imu,), watched=report_file is not None)
     with reading(logs, then="comparing models") as progress:
         result = replay_recordings(logs, recorded, imu=imu, progress=progress)
     if report_file is not None and recorded.chronicle is not None:
@@ -66,11 +66,12 @@ def replay(
     if param_file is not None:
         from onboard.report.parameters import calibration_text, is_qgc
 
-        if result.autopilot != "ardupilot":
+        advice = [its for its in result.advice if its is not None]
+        if not advice:
             raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
         names = [recording.path.name for recording in result.recordings]
         qgc = is_qgc(param_file)
-        write_text(calibration_text(result.calibrations, names, qgc=qgc), param_file)
+        write_text(calibration_text(result.answers, advice, names, qgc=qgc), param_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file):

@@ -10,9 +10,11 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from onboard.advice import Advice
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import SIX_NAMES, Calibration, Estimate, Status
 from onboard.replay import Replay
+from onboard.report.verdict import about_six
 
 STATUS_WORDS = {
     Status.CALIBRATED: ("calibrated", "bold green"),
@@ -27,11 +29,11 @@ UNKNOWN = "-"
 def replay_report(result: Replay) -> Iterator[RenderableType]:
     """What a replay prints, part by part."""
     yield _recordings(result)
-    for calibration in result.calibrations:
+    for calibration, advice in zip(result.calibrations, result.advice, strict=True):
         yield Text()
         yield _headline(calibration)
-        yield _six(calibration, result.autopilot)
-        yield _sentences(_about(calibration, result.autopilot))
+        yield _six(calibration, result.autopilot, advice)
+        yield _sentences(_about(calibration, result.autopilot, advice))
 
 
 def _recordings(result: Replay) -> RenderableType:
@@ -50,14 +52,14 @@ def _headline(calibration: Calibration) -> Text:
     return Text.assemble(f"Accelerometer {calibration.imu}: ", (words, style))
 
 
-def _six(calibration: Calibration, autopilot: str) -> Table:
+def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Table:
     """The six numbers: in force, estimate, sigma, and the parameter that takes the estimate."""
     c = calibration
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
     for header in ("in force", "estimate", "sigma"):
         table.add_column(header, justify="right", no_wrap=True)
-    table.add_column("set" if c.status is Status.CALIBRATED else "parameter", no_wrap=True)
+    table.add_column("set" if advice is not None and advice.settable else "parameter", no_wrap=True)
     table.add_column("observed", no_wrap=True)
     names = parameter_names(c.imu).six if autopilot != "px4" else (UNKNOWN,) * 6
     rows = zip(
@@ -82,9 +84,15 @@ def _six(calibration: Calibration, autopilot: str) -> Table:
     return table
 
 
-def _about(calibration: Calibration, autopilot: str) -> Iterator[tuple[str, str]]:
+def _about(
+    calibration: Calibration, autopilot: str, advice: Advice | None
+) -> Iterator[tuple[str, str]]:
     """Label and sentence of everything else that is known about one accelerometer."""
     c = calibration
+    if advice is not None:
+        yield "to do", about_six(advice)
+        for name, condition in advice.conditions.items():
+            yield "holds", f"{name} {condition}"
     if not c.parameters_known and autopilot != "px4":
         yield (
             "parameters",

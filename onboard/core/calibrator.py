@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,9 +85,18 @@ Event = WindowOpened | WindowClosed | Restarted | Advanced | FlightEnded
 class Calibrator:
     """Estimates the six numbers of every accelerometer from a stream of samples."""
 
-    def __init__(self, settings: EstimatorSettings | None = None) -> None:
-        """Take the settings."""
+    def __init__(
+        self, settings: EstimatorSettings | None = None, only: Collection[int] = ()
+    ) -> None:
+        """Take the settings.
+
+        Args:
+            settings: how it works.
+            only: accelerometers to estimate, none named: all; nothing about one of them depends
+                on whether others are estimated, too.
+        """
         self.settings = settings = settings or EstimatorSettings()
+        self._only = frozenset(only)
         self.parameters = ParametersInForce()
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings)
@@ -369,6 +379,8 @@ class Calibrator:
         )
         newest = -np.inf
         for imu, chunks in made.items():
+            if self._only and imu not in self._only:
+                continue
             for chunk in chunks:
                 self._engine_of(imu).add(chunk)
                 newest = max(newest, float(chunk.fixes.t[-1]))

@@ -91,7 +91,7 @@ class PolicySettings:
     scale_max: float = 1.2
     offset_max: float = 3.5
     scale_sigma_max: float = 0.005
-    offset_sigma_max: float = 0.03
+    offset_sigma_max: float = 0.05
     improvement: float = 0.97
     in_flight_scale_step: float = 0.005
     in_flight_offset_step: float = 0.05

@@ -6,33 +6,39 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from onboard.advice import Advice, cure_parameters
 from onboard.core.findings import Diagnosis, Effect, Verdict, Where
 from onboard.core.result import SIX_NAMES
 from onboard.report import residual_charts, verdict, words
 from onboard.report.chart import pair_bar
 from onboard.report.page import render
-from onboard.report.parameters import changes, to_set
+from onboard.report.parameters import changes
 
 TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
 
 
 def explain_html(
-    diagnosis: Diagnosis, *, files: Sequence[str], autopilot: str, duration_s: float
+    diagnosis: Diagnosis,
+    *,
+    files: Sequence[str],
+    autopilot: str,
+    duration_s: float,
+    advice: Advice | None,
 ) -> str:
     """The page of one diagnosis.
 
     Args:
         diagnosis: what was found; numbers that are not finite are shown as not known.
         files: names of the recordings.
-        autopilot: ``ardupilot`` shows parameters to change; others have different ones.
+        autopilot: where the recordings are from.
         duration_s: length of the recordings, s.
+        advice: which of ArduPilot's parameters to set; None for another autopilot.
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
     """
     unclear = {n for a in diagnosis.ambiguous for n in a.names}
-    ours = autopilot == "ardupilot"
     refused = diagnosis.verdict is Verdict.INSUFFICIENT
     return render(
         TEMPLATE,
@@ -45,7 +51,7 @@ def explain_html(
         severity=verdict.severity(diagnosis),
         missing=verdict.missing(diagnosis),
         sure=verdict.proof(diagnosis),
-        change=verdict.cures(diagnosis, parameters=ours),
+        change=verdict.cures(diagnosis, advice),
         remarks=verdict.remarks(diagnosis),
         to_fly=() if refused else verdict.to_fly(diagnosis),
         charts=residual_charts.of_flight(diagnosis, duration_s),
@@ -55,7 +61,7 @@ def explain_html(
         if residual_charts.is_located(diagnosis)
         else [],
         regimes=_regimes(diagnosis),
-        effects=[_card(e, autopilot, ambiguous=e.name in unclear) for e in diagnosis.effects],
+        effects=[_card(e, advice, ambiguous=e.name in unclear) for e in diagnosis.effects],
         ladder=_ladder(diagnosis),
         six=_six(diagnosis),
         status=diagnosis.calibration.status.value,
@@ -64,7 +70,7 @@ def explain_html(
             (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
             for name, e in diagnosis.timing.items()
         ],
-        parameters=_parameters(diagnosis) if ours else (),
+        parameters=() if advice is None else _parameters(diagnosis, advice),
         ambiguous=[
             ([words.effect_title(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous
         ],
@@ -153,7 +159,7 @@ def _where(w: Where) -> str:
     return f"{span}: {w.regime}, mostly {axis}, {words.percent(w.share)} of the mismatch"
 
 
-def _card(e: Effect, autopilot: str, *, ambiguous: bool) -> dict[str, Any]:
+def _card(e: Effect, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any]:
     before, after = e.held_out_velocity_before, e.held_out_velocity_after
     known = math.isfinite(before) and math.isfinite(after)
     return {
@@ -171,9 +177,12 @@ def _card(e: Effect, autopilot: str, *, ambiguous: bool) -> dict[str, Any]:
         "charts": residual_charts.of_effect(e),
         "rivals": [(words.effect_title(r.name), words.number(r.delta_bic)) for r in e.rivals],
         "cure": e.cure,
-        "parameters": [
-            (n, words.setting(v))
-            for n, v in (to_set(e).items() if autopilot == "ardupilot" else ())
+        "parameters": []
+        if advice is None
+        else [
+            (advice.names.get(n, n), words.setting(v))
+            for n, v in cure_parameters(e).items()
+            if e.name not in advice.against
         ],
         "intervals": _intervals(e),
         "more": max(len(e.intervals) - MOST_SPANS, 0),
@@ -185,7 +194,7 @@ def _intervals(e: Effect) -> list[str]:
     return [f"{words.fixed(a, 1)} to {words.fixed(b, 1)} s" for a, b in e.intervals[:MOST_SPANS]]
 
 
-def _parameters(d: Diagnosis) -> list[dict[str, str]]:
+def _parameters(d: Diagnosis, advice: Advice) -> list[dict[str, str]]:
     """What to set, beside what is in force where that is known."""
     c = d.calibration
     in_force: dict[str, float] = {}
@@ -202,7 +211,7 @@ def _parameters(d: Diagnosis) -> list[dict[str, str]]:
             "reason": change.reason,
             "withheld": change.withheld,
         }
-        for change in changes(d)
+        for change in changes(d, advice)
     ]
 
 

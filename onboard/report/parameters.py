@@ -2,8 +2,8 @@
 
 ``NAME,VALUE`` with ``#`` comments is what Mission Planner and MAVProxy load; QGroundControl wants
 lines of vehicle, component, name, value and type with tabs between them, by custom in a file
-whose name ends in ``.params``.  What is not safe to load unseen stays in the file as a comment,
-with the reason.
+whose name ends in ``.params``.  What the policy would not write (:mod:`onboard.advice`) stays in
+the file as a comment, with the reason.
 """
 
 from __future__ import annotations
@@ -12,13 +12,20 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from onboard.core.accelerometer import parameter_names
-from onboard.core.findings import Diagnosis, Effect, Verdict
-from onboard.core.result import SIX_NAMES, Calibration, Status
+from onboard.advice import Advice, cure_parameters
+from onboard.answer import Answer
+from onboard.core.findings import Diagnosis, Verdict
+from onboard.core.result import SIX_NAMES, Calibration
 from onboard.report.words import effect_title
 
 REAL32 = 9
-INTEGERS = {"GPS1_DELAY_MS": 4, "INS_ACCEL_FILTER": 4, "INS_TCAL": 2, "COMPASS_ORIENT": 2}
+INTEGERS = {
+    "GPS1_DELAY_MS": 4,
+    "GPS_DELAY_MS": 4,
+    "INS_ACCEL_FILTER": 4,
+    "INS_TCAL": 2,
+    "COMPASS_ORIENT": 2,
+}
 """MAV_PARAM_TYPE of what is not a real number, by the beginning of its name."""
 
 
@@ -36,57 +43,44 @@ class Change:
     number: str = ""
 
 
-def changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
-    """Parameters to set: observable calibration numbers, then the cures of the effects.
+def changes(diagnosis: Diagnosis, advice: Advice) -> tuple[Change, ...]:
+    """The six as they would be set, then the cures of the effects; what is withheld says why.
 
-    Each name comes once; values that are not finite do not come at all.  Withheld are numbers of a
-    calibration that is not complete, and cures of effects that the flight cannot tell apart.
+    Each name comes once; values that are not finite do not come at all.
     """
     found: dict[str, Change] = {}
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         return ()
-    unclear = {n for a in diagnosis.ambiguous for n in a.names}
-    for change in (*_calibration(diagnosis.calibration), *_cures(diagnosis, unclear)):
+    for change in (*_six(advice), *_cures(diagnosis, advice)):
         if math.isfinite(change.value):
             found.setdefault(change.name, change)
     return tuple(found.values())
 
 
-def to_set(effect: Effect) -> dict[str, float]:
-    """Parameters that cure an effect; none where they hold it already."""
-    return {} if effect.cure.startswith("none") else effect.parameters
-
-
-def param_file(diagnosis: Diagnosis, *, qgc: bool = False) -> str:
+def parameter_text(
+    diagnosis: Diagnosis, advice: Advice, files: Sequence[str] = (), *, qgc: bool = False
+) -> str:
     """The parameter file of a diagnosis, plain ASCII; ``qgc``: as QGroundControl wants it."""
-    calibration = diagnosis.calibration
-    lines = [
-        f"# onboard: accelerometer {diagnosis.imu}, verdict {diagnosis.verdict.value}",
-        f"# calibration: {calibration.status.value}",
-    ]
+    lines = [f"# onboard explain: {', '.join(files)}"] if files else []
+    lines.append(f"# accelerometer {diagnosis.imu}, verdict {diagnosis.verdict.value}")
+    lines.append(f"# calibration: {diagnosis.calibration.status.value}")
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         lines.append("# This flight says too little: nothing to change.")
     else:
-        lines += _hidden(calibration)
+        lines += _about(diagnosis.calibration, advice)
         lines.append("# Compare with the parameters in force before loading.")
-    return _text([*lines, *_settings(changes(diagnosis), qgc=qgc)])
-
-
-def parameter_text(diagnosis: Diagnosis, files: Sequence[str], *, qgc: bool = False) -> str:
-    """:func:`param_file` with the names of the recordings on top."""
-    return _text([f"# onboard explain: {', '.join(files)}"]) + param_file(diagnosis, qgc=qgc)
+    return _text([*lines, *_settings(changes(diagnosis, advice), qgc=qgc)])
 
 
 def calibration_text(
-    calibrations: Sequence[Calibration], files: Sequence[str], *, qgc: bool = False
+    answers: Sequence[Answer], advice: Sequence[Advice], files: Sequence[str], *, qgc: bool = False
 ) -> str:
-    """The parameter file of a replay: what was observed, of every accelerometer."""
+    """The parameter file of a replay: the six of every accelerometer."""
     lines = [f"# onboard replay: {', '.join(files)}"]
-    for calibration in calibrations:
-        lines.append(f"# accelerometer {calibration.imu}: {calibration.status.value}")
-        lines += _hidden(calibration)
-        known = [c for c in _calibration(calibration) if math.isfinite(c.value)]
-        lines += _settings(known, qgc=qgc)
+    for given, its in zip(answers, advice, strict=True):
+        lines.append(f"# accelerometer {given.imu}: {given.calibration.status.value}")
+        lines += _about(given.calibration, its)
+        lines += _settings(_six(its), qgc=qgc)
     return _text([*lines, "# Compare with the parameters in force before loading."])
 
 
@@ -95,10 +89,15 @@ def is_qgc(file: str) -> bool:
     return file.lower().endswith(".params")
 
 
-def _hidden(calibration: Calibration) -> list[str]:
+def _about(calibration: Calibration, advice: Advice) -> Iterator[str]:
+    """What holds for all six: the objections, and what is left as it is."""
+    for reason in advice.reasons:
+        yield f"# not to be set: {reason}"
+    if not calibration.parameters_known:
+        yield "# parameters in force are not in the recording: scale 1 and offset 0 are assumed"
     names = zip(SIX_NAMES, calibration.observable, strict=True)
-    hidden = [name for name, seen in names if not seen]
-    return [f"# not observable in this flight: {', '.join(hidden)}"] if hidden else []
+    if hidden := [name for name, seen in names if not seen]:
+        yield f"# not observable in this flight, left as in force: {', '.join(hidden)}"
 
 
 def _settings(found: Iterable[Change], *, qgc: bool) -> Iterator[str]:
@@ -119,28 +118,29 @@ def _text(lines: Iterable[str]) -> str:
     return "".join(_plain(line) + "\n" for line in lines)
 
 
-def _calibration(calibration: Calibration) -> Iterator[Change]:
-    rows = zip(
-        parameter_names(calibration.imu).six,
-        SIX_NAMES,
-        calibration.scale + calibration.offset,
-        calibration.scale_sigma + calibration.offset_sigma,
-        calibration.observable,
-        strict=True,
-    )
-    complete = calibration.status is Status.CALIBRATED
-    withheld = "" if complete else f"the calibration is {calibration.status.value}"
-    for name, words, value, sigma, seen in rows:
-        if seen:
-            spread = f", sigma {sigma:.2g}" if math.isfinite(sigma) else ""
-            yield Change(name, value, f"calibration: {words}{spread}", withheld, words)
+def _six(advice: Advice) -> Iterator[Change]:
+    if advice.plan is None:
+        return
+    withheld = ""
+    if advice.refusals:
+        withheld = advice.refusals[0].objection.value.replace("_", " ")
+    for words, number in zip(SIX_NAMES, advice.plan.changes, strict=True):
+        if number.kept:
+            continue
+        reason = f"calibration: {words}"
+        if math.isfinite(number.sigma):
+            reason += f", sigma {number.sigma:.2g}"
+        if number.name in advice.conditions:
+            reason += f": {advice.conditions[number.name]}"
+        yield Change(number.name, number.wanted, reason, withheld, words)
 
 
-def _cures(diagnosis: Diagnosis, unclear: set[str]) -> Iterator[Change]:
+def _cures(diagnosis: Diagnosis, advice: Advice) -> Iterator[Change]:
     for effect in diagnosis.effects:
-        withheld = "not told apart from another effect" if effect.name in unclear else ""
-        for name, value in to_set(effect).items():
-            yield Change(name, value, f"{effect.name}: {effect_title(effect.name)}", withheld)
+        withheld = advice.against.get(effect.name, "")
+        for name, value in cure_parameters(effect).items():
+            reason = f"{effect.name}: {effect_title(effect.name)}"
+            yield Change(advice.names.get(name, name), value, reason, withheld)
 
 
 def _plain(line: str) -> str:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from onboard.advice import Advice
 from onboard.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
 from onboard.core.accelerometer import parameter_names
 from onboard.core.observability import Needs
 from onboard.core.result import SIX_NAMES, Calibration, Status
-from onboard.core.settings import EstimatorSettings
 from onboard.replay import Replay
 from onboard.report import words
 from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
 from onboard.report.page import render
+from onboard.report.verdict import about_six
 
 Array = NDArray[np.float64]
 
@@ -27,7 +29,6 @@ BEGINNING = 0.15
 """Share of a course whose wide bands may leave the picture."""
 ENOUGH_PERCENT = 60.0
 MOST_SPANS = 12
-KEPT_S = EstimatorSettings().buffer_s
 HEADLINES = {
     Status.CALIBRATED: "Calibrated",
     Status.COLLECTING: "Not enough data yet",
@@ -66,16 +67,17 @@ def replay_html(result: Replay, chronicle: Chronicle) -> str:
         trust_chart=_trust_chart(chronicle),
         trust=_trust(chronicle),
         imus=[
-            _imu(c, chronicle.figures(c.imu), result.autopilot, chronicle)
-            for c in result.calibrations
+            _imu(c, chronicle.figures(c.imu), result.autopilot, chronicle, advice)
+            for c, advice in zip(result.calibrations, result.advice, strict=True)
         ],
         free=f"{FREE_S:.0f}",
-        kept=f"{KEPT_S / 60.0:.0f}" if chronicle.duration_s > KEPT_S else "",
     )
 
 
-def _imu(c: Calibration, f: Figures, autopilot: str, chronicle: Chronicle) -> dict[str, Any]:
-    what, sure, do = _sentences(c, f, autopilot)
+def _imu(
+    c: Calibration, f: Figures, autopilot: str, chronicle: Chronicle, advice: Advice | None
+) -> dict[str, Any]:
+    what, sure, do = _sentences(c, f, advice)
     return {
         "imu": c.imu,
         "status": c.status.value,
@@ -104,7 +106,7 @@ def _imu(c: Calibration, f: Figures, autopilot: str, chronicle: Chronicle) -> di
     }
 
 
-def _sentences(c: Calibration, f: Figures, autopilot: str) -> tuple[str, str, str]:
+def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, str, str]:
     """What was found, how sure, what to do: three short paragraphs."""
     seen = sum(c.observable)
     if c.status is Status.CALIBRATED:
@@ -127,15 +129,31 @@ def _sentences(c: Calibration, f: Figures, autopilot: str) -> tuple[str, str, st
             f"noise (with the parameters in force {c.held_out_before:.2f}; 1 is ideal)."
         )
     fly = c.coverage.advice or (f.seen.weak[0].advice if f.seen is not None and f.seen.weak else "")
-    if c.status is Status.CALIBRATED and seen == len(SIX_NAMES):
-        do = "Set the parameters below." if autopilot == "ardupilot" else "Use the numbers below."
-    elif c.status is Status.CALIBRATED:
-        do = f"Set the observed parameters below. For the others: {fly}."
+    return what, sure, " ".join(_to_do(c, fly, advice))
+
+
+def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
+    """What to set, by the policy, and what to fly."""
+    seen = sum(c.observable)
+    calibrated = c.status is Status.CALIBRATED
+    if advice is None:
+        if calibrated:
+            yield "Use the numbers below." if seen == len(SIX_NAMES) else "Use the observed ones."
+    elif advice.settable:
+        yield (
+            "Set the parameters below."
+            if seen == len(SIX_NAMES)
+            else ("Set the observed parameters below.")
+        )
     else:
-        do = f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
+        yield about_six(advice)
+        yield from (f"{name}: {said}." for name, said in advice.conditions.items())
+    if not calibrated:
         if "onboard explain" in c.note:
-            do = f"Ask onboard explain what is missing. {do}"
-    return what, sure, do
+            yield "Ask onboard explain what is missing."
+        yield f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
+    elif seen < len(SIX_NAMES) and fly:
+        yield f"For the others: {fly}."
 
 
 def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:

@@ -7,9 +7,9 @@ import re
 
 import numpy as np
 
+from onboard.advice import Advice, cure_parameters
 from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.push import physics
-from onboard.report.parameters import to_set
 from onboard.report.sizes import size_in_words
 from onboard.report.words import capital, effect_title, fixed, number, setting, signed
 
@@ -114,19 +114,38 @@ def fall(before: float, after: float) -> str:
     return f"{signed(change, 0) if abs(change) >= 0.5 else '0'}\u00a0%"
 
 
-def cures(diagnosis: Diagnosis, *, parameters: bool = True) -> list[str]:
-    """What to do, one sentence for each effect; ``parameters`` names those to set."""
+def cures(diagnosis: Diagnosis, advice: Advice | None = None) -> list[str]:
+    """What to do, one sentence for each effect, then what the calibration is good for.
+
+    ``advice`` says which parameters may be set; without it none is named.
+    """
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         return to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
     out = []
     for e in diagnosis.effects:
-        settings = ", ".join(
-            f"{n} = {setting(v)}" for n, v in to_set(e).items() if math.isfinite(v) and parameters
-        )
-        if e.cure or settings:
+        settings = "" if advice is None else _named(e, advice)
+        why = "" if advice is None or not settings else advice.against.get(e.name, "")
+        if why:
+            out.append(_sentence(e.cure, ""))
+            out.append(f"Do not set {settings} yet: {why}.")
+        elif e.cure or settings:
             out.append(_sentence(e.cure, settings))
-    if out:
-        return list(dict.fromkeys(out))
+    if not out:
+        out = _without_cure(diagnosis)
+    if advice is not None:
+        out.append(about_six(advice))
+    return list(dict.fromkeys(s for s in out if s))
+
+
+def about_six(advice: Advice) -> str:
+    """Whether to set the six, in a sentence."""
+    if advice.settable:
+        return "Set the calibration parameters."
+    reasons = "; ".join(advice.reasons)
+    return f"Leave the calibration parameters as they are: {reasons}."
+
+
+def _without_cure(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.effects:
         return ["No parameter cures what was found."]
     if diagnosis.verdict is Verdict.CLEAN:
@@ -134,10 +153,18 @@ def cures(diagnosis: Diagnosis, *, parameters: bool = True) -> list[str]:
     return ["Look at where the residual lives for a cause."]
 
 
+def _named(effect: Effect, advice: Advice) -> str:
+    return ", ".join(
+        f"{advice.names.get(n, n)} = {setting(v)}"
+        for n, v in cure_parameters(effect).items()
+        if math.isfinite(v)
+    )
+
+
 def _sentence(cure: str, settings: str) -> str:
     text = capital(cure.rstrip(".")).replace("None:", "Nothing:")
     if not settings:
-        return f"{text}."
+        return f"{text}." if text else ""
     return f"{text}: {settings}." if text else f"Set {settings}."
 
 

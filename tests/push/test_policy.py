@@ -5,6 +5,8 @@ from calibrations import calibration, covariance, current
 
 from onboard.core.accelerometer import SixParameters, parameter_names
 from onboard.core.result import Status
+from onboard.daemon.configuration import PushSettings
+from onboard.daemon.settings import policy_settings
 from onboard.push.plan import propose
 from onboard.push.policy import (
     ALLOWED,
@@ -18,6 +20,7 @@ from onboard.push.policy import (
     judge,
     moment,
 )
+from onboard.push.policy import objections as values_objections
 
 LANDED = VehicleCondition(armed=False, disarmed_for=6.0, landed=True)
 HEALTHY = 0x001 | 0x002 | 0x004 | 0x008 | 0x010 | 0x020 | 0x100 | 0x200
@@ -31,6 +34,19 @@ def objections(cal=None, condition=LANDED, settings=None, values=None, others=()
     for refusal in found:
         assert refusal.sentence
     return {r.objection for r in found}
+
+
+def test_a_file_is_judged_by_the_limits_that_a_service_has_by_default():
+    assert policy_settings(PushSettings()) == PolicySettings()
+
+
+def test_objections_to_the_values_know_nothing_of_the_moment():
+    cal = calibration()
+    plan = propose(cal, current(), system_id=1)
+    assert values_objections(plan, cal, PolicySettings(mode=Mode.NEVER)) == ()
+    (said,) = values_objections(plan, cal, PolicySettings(), missing="the axes are not square")
+    assert said.objection is Objection.PHYSICS_MISSING
+    assert said.sentence == "physics missing: the axes are not square"
 
 
 def test_good_calibration_of_a_landed_vehicle_may_be_written():
@@ -96,7 +112,7 @@ class TestEstimate:
     @pytest.mark.parametrize("i", range(6))
     def test_each_number_must_be_sharp(self, i):
         sigmas = [0.001] * 3 + [0.008] * 3
-        sigmas[i] *= 6
+        sigmas[i] *= 7
         assert objections(calibration(covariance=covariance(sigmas))) == {Objection.SIGMA_TOO_LARGE}
 
     def test_value_that_is_already_there_is_not_written_again(self):

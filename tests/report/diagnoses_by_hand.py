@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from onboard.advice import Advice, advise
+from onboard.answer import Answer
 from onboard.core.findings import (
     Ambiguity,
     Diagnosis,
@@ -21,6 +25,16 @@ from onboard.core.findings import (
 from onboard.core.result import Calibration, Coverage, Estimate, Status
 
 NAN = float("nan")
+SIGMAS = (0.001, 0.001, 0.01, 0.01, 0.01, 0.2)
+IN_FORCE = {
+    "AHRS_TRIM_X": 0.0,
+    "AHRS_TRIM_Y": 0.0,
+    "GPS1_DELAY_MS": 0.0,
+    "GPS1_POS_X": 0.0,
+    "GPS1_POS_Y": 0.0,
+    "GPS1_POS_Z": 0.0,
+}
+"""What a recording has of the autopilot's parameters beside the six."""
 
 
 def calibration(**changed: object) -> Calibration:
@@ -29,9 +43,11 @@ def calibration(**changed: object) -> Calibration:
         "status": Status.CALIBRATED,
         "scale": (1.01234567, 0.99, 1.002),
         "offset": (0.2, -0.1, 0.05),
-        "scale_sigma": (0.001, 0.001, 0.01),
-        "offset_sigma": (0.01, 0.01, 0.2),
-        "covariance": tuple(tuple(float(i == j) for j in range(6)) for i in range(6)),
+        "scale_sigma": SIGMAS[:3],
+        "offset_sigma": SIGMAS[3:],
+        "covariance": tuple(
+            tuple(s * s if i == j else 0.0 for j in range(6)) for i, s in enumerate(SIGMAS)
+        ),
         "observable": (True, True, False, True, True, False),
         "note": "",
         "in_force_scale": (1.0, 1.0, 1.0),
@@ -154,3 +170,8 @@ def told_apart_not() -> Diagnosis:
     return diagnosis(
         ambiguous=(Ambiguity(("gps_latency", "imu_delay"), "fly banked turns both ways"),)
     )
+
+
+def advice_on(made: Diagnosis, parameters: Mapping[str, float] = IN_FORCE) -> Advice:
+    """What the policy says of it; the status is as it was made."""
+    return advise((Answer(made),), parameters)[0]

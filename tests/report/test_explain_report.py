@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from diagnoses_by_hand import advice_on
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import diagnose
@@ -77,7 +78,13 @@ def test_the_document_has_only_finite_numbers(diagnosis):
 
 
 def test_the_page_is_well_formed_and_needs_nothing_else(diagnosis):
-    page = explain_html(diagnosis, files=["<x>.tlog"], autopilot="ardupilot", duration_s=150.0)
+    page = explain_html(
+        diagnosis,
+        files=["<x>.tlog"],
+        autopilot="ardupilot",
+        duration_s=150.0,
+        advice=advice_on(diagnosis),
+    )
     parser = Balanced()
     parser.feed(page)
     assert parser.open == []
@@ -97,13 +104,13 @@ def test_what_is_not_a_number_does_no_harm(diagnosis):
         ladder=(),
     )
     parser = Balanced()
-    parser.feed(explain_html(nothing, files=["x"], autopilot="px4", duration_s=nan))
+    parser.feed(explain_html(nothing, files=["x"], autopilot="px4", duration_s=nan, advice=None))
     assert parser.open == []
     json.loads(document(nothing))
 
 
 def test_the_parameter_file_reads_back(diagnosis):
-    lines = parameter_text(diagnosis, ["x.tlog"]).splitlines()
+    lines = parameter_text(diagnosis, advice_on(diagnosis), ["x.tlog"]).splitlines()
     pairs = dict(line.split(",") for line in lines if not line.startswith("#"))
     seen = sum(diagnosis.calibration.observable)
     assert sum(name.startswith("INS_ACC") for name in pairs) == seen

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses_by_hand import diagnosis, effect, told_apart_not, unknown
+from diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
 from html_page import Page
 
 from onboard.core.findings import Diagnosis, Imprint, Law, Quantity, Verdict
@@ -16,7 +16,8 @@ from onboard.report.explain import explain_html
 
 
 def page(d: Diagnosis, files=("flight.tlog",), autopilot: str = "ardupilot") -> tuple[str, Page]:
-    html = explain_html(d, files=files, autopilot=autopilot, duration_s=300.0)
+    advice = advice_on(d) if autopilot == "ardupilot" else None
+    html = explain_html(d, files=files, autopilot=autopilot, duration_s=300.0, advice=advice)
     return html, Page.of(html)
 
 
@@ -167,6 +168,7 @@ def test_a_real_diagnosis(recordings: Path):
         files=result.files,
         autopilot=result.source.autopilot,
         duration_s=result.duration_s,
+        advice=result.advice,
     )
     parsed = Page.of(html)
     assert len(html.encode()) < 500_000

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
-from diagnoses_by_hand import calibration, diagnosis, effect, told_apart_not, unknown
+from diagnoses_by_hand import (
+    IN_FORCE,
+    advice_on,
+    calibration,
+    diagnosis,
+    effect,
+    told_apart_not,
+    unknown,
+)
 from pymavlink.mavparm import MAVParmDict
 
+from onboard.advice import advise
+from onboard.answer import Answer
 from onboard.core.accelerometer import parameter_names
 from onboard.core.findings import Verdict
 from onboard.core.result import Status
-from onboard.report.parameters import calibration_text, param_file
+from onboard.report.parameters import calibration_text, parameter_text
+
+
+def param_file(made, parameters=IN_FORCE, *, qgc: bool = False) -> str:
+    return parameter_text(made, advice_on(made, parameters), qgc=qgc)
 
 
 def loaded(text: str) -> dict[str, float]:
@@ -90,13 +102,14 @@ def test_both_forms_hold_the_same_settings():
 
 
 def test_a_replay_gives_what_was_observed_of_every_accelerometer():
-    c = diagnosis().calibration
-    two = replace(c, imu=2, status=Status.INSUFFICIENT)
-    text = calibration_text([c, two], ["a.BIN"])
-    set_now = [line.split(",")[0] for line in text.splitlines() if not line.startswith("#")]
-    assert set(set_now) <= set(parameter_names(1).six)
-    assert len(set_now) == sum(c.observable)
-    assert "not set, the calibration is insufficient: INS_ACC2" in text
+    one = diagnosis()
+    two = diagnosis(imu=2, calibration=calibration(imu=2, status=Status.INSUFFICIENT))
+    given = [Answer(one), Answer(two)]
+    text = calibration_text(given, advise(given, IN_FORCE), ["a.BIN"])
+    assert set(loaded(text)) <= set(parameter_names(1).six)
+    assert len(loaded(text)) == sum(one.calibration.observable)
+    assert "not to be set: the calibration is 'insufficient'" in text
+    assert "not set, not calibrated: INS_ACC2" in text
 
 
 def test_mavproxys_own_loader_reads_it(tmp_path, capsys):

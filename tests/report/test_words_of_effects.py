@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from diagnoses_by_hand import NAN, diagnosis, effect
+from diagnoses_by_hand import NAN, advice_on, diagnosis, effect
 
 from onboard.core.findings import Quantity, Verdict
 from onboard.report.parameters import changes
@@ -88,16 +88,17 @@ def test_every_verdict_has_words_for_everything(verdict):
 
 
 def test_parameters_are_left_out_where_they_are_not_the_autopilots():
-    assert "GPS1_DELAY_MS" in cures(diagnosis())[0]
+    ours = diagnosis()
+    assert "GPS1_DELAY_MS" in cures(ours, advice_on(ours))[0]
     other = diagnosis(effects=(effect(cure="tell it the delay"),))
-    assert cures(other, parameters=False) == ["Tell it the delay."]
+    assert cures(other) == ["Tell it the delay."]
 
 
 def test_what_the_parameters_hold_already_is_not_set_again():
     held = effect("mount_tilt", cure="none: AHRS_TRIM holds it", parameters={"AHRS_TRIM_X": 0.02})
     d = diagnosis(effects=(held,))
     assert cures(d) == ["Nothing: AHRS_TRIM holds it."]
-    assert all(c.name != "AHRS_TRIM_X" for c in changes(d))
+    assert all(c.name != "AHRS_TRIM_X" for c in changes(d, advice_on(d)))
 
 
 def test_what_is_not_all_is_never_called_noise():

@@ -14,6 +14,8 @@ from onboard.core.nodes import Signals
 Array = NDArray[np.float64]
 
 AXES = "xyz"
+REFERENCE_DEGC = 35.0
+"""Temperature at which a drift with it is nothing: ArduPilot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +23,7 @@ class Origin:
     """What effects count from: times, temperatures; places and trim as the autopilot has them."""
 
     t0: float
-    temperature: float = 35.0
+    temperature: float = REFERENCE_DEGC
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -1,0 +1,168 @@
+"""One policy decides what a file sets: what it would not write is a comment with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnoses_by_hand import IN_FORCE, NAN, advice_on, calibration, diagnosis, effect
+from test_report_parameters import loaded
+
+from onboard.advice import advise
+from onboard.answer import judged
+from onboard.core.findings import Ambiguity, Law, Quantity, Rival, Verdict
+from onboard.core.result import Status
+from onboard.report.parameters import parameter_text
+from onboard.report.verdict import cures
+
+STEP = effect(
+    "bias_step",
+    unknowns={
+        "time": Quantity(187.6, 0.5, "s"),
+        "x": Quantity(0.3534, 0.002, "m/s^2"),
+        "y": Quantity(-0.2, 0.002, "m/s^2"),
+        "z": Quantity(0.0, 0.002, "m/s^2"),
+    },
+    parameters={},
+    cure="inspect the mount",
+    rivals=(),
+)
+DRIFT = effect(
+    "temperature_drift",
+    unknowns={
+        a: Quantity(q, 1e-4, "m/s^2/K") for a, q in zip("xyz", (-0.025, 0.03, 0.0), strict=True)
+    },
+    parameters={},
+    cure="calibrate it",
+    rivals=(),
+    law=Law("temperature", "°C", "", "", np.linspace(24.6, 47.2), {}, {}),
+)
+TILT = effect(
+    "mount_tilt",
+    unknowns={"roll": Quantity(0.037, 0.01, "rad"), "pitch": Quantity(0.079, 0.011, "rad")},
+    parameters={"AHRS_TRIM_X": -0.037, "AHRS_TRIM_Y": -0.079},
+    cure="level the autopilot again, or set AHRS_TRIM",
+    held_out_before=2.0,
+    held_out_after=1.0,
+    rivals=(),
+)
+
+
+def written(made, parameters=IN_FORCE) -> str:
+    """The file of the answer that a diagnosis gives."""
+    given = judged(made)
+    return parameter_text(given.diagnosis, advise((given,), parameters)[0])
+
+
+def comment(text: str, name: str) -> str:
+    """The comment above a parameter that is not set, and its own line."""
+    lines = text.splitlines()
+    at = next(i for i, line in enumerate(lines) if f" {name}," in line)
+    assert lines[at].startswith("# not set")
+    return f"{lines[at - 1]} {lines[at]}"
+
+
+def test_an_offset_that_jumped_is_a_comment_with_both_values_and_since_when():
+    text = written(diagnosis(effects=(STEP,)))
+    assert loaded(text) == {}
+    said = comment(text, "INS_ACCOFFS_X")
+    after = 0.2 + 0.3534 / 1.01234567
+    assert f"0.2000 until 188 s, {after:.4f} from then on" in said
+    assert "the offset jumped" in text
+
+
+def test_a_rotated_boards_jump_is_told_in_the_axes_of_its_parameters():
+    turned = written(diagnosis(effects=(STEP,)), IN_FORCE | {"AHRS_ORIENTATION": 4.0})
+    after = 0.2 - 0.3534 / 1.01234567  # yaw by 180 degrees: the sensor's x points aft
+    assert f"0.2000 until 188 s, {after:.4f} from then on" in comment(turned, "INS_ACCOFFS_X")
+
+
+def test_a_drift_says_at_which_temperature_its_offset_holds_and_what_was_flown():
+    text = written(diagnosis(effects=(DRIFT,)))
+    assert loaded(text) == {}
+    said = comment(text, "INS_ACCOFFS_Y")
+    assert "-0.1000 at 35 degC, +0.0303 per degree, flown from 25 to 47 degC" in said
+
+
+def test_no_improvement_is_not_called_for_by_a_page_either():
+    better = diagnosis(effects=(), calibration=calibration(held_out_before=0.90))
+    worse = diagnosis(
+        effects=(), calibration=calibration(held_out_before=0.90, held_out_after=0.89)
+    )
+    assert "Leave" in cures(better, advice_on(better))[-1]  # 1.0 is no less than 0.9
+    said = cures(worse, advice_on(worse))[-1]
+    assert "Leave the calibration parameters as they are" in said
+    assert "0.9 to 0.89 only" in said
+    assert not any(n.startswith("INS_") for n in loaded(written(worse)))
+
+
+def test_parameters_that_the_recording_lacks_are_said_to_be_assumed_and_nothing_is_set():
+    text = written(diagnosis(calibration=calibration(parameters_known=False)), {})
+    assert loaded(text) == {}
+    assert "scale 1 and offset 0 are assumed" in text
+    assert "GPS1_DELAY_MS in force is not in the recording" in text
+
+
+def test_a_trim_is_not_set_from_a_flight_that_does_not_calibrate_the_accelerometer():
+    shy = calibration(status=Status.INSUFFICIENT)
+    text = written(diagnosis(effects=(TILT,), calibration=shy))
+    assert loaded(text) == {}
+    assert "read off from the accelerometer" in comment(text, "AHRS_TRIM_Y")
+    assert "AHRS_TRIM_Y" in loaded(written(diagnosis(effects=(TILT,))))
+
+
+def test_a_trim_that_helps_by_three_percent_at_most_is_not_set():
+    little = replace(TILT, held_out_before=0.747, held_out_after=0.736)
+    text = written(diagnosis(effects=(little,)))
+    assert "AHRS_TRIM_Y" not in loaded(text)
+    assert "falls from 0.747 to 0.736 only" in comment(text, "AHRS_TRIM_Y")
+
+
+@pytest.mark.parametrize(
+    "doubt",
+    [
+        {"effects": (replace(TILT, rivals=(Rival("cross_axis", 9.0),)),)},
+        {"effects": (TILT,), "ambiguous": (Ambiguity(("cross_axis", "mount_tilt"), "turn"),)},
+    ],
+    ids=["rival", "ambiguity"],
+)
+def test_a_cure_beside_which_a_rival_stands_is_not_set(doubt):
+    text = written(diagnosis(**doubt))
+    assert "AHRS_TRIM_Y" not in loaded(text)
+    assert "not told apart from cross_axis" in comment(text, "AHRS_TRIM_Y")
+    assert "Do not set AHRS_TRIM" in " ".join(
+        cures(diagnosis(**doubt), advice_on(diagnosis(**doubt)))
+    )
+
+
+@pytest.mark.parametrize("verdict", [Verdict.PARTLY_EXPLAINED, Verdict.UNEXPLAINED])
+def test_no_cure_is_set_while_something_else_is_missing(verdict):
+    text = written(diagnosis(verdict=verdict, effects=(TILT,)))
+    assert loaded(text) == {}
+    assert "does not explain all" in comment(text, "AHRS_TRIM_X")
+
+
+def test_an_older_autopilot_gets_the_names_that_it_has():
+    older = {"GPS_DELAY_MS": 0.0}
+    assert loaded(written(diagnosis(), older))["GPS_DELAY_MS"] == 210.0
+
+
+def test_the_numbers_that_are_set_belong_to_those_that_stay():
+    """z scale is not seen and stays at 1; the z offset that belongs to it is not the estimate's."""
+    c = calibration(observable=(True, True, False, True, True, True))
+    rows = [list(row) for row in c.covariance]
+    rows[5][5] = 0.01**2
+    rows[2][5] = rows[5][2] = 0.9 * 0.01 * 0.01
+    c = replace(c, covariance=tuple(map(tuple, rows)), offset_sigma=(0.01, 0.01, 0.01))
+    set_now = loaded(written(diagnosis(effects=(), calibration=c)))
+    assert "INS_ACCSCAL_Z" not in set_now
+    assert set_now["INS_ACCOFFS_Z"] == pytest.approx(0.05 + 0.9 * (1.0 - 1.002), abs=1e-6)
+
+
+def test_numbers_that_make_no_plan_are_refused():
+    made = diagnosis(effects=(), calibration=calibration(scale=(NAN,) * 3))
+    advice = advice_on(made)
+    assert not advice.settable
+    assert advice.plan is None
+    assert advice.reasons == ("there is no usable estimate",)

@@ -1,0 +1,55 @@
+"""What the files and words of recordings set: nothing that the policy would not write."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from test_advice import comment
+from test_report_parameters import loaded
+
+from onboard.explain import Explanation, explain
+from onboard.report.parameters import parameter_text
+from onboard.report.verdict import about_six
+
+pytestmark = pytest.mark.recordings
+
+
+def file_of(result: Explanation) -> str:
+    return parameter_text(result.diagnosis, result.advice, result.files)
+
+
+def test_a_jump_gives_both_offsets_and_when(recordings):
+    """i03: 0.05 before the jump at 188 s, 0.40 after it."""
+    text = file_of(explain([recordings / "sitl" / "i03.tlog"]))
+    assert loaded(text) == {}
+    said = comment(text, "INS_ACCOFFS_X")
+    before, t, after = map(
+        float, re.search(r"([\d.]+) until (\d+) s, ([\d.]+) from", said).groups()
+    )
+    assert (before, after) == (pytest.approx(0.049, abs=0.01), pytest.approx(0.40, abs=0.02))
+    assert abs(t - 188.0) < 2.0
+
+
+def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
+    text = file_of(explain([recordings / "sitl" / "b04.tlog"]))
+    assert loaded(text) == {}
+    assert re.search(
+        r"at 35 degC, [+-][\d.]+ per degree, flown from \d+ to \d+ degC",
+        comment(text, "INS_ACCOFFS_X"),
+    )
+
+
+def test_a_trim_for_three_percent_of_an_insufficient_flight_is_not_set(recordings):
+    result = explain([recordings / "real" / "real-fixedwing-03.BIN"])
+    assert loaded(file_of(result)) == {}
+    assert "calibration: insufficient" in file_of(result)
+
+
+def test_what_improves_nothing_is_not_recommended(recordings):
+    """real-fixedwing-02: held-out residual 0.90 -> 0.89, and no parameters in the log."""
+    result = explain([recordings / "real" / "real-fixedwing-02.BIN"])
+    assert loaded(file_of(result)) == {}
+    assert about_six(result.advice).startswith("Leave the calibration parameters as they are")
+    assert "in force" in about_six(result.advice)
+    assert "scale 1 and offset 0 are assumed" in file_of(result)
