@@ -177,7 +177,7 @@ class Chronicle:
             return Figures(self._course(imu), nothing, nothing, nothing, None)
         before, after = self._free(imu, engine)
         return Figures(
-            self._course(imu), before, after, self._innovation(engine), _observability(engine)
+            self._course(imu), before, after, self._innovation(engine), self._observability(engine)
         )
 
     # How
@@ -241,6 +241,12 @@ class Chronicle:
                 )
             )
 
+    def _observability(self, engine: Engine) -> Observability | None:
+        solution = engine.solution()
+        if solution is None:
+            return None
+        return assess(six_information(solution), engine.settings.needs, self.calibrator.kind)
+
     def _course(self, imu: int) -> Course:
         points = self._points.get(imu, [])
         if not points:
@@ -293,11 +299,6 @@ class Chronicle:
                     piece = last
             placed.insert(0, piece)
         return placed
-
-
-def _observability(engine: Engine) -> Observability | None:
-    solution = engine.solution()
-    return None if solution is None else assess(six_information(solution), engine.settings.needs)
 
 
 def _runs(items: list[Item], times: list[float]) -> list[list[Item]]:

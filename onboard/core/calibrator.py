@@ -92,6 +92,8 @@ class Calibrator:
         self._first = np.inf
         self._armed: bool | None = None
         self._finished = False
+        self.kind = ""
+        """Of vehicle, as it says itself: what to fly depends on it."""
         self.ekf_bias: dict[int, EkfBias] = {}
 
     @property
@@ -155,6 +157,7 @@ class Calibrator:
             return ()
         events = self._judged(sample)
         if isinstance(sample, VehicleState):
+            self.kind = sample.kind or self.kind
             events += self._vehicle(sample)
         return events
 
@@ -199,6 +202,7 @@ class Calibrator:
             engine,
             self.parameters,
             finished=self._finished,
+            kind=self.kind,
             rejected={k: n for k, n in rejected.items() if n},
         )
 

@@ -35,7 +35,7 @@ STEADY: Final[Mapping[str, str]] = MappingProxyType(
     {"failed_before": "the last try to write it failed; it is tried again by itself"}
 )
 """Instead of sentences that count seconds: a state is the same until something happens."""
-FLY_ON = "fly on with GPS trusted: fast, with hard braking and turns both ways"
+FLY_ON = "fly on with GPS trusted, changing speed and direction often"
 GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
 _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
