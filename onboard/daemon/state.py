@@ -124,8 +124,9 @@ def _proposed(
         if "diagnosing" in held:
             then = "it is written when the flight has been diagnosed"
         return _state("calibrated", f"{approved}calibrated", f"{known}; {then}", GOOD, further)
-    if lasting.keys() <= BY_CHOICE:
-        why = "; ".join(lasting.values())
+    chosen = [sentence for name, sentence in lasting.items() if name in BY_CHOICE]
+    if chosen and lasting.keys() <= BY_CHOICE | {"approval"}:
+        why = "; ".join(chosen)
         return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
     if lasting.keys() == {"approval"}:
         if len(held) > 1:
