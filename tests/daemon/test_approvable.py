@@ -25,6 +25,7 @@ from onboard.push.policy import PolicySettings
         (["not_diagnosed", "armed"], False),
         (["approval", "nothing_to_change"], False),
         (["refused", "nothing_to_change"], False),
+        (["approval", "no_improvement"], False),
         (["sigma_too_large"], False),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import pytest
 from daemons import calibration
@@ -21,6 +22,7 @@ SENTENCES = {
     "physics_missing": "physics missing: the offset follows the temperature",
     "nothing_to_change": "no value differs from the one in force by 2 sigma",
     "sigma_too_large": "INS_ACCSCAL_X: sigma 0.006 is above 0.005",
+    "no_improvement": "the held-out residual would go from 0.9 to 0.89 only",
     "policy_never": "the push policy is 'never': values are proposed only",
     "refused": "a person rejected it; `onboard approve 1` lifts that",
     "failed_before": "the last try failed: the next one in 17 s",
@@ -61,6 +63,8 @@ def state(*held, approved=False, **circumstances):
         (("nothing_to_change", "approval"), "up_to_date", "up to date"),
         (("refused", "approval"), "rejected", "rejected"),
         (("policy_never", "approval"), "calibrated", "calibrated, not written"),
+        (("no_improvement", "approval"), "up_to_date", "up to date"),
+        (("no_improvement", "sigma_too_large"), "held_back", "held back"),
         (("policy_never",), "calibrated", "calibrated, not written"),
         (("sigma_too_large", "armed"), "held_back", "held back"),
         (("unconfirmed",), "held_back", "held back"),
@@ -69,6 +73,12 @@ def state(*held, approved=False, **circumstances):
 def test_of_many_reasons_the_telling_one_decides(held, name, title):
     said = state(*held)
     assert (said.name, said.title) == (name, title)
+
+
+def test_values_that_could_not_be_compared_are_not_called_up_to_date():
+    unknown = calibration(held_out_before=math.nan)
+    said = state_of(unknown, Circumstances(proposal=proposal("no_improvement")))
+    assert said.name == "held_back"
 
 
 def test_a_reason_that_nobody_here_has_heard_of_is_told_in_its_own_words():
