@@ -7,7 +7,7 @@ import pytest
 from calibrations import calibration
 
 from onboard.core.findings import Diagnosis, Effect, Mismatch, Quantity, Series, Verdict
-from onboard.push.physics import judge_physics
+from onboard.push.physics import headline, judge_physics
 
 NAN = float("nan")
 
@@ -102,3 +102,25 @@ def test_a_residual_that_is_not_noise_forbids_it(verdict):
     found = judge_physics(PLAIN, diagnosis(PLAIN, *effects, verdict=verdict), {})
     assert "not noise" in found.missing
     assert not found.modelled
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "severity"),
+    [
+        ("clean", [], "good"),
+        ("explained", ["gps_latency", "gps_smoothing"], "info"),
+        ("explained", ["gps_latency", "cross_axis"], "warning"),
+        ("partly_explained", ["gps_latency"], "warning"),
+        ("unexplained", [], "error"),
+        ("insufficient", [], "warning"),
+    ],
+)
+def test_a_late_receiver_is_no_missing_physics(verdict, effects, severity):
+    sentence, found = headline(verdict, effects)
+    assert found == severity
+    assert ("missing from the model" in sentence) == (severity == "warning" and bool(effects))
+
+
+def test_every_verdict_has_a_headline():
+    for verdict in Verdict:
+        assert headline(verdict.value, [])[0].endswith(".")
