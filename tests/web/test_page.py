@@ -102,11 +102,17 @@ def test_roll_back_and_forgetting(browser, served):
 
 
 def test_a_roll_back_shows_what_is_in_force_and_what_would_be_written(browser, served):
+    def shown():
+        cells = (browser.text(f"#confirm-changes tbody td:nth-child({n})") for n in (1, 2, 3))
+        return list(cells)
+
     served.tell(story(30), push=wrote(story(0).push))
     browser.open(served.url)
     browser.element('#push-all [data-action="rollback"]').click()
-    cells = [browser.text(f"#confirm-changes tbody td:nth-child({n})") for n in (1, 2, 3)]
-    assert cells == ["INS_ACCSCAL_X", "1.02400", "1.00100"]
+    assert shown() == ["INS_ACCSCAL_X", "1.02400", "1.00100"]
+    browser.element("#confirm-no").click()
+    served.tell(parameters={"INS_ACCSCAL_X": 1.03})  # somebody has changed it since
+    browser.until(lambda: browser.run(ROLL_BACK) and shown()[1] == "1.03000")
     assert served.told.asked == []
     browser.element("#confirm-no").click()
     browser.element('#push-all [data-action="reset"]').click()
@@ -451,6 +457,9 @@ DIAGNOSIS = {
     ],
     "not_testable": [{"name": "temperature_drift", "why": "no temperature in the recording"}],
 }
+
+ROLL_BACK = """document.querySelector('#confirm').close();
+document.querySelector('#push-all [data-action="rollback"]').click(); return true;"""
 
 # WCAG 2 contrast of every visible piece of text against the nearest painted ground behind it.
 CONTRASTS = """
