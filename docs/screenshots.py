@@ -118,7 +118,7 @@ def _snapshot(url: str) -> dict[str, Any] | None:
     try:
         with urllib.request.urlopen(f"{url}/api/snapshot", timeout=5.0) as answer:  # noqa: S310 - loopback
             document: dict[str, Any] = json.load(answer)
-    except (urllib.error.URLError, ConnectionError):
+    except (urllib.error.URLError, ConnectionError, TimeoutError):
         return None
     return document
 

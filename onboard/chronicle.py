@@ -178,7 +178,7 @@ class Chronicle:
             before,
             after,
             self._innovation(engine),
-            _observability(engine),
+            self._observability(engine),
         )
 
     # How
@@ -250,6 +250,12 @@ class Chronicle:
         t, *six = (np.array(column) for column in zip(*rows, strict=True))
         return Course(t[:, 0], *six)
 
+    def _observability(self, engine: Engine) -> Observability | None:
+        solution = engine.solution()
+        if solution is None:
+            return None
+        return assess(six_information(solution), engine.settings.needs, self.calibrator.kind)
+
     def _in_force(self, imu: int, t: float) -> Array:
         """(6,) what the autopilot used then; what was first reported, before that."""
         held = self._held.get(imu)
@@ -306,8 +312,3 @@ class Chronicle:
             placed.append(piece)
             later = t
         return placed[::-1]
-
-
-def _observability(engine: Engine) -> Observability | None:
-    solution = engine.solution()
-    return None if solution is None else assess(six_information(solution), engine.settings.needs)

@@ -11,6 +11,8 @@ from onboard.core.result import SIX_NAMES
 from onboard.daemon.snapshot import ImuView, Snapshot
 
 JOURNAL_LINES = 2
+ROOMY = 2
+"""Of more accelerometers the numbers come before the journal."""
 ROWS = 4
 IMU_LINES = 4
 """Of an accelerometer, besides the rows of its table."""
@@ -22,7 +24,8 @@ def compact(snapshot: Snapshot, height: int) -> RenderableType:
     if snapshot.mode != "active":
         top.append(Text(f"{snapshot.mode}: {snapshot.mode_reason}", style="yellow"))
     bottom = [_push(snapshot)]
-    bottom += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]
+    if len(snapshot.imus) <= ROOMY:
+        bottom += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]
     bottom.append(Text("Ctrl-C ends it; --full shows everything", style="dim"))
     each = (height - len(top) - len(bottom)) // max(len(snapshot.imus), 1)
     rows = min(max(each - IMU_LINES, 1), ROWS)

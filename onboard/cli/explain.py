@@ -111,7 +111,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
         found = [f"{said[:-1]} ({named(e)})." for said, e in zip(found, d.effects, strict=False)]
         found += verdict.missing(d)[len(d.effects) :]
     rows = [
-        ("Missing", found),
+        ("To know" if verdict.severity(d) == "info" else "Missing", found),
         ("Proof", [verdict.proof(d)]),
         ("To fly" if refused else "To do", verdict.cures(d, advice)),
         ("Note", verdict.remarks(d)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -169,15 +170,17 @@ def _written(written: WrittenView) -> RenderableType:
     return Group(*parts)
 
 
-def changes(written: WrittenView, *, back: bool = False) -> Table:
-    """Old and new values of a push; ``back``: of the way back."""
+def changes(written: WrittenView, now: Mapping[str, float] | None = None) -> Table:
+    """Old and new values of a push; with what is in force ``now``, by name: of the way back."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    headings = ("in force", "to be written") if back else ("before", "written")
+    headings = ("before", "written") if now is None else ("in force", "to be written")
     for name in ("parameter", *headings):
         table.add_column(name, justify="left" if name == "parameter" else "right", no_wrap=True)
     for value in written.values:
         pair = (value.before, value.written)
-        table.add_row(value.name, *(f"{v:.5f}" for v in (reversed(pair) if back else pair)))
+        if now is not None:
+            pair = (now.get(value.name, value.written), value.before)
+        table.add_row(value.name, *(f"{v:.5f}" for v in pair))
     return table
 
 

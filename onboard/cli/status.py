@@ -242,11 +242,12 @@ def rollback(
 
     client = _client(url, config, token_file)
     console = Console(highlight=False)
-    in_force = [w for w in client.snapshot().push.written if w.in_force]
+    snapshot = client.snapshot()
+    in_force = [w for w in snapshot.push.written if w.in_force]
     chosen = [w for w in in_force if not imus or w.imu in imus]
     for written in chosen:
         console.print(f"IMU {written.imu}: what would be written")
-        console.print(changes(written, back=True))
+        console.print(changes(written, snapshot.parameters))
     # With several, or none, the daemon refuses in any case.
     ask = len(chosen) == 1 and sys.stdin.isatty() and not yes
     if ask and not click.confirm("Write these values?"):

@@ -109,6 +109,8 @@ class Calibrator:
         self._finished = False
         self.flown_s = 0.0
         """Trusted flight that was taken in, s; it only grows."""
+        self.kind = ""
+        """Of vehicle, as it says itself: what to fly depends on it."""
         self.ekf_bias: dict[int, EkfBias] = {}
 
     @property
@@ -172,6 +174,7 @@ class Calibrator:
             return ()
         events = self._judged(sample)
         if isinstance(sample, VehicleState):
+            self.kind = sample.kind or self.kind
             events += self._vehicle(sample)
         return events
 
@@ -222,6 +225,7 @@ class Calibrator:
             engine,
             self.parameters,
             finished=self._finished,
+            kind=self.kind,
             rejected={k: n for k, n in rejected.items() if n},
         )
 

@@ -13,8 +13,9 @@ with each other.  The eigenvector *within* a coupled group then says which combi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -89,7 +90,7 @@ class Observability:
         return " ".join(said)
 
 
-def assess(information: ArrayLike, needs: Needs = Needs()) -> Observability:
+def assess(information: ArrayLike, needs: Needs = Needs(), kind: str = "") -> Observability:
     """Judge an information matrix.
 
     Args:
@@ -97,6 +98,7 @@ def assess(information: ArrayLike, needs: Needs = Needs()) -> Observability:
             prior.  Need not be regular; negative eigenvalues (from noise corrections) count
             as none, and a matrix that is not finite as no information.
         needs: Prior and needed sigmas.
+        kind: Of vehicle (copter, plane, rover, boat), for what to fly; empty: not known.
 
     Returns:
         Flags, coverage in percent, weak directions.
@@ -107,7 +109,7 @@ def assess(information: ArrayLike, needs: Needs = Needs()) -> Observability:
     excess = np.round(sigma / needs.target, 6)
     observed = sigma <= needs.target * (1 + _ROUNDING)
     percent = _percent(sigma, needs)
-    weak = _weak_directions(covariance, needs.target, observed)
+    weak = _weak_directions(covariance, needs.target, observed, kind)
     worst = int(np.argmax(excess))
     # Percent saturates at both ends; excess goes on to tell the better from the worse.
     coverage = Coverage(
@@ -159,7 +161,7 @@ def _six(values: Array) -> tuple[float, float, float, float, float, float]:
 
 
 def _weak_directions(
-    covariance: Array, target: Array, observed: NDArray[np.bool_]
+    covariance: Array, target: Array, observed: NDArray[np.bool_], kind: str
 ) -> tuple[WeakDirection, ...]:
     C = covariance / np.outer(target, target)
     correlation = C / np.sqrt(np.outer(np.diag(C), np.diag(C)))
@@ -168,7 +170,7 @@ def _weak_directions(
         eigenvalues, V = np.linalg.eigh(C[np.ix_(group, group)])
         v = V[:, -1]
         v = v * np.sign(v[np.argmax(np.abs(v))])
-        sentence, advice = describe(group)
+        sentence, advice = describe(group, kind)
         directions.append(
             WeakDirection(
                 members=group,
@@ -195,30 +197,56 @@ def _groups(coupled: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> list[tuple
     return groups
 
 
-# Manoeuvres per axis that change the specific force along it: what tells scale from offset.
-_CHANGE_FORCE: Final = (
+_CHANGE_FORCE: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
+    {
+        "copter": (
+            "fly fast forward and backward, and brake hard each time",
+            "fly fast to the left and to the right, and brake hard each time",
+            "climb and descend fast, and fly banked turns at speed",
+        ),
+        "plane": (
+            "change between full and idle throttle, climbing and descending",
+            "sideslip to both sides",
+            "fly steep banked turns and pull-ups, so that the load factor changes",
+        ),
+        "rover": (
+            "accelerate and brake hard, several times",
+            "turn tightly at speed, to both sides",
+            "drive fast up and down slopes",
+        ),
+        "boat": (
+            "accelerate and slow down hard, several times",
+            "turn tightly at speed, to both sides",
+            "cross waves at speed",
+        ),
+    }
+)
+"""By kind of vehicle and axis: what changes the specific force along it and so tells scale from
+offset."""
+_OTHER_KIND: Final = (
     "accelerate and brake hard, several times, nose up and nose down",
-    "fly fast sideways and stop (copter), or sideslip to both sides (plane)",
-    "fly steep banked turns and pull-ups, so that the load factor changes",
+    "accelerate hard to both sides",
+    "change the load factor: steep banked turns, pull-ups, fast climbs and descents",
 )
 _ROLL_OVER_HEADINGS: Final = "fly level legs on different headings, with turns both ways"
 _LONGER: Final = "fly on with GPS trusted, and turn through all headings"
 
 
-def describe(members: tuple[int, ...]) -> tuple[str, str]:
+def describe(members: tuple[int, ...], kind: str = "") -> tuple[str, str]:
     """(what cannot be told, what to fly) for a group of numbers, indices into SIX_NAMES."""
+    change = _CHANGE_FORCE.get(kind, _OTHER_KIND)
     names = [SIX_NAMES[i] for i in members]
     axes = sorted({i % 3 for i in members})
     scales = [i for i in members if i < 3]
     if len(members) == 1:
         (index,) = members
         if index < 3:
-            return f"{names[0]} is not excited enough", _CHANGE_FORCE[index]
+            return f"{names[0]} is not excited enough", change[index]
         return f"{names[0]} is not known well enough", _LONGER
     sentence = f"{_listed(members)} cannot be told apart"
     if not scales:
         return sentence, _ROLL_OVER_HEADINGS
-    return sentence, "; ".join(_CHANGE_FORCE[axis] for axis in axes)
+    return sentence, "; ".join(change[axis] for axis in axes)
 
 
 def _listed(members: Sequence[int]) -> str:

@@ -37,8 +37,12 @@ def calibration_of(
     *,
     finished: bool,
     rejected: dict[str, int],
+    kind: str = "",
 ) -> Calibration:
-    """Everything about one accelerometer, cheap enough for once a second."""
+    """Everything about one accelerometer, cheap enough for once a second.
+
+    ``kind`` is that of the vehicle, for the advice.
+    """
     in_force = parameters.six(imu)
     solution = engine.solution()
     refused = dict(rejected)
@@ -51,7 +55,7 @@ def calibration_of(
     beta = solution.theta[3:6]
     offset = -beta / scale
     covariance = six_covariance(solution)
-    seen = assess(six_information(solution), engine.settings.needs)
+    seen = assess(six_information(solution), engine.settings.needs, kind)
     status, note = _status(engine, solution, seen, parameters, finished=finished)
     held_scale, held_offset = np.array(in_force.scale), np.array(in_force.offset)
     force_six = np.concatenate([held_scale, -held_scale * held_offset])

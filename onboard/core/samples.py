@@ -80,11 +80,15 @@ class GpsFix:
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """Armed and landed flags; None where the source does not say."""
+    """Armed and landed flags; None where the source does not say.
+
+    ``kind`` is ``copter``, ``plane``, ``rover``, ...; empty where the source does not say.
+    """
 
     t: float
     armed: bool | None = None
     landed: bool | None = None
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class Observed:
     def feed(self, sample: Sample, now: float) -> None:
         """Take a sample of any kind."""
         match sample:
-            case VehicleState(_, armed, landed):
+            case VehicleState(armed=armed, landed=landed):
                 if armed is not None:
                     if armed:
                         self._disarmed_since = None

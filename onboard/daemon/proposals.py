@@ -25,7 +25,7 @@ from onboard.core.result import Status
 from onboard.daemon.flight import JudgedFlight
 from onboard.daemon.learner import Learned
 from onboard.daemon.snapshot import ChangeView, ProposalView
-from onboard.daemon.state import landing_lifts
+from onboard.daemon.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan, propose
@@ -324,12 +324,12 @@ class Proposals:
 
 
 def approvable(held_back: Mapping[str, str]) -> bool:
-    """Whether a person's approval would lift one of the reasons, and something would change.
+    """Whether a person's approval would lift one of the reasons, and something is to be gained.
 
     That this flight is not diagnosed yet, which it will be after the landing, is none of them.
     """
     lifted = [n for n in held_back if n in PEOPLE | DIAGNOSIS and not landing_lifts(n, held_back)]
-    return "nothing_to_change" not in held_back and bool(lifted)
+    return bool(lifted) and not held_back.keys() & NOTHING_GAINED
 
 
 def named(imus: Sequence[int]) -> str:

@@ -7,6 +7,7 @@ messages, broker) shows that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -31,11 +32,13 @@ AFTER_LANDING: Final = frozenset({"armed", "disarmed_too_short", "in_air", "diag
 """Reasons against a push that go away by themselves when the vehicle has landed."""
 BY_CHOICE: Final = frozenset({"policy_never", "advise_only", "not_selected"})
 """Reasons that somebody has configured: no fault, and nothing to wait for."""
+NOTHING_GAINED: Final = frozenset({"nothing_to_change", "no_improvement"})
+"""Reasons that leave nothing worth writing, and so nothing to approve."""
 STEADY: Final[Mapping[str, str]] = MappingProxyType(
     {"failed_before": "the last try to write it failed; it is tried again by itself"}
 )
 """Instead of sentences that count seconds: a state is the same until something happens."""
-FLY_ON = "fly on with GPS trusted: fast, with hard braking and turns both ways"
+FLY_ON = "fly on with GPS trusted, changing speed and direction often"
 GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
 _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
@@ -109,6 +112,13 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
     if "nothing_to_change" in lasting:
         whose = "the values that were written" if now.written else "these values already"
         return _state("up_to_date", "up to date", f"{known}; the autopilot has {whose}", GOOD)
+    if (
+        "no_improvement" in lasting
+        and lasting.keys() <= {"no_improvement", "approval"}
+        and _judged(c)
+    ):
+        why = f"{known}; they would hardly do better than the values in force"
+        return _state("up_to_date", "up to date", why, GOOD)
     return _proposed(known, now.proposal, lasting, further)
 
 
@@ -124,8 +134,9 @@ def _proposed(
         if "diagnosing" in held:
             then = "it is written when the flight has been diagnosed"
         return _state("calibrated", f"{approved}calibrated", f"{known}; {then}", GOOD, further)
-    if lasting.keys() <= BY_CHOICE:
-        why = "; ".join(lasting.values())
+    chosen = [sentence for name, sentence in lasting.items() if name in BY_CHOICE]
+    if chosen and lasting.keys() <= BY_CHOICE | {"approval"}:
+        why = "; ".join(chosen)
         return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
     if lasting.keys() <= {"approval", "unconfirmed"}:
         if not held.keys() <= {"approval", "unconfirmed"}:
@@ -140,6 +151,11 @@ def _proposed(
     todo = further or ("approve it if that is all right" if proposal.approvable else "")
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+
+
+def _judged(c: Calibration) -> bool:
+    """Whether flight that was not fitted has compared old and new values."""
+    return math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after)
 
 
 def _known(c: Calibration) -> str:

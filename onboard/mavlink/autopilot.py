@@ -10,11 +10,8 @@ from typing import Protocol, TypeAlias
 from onboard.mavlink.connection import ConnectionState
 from onboard.mavlink.dialect import Message, mavlink
 from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.vehicle import kind_of_vehicle
 from onboard.outage import Over
-
-_COPTERS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
-_PLANES = frozenset({1, 19, 20, 21, 22, 23, 24, 25, 28})
-_OTHERS = {10: "rover", 11: "boat", 12: "submarine", 7: "airship"}
 
 
 class AutopilotState(Enum):
@@ -46,11 +43,7 @@ class Autopilot:
     @property
     def vehicle(self) -> str:
         """copter, plane (VTOL planes, too), rover, boat, submarine, airship or vehicle."""
-        if self.vehicle_type in _COPTERS:
-            return "copter"
-        if self.vehicle_type in _PLANES:
-            return "plane"
-        return _OTHERS.get(self.vehicle_type, "vehicle")
+        return kind_of_vehicle(self.vehicle_type) or "vehicle"
 
     @property
     def firmware_name(self) -> str:

@@ -27,6 +27,7 @@ from onboard.core.samples import (
 )
 from onboard.mavlink.bootclock import BootClock
 from onboard.mavlink.dialect import MESSAGE_IDS, Message, mavlink
+from onboard.mavlink.vehicle import kind_of_vehicle
 
 Samples: TypeAlias = tuple[Sample, ...]
 
@@ -246,7 +247,8 @@ class Decoder:
         t = self.clock.latest
         if t is None:
             return NOTHING
-        return (VehicleState(t, armed=bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)),)
+        armed = bool(m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        return (VehicleState(t, armed=armed, kind=kind_of_vehicle(m.type)),)
 
     def _extended_sys_state(self, m: Message) -> Samples:
         t = self.clock.latest

@@ -62,6 +62,7 @@ class PushWatch:
         self._pushed = pushed
         self._settings = settings or WatchSettings()
         self._in_flight_since = in_flight_since
+        self._flown: Calibration | None = None
 
     @property
     def plan(self) -> PushPlan:
@@ -85,31 +86,22 @@ class PushWatch:
         in_force = np.array(flown.in_force_scale + flown.in_force_offset)
         if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > SAME:
             return self._say(Verdict.SUPERSEDED, "somebody has changed the parameters since")
-        verdict = self._verdict(flown)
-        return None if verdict is None else self._say(*verdict, flown)
-
-    def _verdict(self, flown: Calibration) -> tuple[Verdict, str] | None:
-        """What a flight with the pushed values says; None: nothing that could be judged."""
+        self._flown = flown
         worse = self._residual_worse(flown)
-        plan = self._pushed.plan
         old, new = plan.six_before().as_vector(), plan.six_wanted().as_vector()
         preferred = preference(old, new, flown)
         clear = self._settings.evidence
         if preferred is not None and preferred < -clear:
-            return (
-                Verdict.WORSE,
-                f"the old values fit this flight better (by {-preferred:.3g} in J)",
-            )
+            sentence = f"the old values fit this flight better (by {-preferred:.3g} in J)"
+            return self._say(Verdict.WORSE, sentence)
         if worse is None and preferred is None:
             return None
         if worse and (preferred is None or preferred < clear):
-            return Verdict.WORSE, worse
+            return self._say(Verdict.WORSE, worse)
         if worse:
-            return (
-                Verdict.KEPT,
-                f"{worse}, but the old values would have done worse still on this flight",
-            )
-        return Verdict.KEPT, "the residual has not grown"
+            sentence = f"{worse}, but the old values would have done worse still on this flight"
+            return self._say(Verdict.KEPT, sentence)
+        return self._say(Verdict.KEPT, "the residual has not grown")
 
     def _residual_worse(self, flown: Calibration) -> str | None:
         """A sentence if it is worse, empty if it is not, None if it cannot be said."""
@@ -128,7 +120,9 @@ class PushWatch:
             return ""
         return None
 
-    def _say(self, verdict: Verdict, sentence: str, flown: Calibration | None = None) -> Watched:
+    def _say(self, verdict: Verdict, sentence: str) -> Watched:
+        """The verdict, with the residuals of the flight that gave it, if one did."""
+        flown = self._flown
         return Watched(
             self._pushed.transaction,
             verdict,

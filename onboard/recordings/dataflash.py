@@ -71,7 +71,7 @@ def _usable_slots(index: DataflashIndex) -> frozenset[int]:
     for slot, form in enumerate(index.formats):
         timed = form.has("TimeUS") or form.has("T" if form.name in GPS_NAMES else "TimeMS")
         complete = form.name in CONVERTERS and form.has(*NEEDED.get(form.name, ()))
-        if complete and (timed or form.name in {"PARM", "EV"}):
+        if complete and (timed or form.name in {"PARM", "EV", "MSG"}):
             usable.add(slot)
     return frozenset(usable)
 

@@ -289,6 +289,23 @@ def flying(batch: Batch, _context: Context) -> Converted:
     ]
 
 
+def firmware(batch: Batch, _context: Context) -> Converted:
+    """MSG: the firmware's name, with which every log begins, is that of the kind of vehicle."""
+    texts = (bytes(text).decode("ascii", errors="replace") for text in batch.records["Message"])
+    kinds = (next((k for n, k in FIRMWARE.items() if text.startswith(n)), "") for text in texts)
+    return [
+        VehicleState(t, kind=kind) if kind else None
+        for t, kind in zip(batch.t.tolist(), kinds, strict=True)
+    ]
+
+
+FIRMWARE = {
+    "ArduCopter": "copter",
+    "ArduPlane": "plane",
+    "ArduRover": "rover",
+    "ArduSub": "submarine",
+    "Blimp": "airship",
+}
 IMU_NAMES = ("IMU", "IMU2", "IMU3")
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     **dict.fromkeys(IMU_NAMES, (imu,)),
@@ -307,6 +324,7 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
     "EV": (event,),
     "ARM": (arming,),
     "STAT": (flying,),
+    "MSG": (firmware,),
 }
 NEEDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(IMU_NAMES, ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")),
@@ -321,5 +339,6 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "EV": ("Id",),
     "ARM": ("ArmState",),
     "STAT": ("isFlying",),
+    "MSG": ("Message",),
 }
 """Fields without which a record of that name is another thing, and is not read."""

@@ -34,6 +34,8 @@ Stream = tuple[Floats, list[Sample]]
 
 MAGIC = b"ULog"
 ARMED = 2
+KINDS = {1: "copter", 2: "plane", 3: "rover"}
+"""vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""
 JAMMED = 2
 """jamming_state and spoofing_state: 1 is fine, 2 and 3 are trouble."""
 
@@ -205,9 +207,13 @@ def gps_integrity(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
 
 
 def vehicle_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
-    """Armed."""
+    """Armed, and the kind of vehicle."""
     armed = columns["arming_state"] == ARMED
-    return [VehicleState(at, armed=bool(a)) for at, a in zip(t.tolist(), armed, strict=True)]
+    kinds = columns.get("vehicle_type", np.zeros(len(t)))
+    return [
+        VehicleState(at, armed=bool(a), kind=KINDS.get(int(kind), ""))
+        for at, a, kind in zip(t.tolist(), armed, kinds, strict=True)
+    ]
 
 
 def vehicle_land_detected(t: Floats, columns: Columns, _instance: int) -> list[Sample]:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1000.0, 300.0
 MOST_POINTS = 1400
+TIME_STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
+"""Between two marks of a time axis, s."""
 LONGEST_STEP_S = 1.0
 """A pause in the data longer than this, and than four usual steps, is drawn as a gap."""
 
@@ -89,6 +91,27 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
     return found
 
 
+def time_ticks(low: float, high: float, most: int = 6) -> tuple[list[float], float, str]:
+    """Marks of a time axis (s) that people count in, and the unit that makes them short numbers.
+
+    Returns:
+        Times (s), seconds of the unit, its name.
+    """
+    span = high - low
+    if not (math.isfinite(span) and span > 0.0):
+        return [], 1.0, "s"
+    step = next((s for s in TIME_STEPS if span / s <= most), None)
+    marks = (
+        ticks(low, high, most)
+        if step is None
+        else [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step) + 1)]
+    )
+    for unit, name in ((3600.0, "h"), (60.0, "min")):
+        if marks and marks[-1] >= unit and all(mark % unit == 0.0 for mark in marks):
+            return marks, unit, name
+    return marks, 1.0, "s"
+
+
 def line_chart(
     title: str,
     unit: str,
@@ -96,6 +119,7 @@ def line_chart(
     bands: Sequence[Band] = (),
     *,
     ribbons: Sequence[Ribbon] = (),
+    x_label: str = "time",
     x_unit: str = "s",
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
@@ -106,6 +130,7 @@ def line_chart(
 
     The vertical range covers 99.5 % of all points, so that a single wild value does not flatten the
     rest; what is beyond is cut at the edge.  ``x_range`` and ``y_range`` set the ranges instead.
+    Under the horizontal axis stand what it is and its unit; seconds become minutes or hours.
     ``summary`` tells those who do not see the curves what they show.
     """
     drawn = [(*decimate(line.x, line.y), line) for line in lines]
@@ -125,9 +150,11 @@ def line_chart(
 
     shapes = [_band(px(max(b.start, x0)), px(min(b.end, x1)), b.kind) for b in bands]
     labels = []
-    for v in ticks(x0, x1):
+    marks, unit_s, x_unit = time_ticks(x0, x1) if x_unit == "s" else (ticks(x0, x1), 1.0, x_unit)
+    for v in marks:
         shapes.append(f'<path class="grid" d="M{px(v):.1f} 0V{HEIGHT:.0f}"/>')
-        labels.append(_label("x", "left", px(v) / WIDTH, v))
+        labels.append(_label("x", "left", px(v) / WIDTH, v / unit_s))
+    along = f"{x_label}, {x_unit}" if x_unit else x_label
     for v in ticks(y0, y1, 4):
         kind = "zero" if v == 0 else "grid"
         shapes.append(f'<path class="{kind}" d="M0 {py(v):.1f}H{WIDTH:.0f}"/>')
@@ -142,18 +169,18 @@ def line_chart(
         d = _path([px(float(v)) for v in x], [py(float(v)) for v in y], x)
         shapes.append(f'<path class="line {escape(line.kind)}" d="{d}"/>')
     return Markup(
-        '<figure><figcaption>{} <span class="muted">({} over {})</span></figcaption>'
+        "<figure><figcaption>{}{}</figcaption>"
         '<div class="plot"><svg viewBox="0 0 {:.0f} {:.0f}" preserveAspectRatio="none" role="img" '
-        'aria-label="{}">{}</svg>{}</div></figure>'
+        'aria-label="{}">{}</svg>{}<span class="along">{}</span></div></figure>'
     ).format(
         title,
-        unit,
-        x_unit,
+        Markup(' <span class="muted">({})</span>').format(unit) if unit else "",
         WIDTH,
         HEIGHT,
         f"{title}: {summary}" if summary else title,
         Markup("".join(shapes)),  # noqa: S704  numbers and escaped classes only
         Markup("".join(labels)),  # noqa: S704
+        along,
     )
 
 

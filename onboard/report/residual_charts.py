@@ -127,6 +127,7 @@ def _law(law: Law) -> Markup:
         words.unit_in_words(law.quantity_unit),
         lines,
         ribbons=ribbons,
+        x_label=law.signal,
         x_unit=words.unit_in_words(law.unit),
         x_range=(float(law.x[0]), float(law.x[-1])),
         y_range=(min(edges) - margin, max(edges) + margin) if margin > 0.0 else None,

@@ -71,7 +71,19 @@ def test_axes_that_were_not_excited_are_named_one_by_one():
     assert [w.members for w in result.weak] == [(0,), (1,)]
     assert [SIX_NAMES[0] in w.sentence for w in result.weak] == [True, False]
     assert "brake" in result.weak[0].advice
-    assert "sideslip" in result.weak[1].advice
+    assert "to both sides" in result.weak[1].advice
+
+
+def test_each_kind_of_vehicle_is_told_what_it_can_do():
+    def advised(kind):
+        return assess(information(flight(1_000_000, 3, 0.01, 3)), kind=kind).coverage.advice
+
+    assert "sideslip" in advised("plane")
+    for kind in ("copter", "rover", "boat", "", "submarine"):
+        assert advised(kind)
+        assert "sideslip" not in advised(kind)
+    assert "left and to the right" in advised("copter")
+    assert not any(word in advised("rover") for word in ("fly", "throttle", "nose"))
 
 
 def test_an_unexcited_scale_does_not_condemn_the_offset_beside_it():

@@ -101,7 +101,7 @@ async def test_status_fits_80_columns_and_tells_what_matters(
         status, out, _ = await call(capsys, "status", "--url", service.server.url)
         assert status == 0
         assert max(map(cell_len, out.splitlines())) <= 80
-        for words in ("ardupilot copter", "disarmed", "IMU 1: calibrated", "INS_ACC2OFFS_Z"):
+        for words in ("ardupilot copter", "disarmed", "IMU 1: waits for your", "INS_ACC2OFFS_Z"):
             assert words in out
         assert "1.02000" in out
         assert "onboard approve" in out
@@ -120,8 +120,12 @@ async def test_approve_and_rollback_from_the_terminal(document, daemon, port, ca
         status, out, _ = await call(capsys, "approve", "1", "--url", url)
         assert (status, "IMU 1" in out) == (0, True)
         await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        before = service.snapshot().push.written[0].values[0]
         status, out, _ = await call(capsys, "rollback", "--url", url)
         assert (status, "rolling back" in out) == (0, True)
+        shown = next(line for line in out.splitlines() if before.name in line)
+        assert shown.split() == [before.name, f"{before.written:.5f}", f"{before.before:.5f}"]
+        assert out.index(before.name) < out.index("rolling back")
         await until(lambda: vehicle.parameters["INS_ACCSCAL_X"] == 1.0)
 
 

@@ -29,8 +29,8 @@ def test_a_ring_keeps_first_and_newest_in_order_within_its_budget(steps, limit):
         now += step
         assert ring.add(row(now), limit)
         assert len(ring.rows) <= limit
-        assert ring.rows[-1].trusted_s == now
-    times = [r.trusted_s for r in ring.rows]
+        assert ring.rows[-1].flown_s == now
+    times = [r.flown_s for r in ring.rows]
     assert times == sorted(times)
     assert times[0] == first
 
@@ -44,20 +44,14 @@ def test_standing_still_adds_nothing_but_shows_what_changed():
     assert [r.value[0] for r in ring.rows] == [1.02]
 
 
-def test_what_was_forgotten_leaves_no_curve():
-    ring = Ring()
-    for t in range(1, 500):
-        ring.add(row(float(t)))
-    ring.add(row(5.0))
-    assert [r.trusted_s for r in ring.rows] == [5.0]
-    assert ring.every == 1
-
-
-def seen(trusted: float, system_id: int = 1):
+def seen(trusted: float, system_id: int = 1, *, armed: bool = True, resets: int = 0, scale=1.0):
     blank = blank_snapshot()
-    link = msgspec.structs.replace(blank.link, system_id=system_id)
-    view = msgspec.structs.replace(imu_view(calibration()), trusted_s=trusted)
-    return msgspec.structs.replace(blank, link=link, imus=(view,), time=trusted)
+    link = msgspec.structs.replace(blank.link, system_id=system_id, armed=armed, landed=not armed)
+    answer = calibration(scale=(scale, 1.0, 1.0))
+    view = msgspec.structs.replace(imu_view(answer), trusted_s=trusted)
+    return msgspec.structs.replace(
+        blank, link=link, imus=(view,), time=trusted, counters={"resets": resets}
+    )
 
 
 @pytest.fixture
@@ -79,7 +73,7 @@ def flown(folder: Path, clock, seconds: range, system_id: int = 1) -> History:
 
 
 def times(history: History) -> list[float]:
-    return [r.trusted_s for imu in history.document().imus for r in imu.rows]
+    return [r.flown_s for imu in history.document().imus for r in imu.rows]
 
 
 def test_it_goes_on_after_a_restart(tmp_path, clock):
@@ -87,6 +81,66 @@ def test_it_goes_on_after_a_restart(tmp_path, clock):
     before.save()
     assert times(flown(tmp_path, clock, range(20, 25))) == [float(t) for t in range(1, 25)]
     assert times(flown(tmp_path, clock, range(5, 6), system_id=2)) == [5.0]
+
+
+def test_hours_on_the_ground_do_not_push_the_flight_out(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 200))
+    flight = times(history)
+    for t in range(200, 8000):
+        history.take(seen(float(t), armed=False, scale=1.0 + 1e-5 * (t % 7)))
+    assert times(history) == flight
+    for t in range(8000, 8010):
+        history.take(seen(float(t)))
+    assert times(history) == [*flight, *(float(t) for t in range(200, 210))]
+
+
+def test_what_is_refined_after_the_landing_is_the_end_of_the_curve(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 20))
+    history.take(seen(25.0, armed=False, scale=1.03))
+    (imu,) = history.document().imus
+    assert (imu.rows[-1].flown_s, imu.rows[-1].value[0]) == (19.0, 1.03)
+
+
+def test_before_the_first_flight_there_is_no_curve(tmp_path, clock):
+    history = History(tmp_path, clock=clock)
+    for t in range(1, 60):
+        history.take(seen(float(t), armed=False))
+    assert times(history) == []
+    history.take(seen(60.0))
+    assert times(history) == [1.0]
+
+
+@pytest.mark.parametrize("saved_at", [0.0, 3.0, 50.0])
+def test_sums_of_another_moment_than_the_curve_do_not_end_it(tmp_path, clock, saved_at):
+    """Power is cut: sums and curves come back as they were saved, each at its own time."""
+    flown(tmp_path, clock, range(1, 20)).save()
+    after = History(tmp_path, clock=clock)
+    for t in range(3):
+        after.take(seen(saved_at + t, armed=False))
+    assert times(after) == [float(t) for t in range(1, 20)]
+    after.take(seen(saved_at + 3.0))
+    assert times(after) == [float(t) for t in range(1, 21)]
+
+
+def test_the_power_may_go_right_after_the_landing(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 20))
+    history.take(seen(19.0, armed=False))
+    assert times(flown(tmp_path, clock, range(20, 21))) == [float(t) for t in range(1, 21)]
+
+
+def test_estimates_that_begin_anew_end_the_curve_when_something_is_flown(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 20))
+    history.take(seen(0.0))
+    history.take(seen(0.0, armed=False))
+    assert times(history) == [float(t) for t in range(1, 20)]
+    history.take(seen(2.0))
+    assert times(history) == [2.0]
+
+
+def test_what_a_person_has_forgotten_leaves_no_curve(tmp_path, clock):
+    history = flown(tmp_path, clock, range(1, 20))
+    history.take(seen(19.0, armed=False, resets=1))
+    assert times(history) == []
 
 
 def test_it_is_on_the_disk_now_and_then_and_only_if_there_is_something_new(tmp_path, clock):

@@ -81,6 +81,16 @@ def test_a_person_is_called_each_time_one_is_waited_for():
     assert len(stage.told("approval_needed")) == 2
 
 
+def test_what_will_not_be_written_is_told_on_the_ground_once():
+    stage = Stage()
+    for _ in range(2):
+        stage.show(imus=[accelerometer(1), accelerometer(2, stands="held_back")])
+    assert stage.told("imu_state") == ["IMU 2: held back"]
+    stage.show(imus=[accelerometer(1), accelerometer(2, stands="up_to_date")])
+    stage.show(imus=[accelerometer(1), accelerometer(2, stands="insufficient")])
+    assert stage.told("imu_state")[1:] == ["IMU 2: insufficient"]
+
+
 def test_every_tick_reaches_the_parameters():
     stage = Stage()
     (server, _announcer) = stage.participants

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from vehicles_state import accelerometer, proposal, seen
+from vehicles_state import accelerometer, seen
 
 from onboard.core.findings import Verdict
 from onboard.core.result import Status
@@ -20,6 +20,7 @@ from onboard.daemon.parameter_view import (
     finding_number,
     parameter_values,
 )
+from onboard.daemon.state import NAMES
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.policy import Mode
 
@@ -83,7 +84,9 @@ def test_a_number_that_is_not_there_is_zero_and_a_sigma_that_is_there_is_not():
         ({"trusted": True}, "learning"),
         ({"trusted": True, "imus": [accelerometer(1)]}, "calibrated"),
         ({"imus": [accelerometer(1), accelerometer(2, status="collecting")]}, "waiting"),
-        ({"imus": [accelerometer(1)], "proposals": [proposal("approval")]}, "approval"),
+        ({"imus": [accelerometer(1, stands="approval")]}, "approval"),
+        ({"imus": [accelerometer(1, stands="up_to_date")]}, "calibrated"),
+        ({"imus": [accelerometer(1, stands="held_back")]}, "calibrated"),
         ({"push_state": "writing", "imus": [accelerometer(1)]}, "writing"),
         ({"phase": "stopping"}, "stopping"),
     ],
@@ -93,13 +96,8 @@ def test_state_in_one_number(changes, state):
 
 
 def test_what_waits_for_a_person_is_counted():
-    waiting = seen(
-        proposals=[
-            proposal("approval"),
-            proposal("approval", imu=2),
-            proposal("approval", "armed", imu=3),
-        ]
-    )
+    states = ("approval", "approval", "calibrated")
+    waiting = seen(imus=[accelerometer(n, stands=s) for n, s in enumerate(states, start=1)])
     assert values(waiting)["OBC_WAITING"] == 2.0
 
 
@@ -113,7 +111,7 @@ def test_trust_and_why_not():
 
 def test_tables_know_every_word_of_the_service():
     assert set(POLICIES) == {mode.value for mode in Mode}
-    assert set(STATUSES) == {status.value for status in Status}
+    assert {status.value for status in Status} < set(STATUSES) == set(NAMES)
     assert set(REASONS) == {reason.value for reason in Reason}
     for table in (STATES, STATUSES, REASONS, FINDINGS):
         assert len(set(table.values())) == len(table)

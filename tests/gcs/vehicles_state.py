@@ -10,14 +10,21 @@ from onboard.daemon.snapshot import (
     ProposalView,
     PushView,
     Snapshot,
+    StateView,
     TrustView,
 )
 
 
-def accelerometer(number, *, status="calibrated"):
+def state(name):
+    return StateView(name=name, title=name.replace("_", " "), sentence="so it is", severity="info")
+
+
+def accelerometer(number, *, status="calibrated", stands=None):
+    """One that is ``stands``; where that is not said, as its status."""
     return ImuView(
         imu=number,
         status=status,
+        state=state(stands or status),
         calibration=CalibrationView(
             scale=(1.021234, 0.98, 1.01),
             offset=(0.21234, -0.1, 0.15),
@@ -59,6 +66,7 @@ def proposal(*held_back, imu=1):
         held_back=dict.fromkeys(held_back, "because"),
         approved=False,
         rejected=False,
+        approvable="approval" in held_back,
     )
 
 

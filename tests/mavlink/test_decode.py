@@ -17,7 +17,6 @@ from onboard.core.samples import (
     ImuSource,
     ParameterValue,
     Throttle,
-    VehicleState,
     Vibration,
 )
 from onboard.mavlink.codec import Codec
@@ -171,9 +170,18 @@ class TestGps:
 
 
 class TestStatus:
+    @pytest.mark.parametrize(
+        ("mav_type", "kind"), [(2, "copter"), (14, "copter"), (1, "plane"), (10, "rover"), (0, "")]
+    )
+    def test_what_kind_of_vehicle_it_is(self, decoder, mav_type, kind):
+        message = mavlink.MAVLink_heartbeat_message(mav_type, 3, 1, 0, 4, 3)
+        (state,) = decode(decoder, message)
+        assert state.kind == kind
+
     def test_armed_and_landed(self, decoder):
-        assert decode(decoder, heartbeat(base_mode=0x80 | 1)) == (VehicleState(10.0, armed=True),)
-        assert decode(decoder, heartbeat(base_mode=1)) == (VehicleState(10.0, armed=False),)
+        for mode, armed in ((0x80 | 1, True), (1, False)):
+            (state,) = decode(decoder, heartbeat(base_mode=mode))
+            assert (state.t, state.armed, state.landed) == (10.0, armed, None)
         landed = [
             [s.landed for s in decode(decoder, mavlink.MAVLink_extended_sys_state_message(0, n))]
             for n in range(5)

@@ -13,6 +13,7 @@ from onboard.daemon.snapshot import (
     Number,
     PushView,
     Snapshot,
+    StateView,
     TrustView,
 )
 from onboard.errors import RefusedError
@@ -22,6 +23,9 @@ def imu_view(number=1, scale=1.02):
     return ImuView(
         imu=number,
         status="calibrated",
+        state=StateView(
+            name="up_to_date", title="up to date", sentence="all known", severity="good"
+        ),
         calibration=CalibrationView(
             scale=(scale, 0.99, None),
             offset=(0.2, -0.1, 0.15),

@@ -9,6 +9,7 @@ from calibrations import SIGMAS, calibration
 from onboard.answer import diagnosed, judged
 from onboard.core.findings import Diagnosis, Effect, Mismatch, Plain, Quantity, Series, Verdict
 from onboard.core.result import Status
+from onboard.push.physics import headline
 
 NAN = float("nan")
 
@@ -146,3 +147,25 @@ def test_what_the_daemon_keeps_is_the_answer():
     assert (kept.calibration, kept.missing) == (given.calibration, given.missing)
     assert (kept.modelled, kept.resumed) == (True, False)
     assert kept.document == {"schema": "onboard.explain/1"}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "severity"),
+    [
+        ("clean", [], "good"),
+        ("explained", ["gps_latency", "gps_smoothing"], "info"),
+        ("explained", ["gps_latency", "cross_axis"], "warning"),
+        ("partly_explained", ["gps_latency"], "warning"),
+        ("unexplained", [], "error"),
+        ("insufficient", [], "warning"),
+    ],
+)
+def test_a_late_receiver_is_no_missing_physics(verdict, effects, severity):
+    sentence, found = headline(verdict, effects)
+    assert found == severity
+    assert ("missing from the model" in sentence) == (severity == "warning" and bool(effects))
+
+
+def test_every_verdict_has_a_headline():
+    for verdict in Verdict:
+        assert headline(verdict.value, [])[0].endswith(".")

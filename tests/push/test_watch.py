@@ -55,6 +55,17 @@ def test_old_values_that_fit_the_new_flight_better_are_worse_for_the_push():
     assert verdict(**truth_is(old=True)) is Verdict.WORSE
 
 
+def test_what_the_flight_measured_is_told_with_the_verdict():
+    said = PushWatch(PUSHED).judge(flown(held_out_before=1.02, velocity_rms_before=0.06))
+    assert (said.held_out, said.velocity_rms) == (1.02, 0.06)
+
+
+def test_a_flight_with_other_values_measured_nothing_of_the_pushed():
+    said = PushWatch(PUSHED).judge(flown(in_force_scale=(1.1, 1.1, 1.1)))
+    assert said.verdict is Verdict.SUPERSEDED
+    assert (said.held_out, said.velocity_rms) == (None, None)
+
+
 def test_rough_flight_alone_is_no_reason_to_go_back():
     said = PushWatch(PUSHED).judge(flown(held_out_before=5.0, **truth_is(old=False)))
     assert said.verdict is Verdict.KEPT

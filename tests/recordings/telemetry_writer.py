@@ -72,13 +72,13 @@ FORMATS = {
     "double altitude_msl_m;float s_variance_m_s;float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;"
     "float hdop;uint64_t time_utc_usec;uint8_t fix_type;uint8_t satellites_used;"
     "uint8_t jamming_state;uint8_t spoofing_state;",
-    "vehicle_status": "uint64_t timestamp;uint8_t arming_state;",
+    "vehicle_status": "uint64_t timestamp;uint8_t arming_state;uint8_t vehicle_type;",
 }
 PACKING = {
     "sensor_combined": "<Q3fIi3f",
     "vehicle_attitude": "<Q4f",
     "sensor_gps": "<QdddfffffQBBBB",
-    "vehicle_status": "<QB",
+    "vehicle_status": "<QBB",
 }
 
 
@@ -111,5 +111,5 @@ def px4_log(seconds: int = 2) -> bytes:
             out += data("sensor_gps", t + 9, 47.4, 8.5, 500.0, 0.2, 1.0, 2.0, -0.5, 0.8,
                         1_700_000_000_000_000 + t, 3, 15, 1, 1)  # fmt: skip
         if k % 50 == 0:
-            out += data("vehicle_status", t + 11, 2)
+            out += data("vehicle_status", t + 11, 2, 2)
     return bytes(out)

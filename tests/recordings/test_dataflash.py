@@ -112,6 +112,24 @@ def test_old_log_takes_the_boot_clock_of_gps_from_t(tmp_path):
     assert disarmed.t == pytest.approx(303.96, abs=0.2)
 
 
+@pytest.mark.parametrize(
+    ("text", "kinds"),
+    [
+        ("ArduCopter V4.5.7 (2a3dc4b7)", ["copter"]),
+        ("ArduPlane V4.5.7 (0358a9c2)", ["plane"]),
+        ("Rover: ArduRover", []),
+        ("EKF3 IMU0 is using GPS", []),
+    ],
+)
+def test_the_firmware_says_what_kind_of_vehicle_it_is(tmp_path, text, kinds):
+    log = modern_log()
+    log.format(20, "MSG", "QZ", "TimeUS,Message")
+    log.add("MSG", 5_000_000, text)
+    states = of_type(saved(tmp_path, log), VehicleState)
+    assert [state.kind for state in states if state.kind] == kinds
+    assert [state.armed for state in states if not state.kind] == [True]
+
+
 def test_samples_keep_the_order_of_the_file(tmp_path):
     t = [s.t for s in open_recording(saved(tmp_path, modern_log())).samples()]
     assert t == sorted(t)

@@ -96,7 +96,7 @@ def test_px4_log(tmp_path, capsys):
     fix = first[GpsFix]
     assert (fix.v_n, fix.v_e, fix.v_d, fix.receiver) == (1.0, 2.0, -0.5, 1)
     assert fix.latitude == pytest.approx(math.radians(47.4))
-    assert first[VehicleState].armed is True
+    assert (first[VehicleState].armed, first[VehicleState].kind) == (True, "plane")
     assert first[GpsIntegrity].jammed is False
     assert capsys.readouterr().out == ""
 

@@ -40,7 +40,8 @@ def test_both_versions_of_mavlink(tmp_path, version):
     assert fixes[0].latitude == pytest.approx(math.radians(-35.3632621))
     assert fixes[0].speed_accuracy == (0.3 if version == 2 else None)
     assert [p.name for p in of_type(path, ParameterValue)] == ["INS_ACCSCAL_X"]
-    assert all(state.armed is False for state in of_type(path, VehicleState))
+    states = of_type(path, VehicleState)
+    assert {(state.armed, state.kind) for state in states} == {(False, "copter")}
 
 
 def test_each_reading_starts_anew(tmp_path):

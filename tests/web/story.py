@@ -17,12 +17,21 @@ from onboard.daemon.snapshot import (
     ProposalView,
     PushView,
     Snapshot,
+    StateView,
     TrustView,
 )
+from onboard.daemon.state import next_step
 
 T0 = 1_780_000_000.0
 SCALE = ((1.0243, 0.9871, 1.0112), (0.9912, 1.0178, 0.9954))
 OFFSET = ((0.2214, -0.1482, 0.3071), (-0.0921, 0.1143, -0.2215))
+APPROVAL = StateView(
+    name="approval",
+    title="waits for your approval",
+    sentence="all six numbers are known; a person has to approve it",
+    severity="warning",
+    next="look at the values, then approve or reject them",
+)
 IN_FORCE_OFFSET = (0.0412, 0.0231, -0.0312)
 
 
@@ -58,6 +67,7 @@ def story(second, *, imus=2):
             last_outcome=None,
             can_roll_back=(),
         ),
+        next_step=next_step(views),
         parameters={},
         journal=(
             JournalLine(
@@ -82,9 +92,19 @@ def _imu(number, second, *, done):
     )
     covered = tuple(min(100.0, 110.0 * (1 - math.exp(-second / (30.0 + 12 * i)))) for i in range(6))
     weakest = min(range(6), key=lambda i: covered[i])
+    advice = "" if done else "fly banked turns both ways, so that the load factor varies"
     return ImuView(
         imu=number,
         status="calibrated" if done else "collecting",
+        state=APPROVAL
+        if done
+        else StateView(
+            name="collecting",
+            title="learning",
+            sentence=f"least of all the {SIX_NAMES[weakest]}",
+            severity="info",
+            next=advice,
+        ),
         calibration=CalibrationView(
             scale=scale,
             offset=offset,
@@ -110,7 +130,7 @@ def _imu(number, second, *, done):
             percent=min(covered),
             per_parameter=dict(zip(SIX_NAMES, covered, strict=True)),
             weakest=SIX_NAMES[weakest],
-            advice="" if done else "fly banked turns both ways, so that the load factor varies",
+            advice=advice,
         ),
         certificate={
             "window_s": float(second),
@@ -153,6 +173,7 @@ def _proposal(view):
         held_back={"approval": "a person has to approve"},
         approved=False,
         rejected=False,
+        approvable=True,
     )
 
 

@@ -70,12 +70,14 @@ async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
         await asyncio.to_thread(browser.open, service.server.url)
         await see(lambda: browser.text("#glance-trust .headline") == "Trusted")
         await see(lambda: browser.elements("#axes canvas"))
-        await see(lambda: browser.text("#glance-push .headline") == "Waits for your approval")
+        await see(lambda: browser.text("#glance-imu-1 .headline") == "Waits for your approval")
         before = six(autopilot)
         assert list(before[:3]) == [1.0, 1.0, 1.0]
 
         def approve():
-            browser.until(lambda: browser.run(CLICK, '[data-imu="1"] [data-action="approve"]'))
+            browser.until(
+                lambda: browser.run(CLICK, '.proposal[data-imu="1"] [data-action="approve"]')
+            )
             browser.element("#confirm-yes").click()
             browser.until_says("#push-result", "IMU 1 approved")
             browser.until(lambda: browser.elements('[data-key="rollback-1"]'))
@@ -99,6 +101,7 @@ async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
         browser.blank()  # before the service goes, which it would complain of
 
 
+APPROVE = '.proposal[data-imu="1"] [data-action="approve"]'
 # A table that is renewed while it is looked for must not lose the click.
 CLICK = """const e = document.querySelector(arguments[0]); e?.click();
 return document.querySelector('#confirm').open;"""

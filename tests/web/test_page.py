@@ -7,8 +7,10 @@ import msgspec
 import pytest
 from browsing import LAPTOP, PHONE
 from page_server import PageServer
-from story import story
+from story import T0, story
 
+from onboard.daemon.snapshot import WrittenValue, WrittenView
+from onboard.push.physics import headline
 from onboard.report.words import EFFECTS
 
 STALE = ("WebSocket", "Failed to load resource")
@@ -18,9 +20,9 @@ def test_one_glance_says_what_is_trusted_known_missing_and_next(browser, served)
     served.tell(story(40))
     browser.open(served.url)
     assert browser.text("#glance-trust .headline") == "Trusted"
-    assert "Collecting" in browser.text("#glance-calibration .headline")
-    assert "Fly banked turns" in browser.text("#glance-fly .headline")
-    assert "Nothing to write" in browser.text("#glance-push .headline")
+    assert browser.text("#glance-imu-1 .headline") == "Learning"
+    assert browser.text("#glance-imu-2 .detail") == "Least of all the z offset."
+    assert "Fly banked turns" in browser.text("#glance-next .headline")
     assert "SCALED_IMU2" in browser.text("#link-body")
     assert "slow" in browser.text("#link-body")
 
@@ -31,7 +33,7 @@ def test_values_change_as_snapshots_come(browser, served):
     served.tell(story(160))
     browser.until_says('[data-axis="x scale"] .value', "1.024")
     assert browser.text('[data-axis="x scale"] .value') != before
-    assert browser.text("#glance-calibration .headline") == "Calibrated"
+    assert browser.text("#glance-imu-1 .headline") == "Waits for your approval"
     assert browser.element('[data-axis="z offset"] canvas').size["height"] > 40
 
 
@@ -90,14 +92,45 @@ def test_approval_shows_before_and_after_and_cancelling_changes_nothing(browser,
 
 
 def test_roll_back_and_forgetting(browser, served):
-    push = story(0).push
-    served.tell(story(30), push=type(push)(**{**_fields(push), "can_roll_back": (1,)}))
+    served.tell(story(30), push=wrote(story(0).push))
     browser.open(served.url)
     for action, imus in (("rollback", (1,)), ("reset", ())):
         browser.element(f'#push-all [data-action="{action}"]').click()
         browser.element("#confirm-yes").click()
         browser.until_says("#push-result", f"{action.capitalize()} taken")
         assert served.told.asked[-1] == (action, imus)
+
+
+def test_a_roll_back_shows_what_is_in_force_and_what_would_be_written(browser, served):
+    def shown():
+        cells = (browser.text(f"#confirm-changes tbody td:nth-child({n})") for n in (1, 2, 3))
+        return list(cells)
+
+    served.tell(story(30), push=wrote(story(0).push))
+    browser.open(served.url)
+    browser.element('#push-all [data-action="rollback"]').click()
+    assert shown() == ["INS_ACCSCAL_X", "1.02400", "1.00100"]
+    browser.element("#confirm-no").click()
+    served.tell(parameters={"INS_ACCSCAL_X": 1.03})  # somebody has changed it since
+    browser.until(lambda: browser.run(ROLL_BACK) and shown()[1] == "1.03000")
+    assert served.told.asked == []
+    browser.element("#confirm-no").click()
+    browser.element('#push-all [data-action="reset"]').click()
+    assert browser.elements("#confirm-changes tr") == []
+
+
+def test_what_a_push_has_brought_stays_when_nothing_is_left_to_change(browser, served):
+    """In force and estimate are the same then: the residual of before is in what was written."""
+    imus = tuple(
+        msgspec.structs.replace(view, velocity_rms_before_m_s=0.05) for view in story(160).imus
+    )
+    served.tell(story(160), imus=imus, push=wrote(story(160).push))
+    browser.open(served.url)
+    words = browser.text("#written-body")
+    for said in ("0.610", "0.0510", "0.0550", "the residual has not grown", "1.00100", "1.02400"):
+        assert said in words
+    browser.element("#tab-2").click()
+    browser.until(lambda: browser.element("#written").get_attribute("hidden") is not None)
 
 
 def test_a_refusal_is_shown_with_its_reason(browser, served):
@@ -136,55 +169,46 @@ def test_a_restart_of_the_service_is_said_and_survived(browser, served):
     served.start()
     browser.until(lambda: browser.text("#connection") == "live")
     served.tell(story(160))
-    browser.until_says("#glance-calibration .headline", "Calibrated")
+    browser.until_says("#glance-imu-1 .headline", "Waits for your approval")
     assert browser.element("#banner").get_attribute("hidden") is not None
     browser.expect_complaints(*STALE)
 
 
-def holding(held_back):
-    """The push of a flight with these reasons against it, for both accelerometers."""
+def wrote(push):
+    """Accelerometer 1 was written, and flown since."""
+    values = (WrittenValue(name="INS_ACCSCAL_X", before=1.001, written=1.024, read_back=1.024),)
+    written = WrittenView(
+        imu=1,
+        at=T0,
+        values=values,
+        in_force=True,
+        held_out_before=4.2,
+        held_out_after=1.1,
+        velocity_rms_before_m_s=0.61,
+        velocity_rms_after_m_s=0.051,
+        verdict="kept",
+        verdict_sentence="the residual has not grown",
+        next_held_out=1.05,
+        next_velocity_rms_m_s=0.055,
+    )
+    return msgspec.structs.replace(push, can_roll_back=(1,), written=(written,))
+
+
+def holding(held_back, *, approvable=False):
     push = story(160).push
     proposals = tuple(
-        msgspec.structs.replace(proposal, held_back=held_back) for proposal in push.proposals
+        msgspec.structs.replace(p, held_back=held_back, approvable=approvable)
+        for p in push.proposals
     )
     return msgspec.structs.replace(push, approval_needed=False, proposals=proposals)
 
 
-@pytest.mark.parametrize(
-    ("held_back", "headline", "detail"),
-    [
-        (
-            {"disarmed_too_short": "disarmed for 1 s", "not_calibrated": "it is collecting"},
-            "Nothing to write yet",
-            "IMU 1, IMU 2 not calibrated yet",
-        ),
-        ({"armed": "armed, and landed is needed"}, "Written after landing", "IMU 1, IMU 2; armed"),
-        (
-            {"armed": "armed", "sigma_too_large": "INS_ACCSCAL_X: sigma is above"},
-            "Held back",
-            "INS_ACCSCAL_X: sigma is above",
-        ),
-        (
-            {"armed": "armed", "physics_missing": "GPS is late (83 %)"},
-            "Held back by the diagnosis",
-            "IMU 1: GPS is late (83 %)",
-        ),
-        (
-            {"not_diagnosed": "no flight was diagnosed yet", "armed": "armed"},
-            "Written after landing",
-            "IMU 1, IMU 2; this flight will be diagnosed",
-        ),
-        ({"not_diagnosed": "no flight was diagnosed yet"}, "Held back", "no flight was diagnosed"),
-        ({"nothing_to_change": "no value differs"}, "Nothing to write", ""),
-    ],
-)
-def test_of_many_reasons_the_telling_one_is_in_the_glance(
-    browser, served, held_back, headline, detail
-):
-    served.tell(story(160), push=holding(held_back))
-    browser.open(served.url)
-    assert browser.text("#glance-push .headline") == headline
-    assert browser.text("#glance-push .detail").startswith(detail)
+def standing(**changes):
+    """The accelerometers of the story's end in another state."""
+    return tuple(
+        msgspec.structs.replace(v, state=msgspec.structs.replace(v.state, **changes))
+        for v in story(160).imus
+    )
 
 
 def test_diagnosis_in_words(browser, served):
@@ -198,32 +222,79 @@ def test_diagnosis_in_words(browser, served):
     assert "0.055 m/s; it was 0.65 m/s" in words
 
 
+def test_the_state_of_an_accelerometer_is_told_as_the_service_says_it(browser, served):
+    """Tile and proposal alike: the page makes no story of its own."""
+    told = {"title": "held back", "sentence": "not written: the board is another"}
+    served.tell(story(160), imus=standing(**told), push=holding({"other": "the board is another"}))
+    browser.open(served.url)
+    assert browser.text("#glance-imu-1 .headline") == "Held back"
+    assert browser.text("#glance-imu-1 .detail") == "Not written: the board is another."
+    assert browser.text('.proposal[data-imu="1"] h3') == "IMU 1: held back"
+    for contradiction in ("collecting", "Nothing more needed", "not enough"):
+        assert contradiction not in browser.text("main")
+
+
 @pytest.mark.parametrize(
-    ("held_back", "heading"),
+    ("held_back", "approvable", "action", "enabled"),
     [
-        ({}, "about to be written"),
-        ({"approval": "a person has to approve"}, "waits for your approval"),
-        ({"approval": "a person has to approve", "armed": "armed"}, "waits for your approval"),
-        ({"in_air": "in the air"}, "waits for its moment"),
-        ({"in_air": "in the air", "not_diagnosed": "none yet"}, "waits for its moment"),
-        ({"not_diagnosed": "none yet"}, "not diagnosed yet"),
-        ({"not_calibrated": "it is collecting", "armed": "armed"}, "not calibrated yet"),
-        ({"physics_missing": "physics missing: GPS is late"}, "held back by the diagnosis"),
-        ({"sigma_too_large": "sigma is above", "armed": "armed"}, "held back"),
+        ({"unconfirmed": "learned before the last start"}, True, "approve", True),
+        ({"unheard_of": "something new"}, True, "approve", True),
+        ({"unheard_of": "something new"}, False, "approve", False),
+        ({"physics_missing": "the offset jumped"}, True, "override", True),
+        ({"not_diagnosed": "none yet", "armed": "armed"}, False, "approve", False),
     ],
 )
-def test_the_heading_of_a_proposal_says_what_becomes_of_it(browser, served, held_back, heading):
-    served.tell(story(160), push=holding(held_back))
+def test_what_can_be_approved_is_the_services_word(
+    browser, served, held_back, approvable, action, enabled
+):
+    served.tell(story(160), push=holding(held_back, approvable=approvable))
     browser.open(served.url)
-    assert browser.text('[data-imu="1"] h3') == f"IMU 1: {heading}"
+    button = browser.element(f'.proposal[data-imu="1"] [data-action="{action}"]')
+    assert button.is_enabled() is enabled
+    for sentence in held_back.values():
+        assert sentence in browser.text('.proposal[data-imu="1"] .held')
 
 
 def test_where_nothing_would_change_there_is_nothing_to_approve(browser, served):
-    served.tell(story(160), push=holding({"nothing_to_change": "no value differs by 2 sigma"}))
+    sentence = "the autopilot has these values already"
+    imus = standing(name="up_to_date", title="up to date", sentence=sentence, severity="good")
+    served.tell(story(160), imus=imus, push=holding({"nothing_to_change": "no value differs"}))
     browser.open(served.url)
-    assert browser.text('[data-imu="1"] h3') == "IMU 1: nothing to change"
-    assert "no value differs by 2 sigma" in browser.text('[data-imu="1"]')
-    assert browser.elements('[data-imu="1"] button') == []
+    assert browser.text('.proposal[data-imu="1"] h3') == "IMU 1: up to date"
+    assert "The autopilot has these values already." in browser.text('.proposal[data-imu="1"]')
+    assert browser.elements('.proposal[data-imu="1"] button') == []
+
+
+def test_plain_latency_is_no_alarm(browser, served):
+    effect = DIAGNOSIS["effects"][0] | {"severity": "info"}
+    sentence, severity = headline("explained", ["gps_latency"])
+    known = DIAGNOSIS | {"headline": sentence, "severity": severity, "effects": [effect]}
+    served.tell(story(20), diagnosis=known)
+    browser.open(served.url)
+    browser.until_says("#diagnosis-body", "Nothing is missing")
+    assert "Physics is missing" not in browser.text("#diagnosis-body")
+    assert browser.elements("#diagnosis-body .warn") == []
+    served.tell(diagnosis=DIAGNOSIS)
+    browser.until_says("#diagnosis-body .warn", "Physics is missing")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "labels"),
+    [
+        ([0, 10, 20], ["0", "10", "20 s"]),
+        ([0, 180, 360], ["0", "3", "6 min"]),
+        ([0, 30, 60, 90], ["0", "30", "60", "90 s"]),
+        ([0, 3600, 7200], ["0", "1", "2 h"]),
+    ],
+)
+def test_the_time_axis_has_its_unit(browser, served, seconds, labels):
+    browser.open(served.url)
+    shown = browser.driver.execute_async_script(
+        """const [seconds, done] = arguments;
+        import('/static/charts.js').then(({elapsed}) => done(elapsed(seconds)));""",
+        seconds,
+    )
+    assert shown == labels
 
 
 def test_the_diagnosis_says_what_it_holds_back(browser, served):
@@ -284,7 +355,7 @@ def test_a_day_does_not_make_the_page_grow(browser, served):
     assert (first, last) == (0, 86_399)
     assert every == pytest.approx(86_400 / rows, rel=1.0)
     served.tell(story(160))
-    browser.until_says("#glance-calibration .headline", "Calibrated")
+    browser.until_says("#glance-imu-1 .headline", "Waits for your approval")
     before = browser.run("return document.getElementsByTagName('*').length")
     for second in range(161, 201):
         served.tell(story(second))
@@ -365,6 +436,8 @@ def _fields(record):
 DIAGNOSIS = {
     "schema": "onboard.explain/1",
     "verdict": "partly_explained",
+    "headline": "Physics is missing from the model; a part of it was found.",
+    "severity": "warning",
     "recording": {"imu": 1},
     "mismatch": {
         "held_out_velocity_rms_before_m_s": 0.65,
@@ -384,6 +457,9 @@ DIAGNOSIS = {
     ],
     "not_testable": [{"name": "temperature_drift", "why": "no temperature in the recording"}],
 }
+
+ROLL_BACK = """document.querySelector('#confirm').close();
+document.querySelector('#push-all [data-action="rollback"]').click(); return true;"""
 
 # WCAG 2 contrast of every visible piece of text against the nearest painted ground behind it.
 CONTRASTS = """

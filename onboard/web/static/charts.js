@@ -68,7 +68,7 @@ export class Chart {
       padding: [6, 12, 0, 0],
       legend: { show: false },
       cursor: { show: false },
-      scales: { x: { time: false }, y: { range: span } },
+      scales: { x: { time: false, range: (_, _least, most) => [0, Math.max(most, 1)] }, y: { range: span } },
       axes: [
         { ...axis, size: 18, space: 34, incrs: STEPS, values: (_, marks) => elapsed(marks), grid: { stroke: line, width: 1 } },
         { ...axis, size: 44, space: 28, grid: { stroke: line, width: 1 } },

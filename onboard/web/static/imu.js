@@ -78,8 +78,6 @@ export class Imus {
     byId("residual").hidden = view === undefined;
     if (view === undefined) return showWritten(push, null);
     for (const axis of this.axes) axis.show(view);
-    const seconds = this.remembered.of(view.imu).seconds;
-    say(byId("axes-span"), seconds > 0 ? `over ${duration(seconds)} of trusted flight` : "nothing flown yet");
     this.showResidual(view);
     showWritten(this.push, view.imu);
     this.redraw();
@@ -131,6 +129,7 @@ export class Imus {
   redraw() {
     if (document.hidden || this.chosen === null) return;
     const history = this.remembered.of(this.chosen);
+    say(byId("axes-span"), history.seconds > 0 ? `over ${duration(history.seconds)} of trusted flight` : "nothing flown yet");
     for (const axis of this.axes) axis.chart.show(history);
   }
 

@@ -25,7 +25,7 @@ function showSnapshot(snapshot) {
   remembered.take(snapshot);
   showGlance(snapshot);
   imus.show(snapshot.imus, snapshot.push);
-  push.show(snapshot.push, snapshot.imus);
+  push.show(snapshot.push, snapshot.imus, snapshot.parameters);
   showDiagnosis(snapshot.diagnosis, snapshot.push);
   showJournal(snapshot.journal, snapshot.notices);
   showLink(snapshot.link);

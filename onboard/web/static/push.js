@@ -36,8 +36,9 @@ export class Push {
     });
   }
 
-  show(push, imus) {
+  show(push, imus, parameters) {
     this.push = push;
+    this.parameters = parameters;
     const approval = push.approval_required ? ", after a person has approved" : "";
     const doing = push.state === "idle" ? "" : ` Now: ${plain(push.state)}${push.active_imu ? `, IMU ${push.active_imu}` : ""}.`;
     const last = push.last_outcome ? ` Last time: ${push.last_outcome}` : "";
@@ -104,7 +105,7 @@ export class Push {
   table(action, imus, proposal) {
     if (["approve", "override"].includes(action) && proposal) return [changesTable(proposal.changes)];
     const written = action === "rollback" && (this.push.written ?? []).find((push) => push.in_force && imus.includes(push.imu));
-    return written ? [valuesTable(written.values, { back: true })] : [];
+    return written ? [valuesTable(written.values, { now: this.parameters })] : [];
   }
 
   async send(action, imus) {

@@ -39,11 +39,11 @@ function oneOf(push) {
   );
 }
 
-/** Old and new of each value; `back`: of the way back. */
-export function valuesTable(values, { back = false } = {}) {
+/** Old and new of each value; with what is in force `now`, by name: of the way back. */
+export function valuesTable(values, { now = null } = {}) {
   const decimals = ({ name }) => (name.includes("SCAL") ? 5 : 4);
-  const [first, second] = back ? ["written", "before"] : ["before", "written"];
-  const headings = back ? ["in force", "to be written"] : ["before", "written"];
+  const pair = ({ name, before, written }) => (now ? [now[name] ?? written, before] : [before, written]);
+  const headings = now ? ["in force", "to be written"] : ["before", "written"];
   return h("div", { class: "scroll" }, h(
     "table",
     { class: "changes" },
@@ -52,8 +52,8 @@ export function valuesTable(values, { back = false } = {}) {
       "tr",
       {},
       h("td", { class: "name", text: value.name }),
-      h("td", { class: "number", text: fixed(value[first], decimals(value)) }),
-      h("td", { class: "number to", text: fixed(value[second], decimals(value)) }),
+      h("td", { class: "number", text: fixed(pair(value)[0], decimals(value)) }),
+      h("td", { class: "number to", text: fixed(pair(value)[1], decimals(value)) }),
     ))),
   ));
 }

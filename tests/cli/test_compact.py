@@ -1,0 +1,52 @@
+"""``onboard status --watch``: nothing that is needed is below the edge of the terminal."""
+
+from __future__ import annotations
+
+import io
+
+import msgspec
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+from vehicles_state import accelerometer, seen
+
+from onboard.cli.compact import compact
+from onboard.daemon.snapshot import JournalLine
+
+LONG = "a sentence that goes on and on, as those of the core may do on a bad day " * 3
+
+
+def wordy(number):
+    view = accelerometer(number)
+    state = msgspec.structs.replace(view.state, next=LONG, sentence=LONG, title="held back by it")
+    return msgspec.structs.replace(view, state=state)
+
+
+def lines(imus, height=24, **changes):
+    journal = tuple(
+        JournalLine(at=float(n), kind="closed", transaction="a", imu=1, text=LONG) for n in range(9)
+    )
+    snapshot = msgspec.structs.replace(seen(imus=imus), journal=journal, **changes)
+    console = Console(file=io.StringIO(), width=80, height=height)
+    console.print(compact(snapshot, height))
+    return console.file.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+@pytest.mark.parametrize("mode", ["active", "advise_only"])
+def test_everything_fits_80x24(count, mode):
+    shown = lines([wordy(n + 1) for n in range(count)], mode=mode, mode_reason=LONG)
+    assert len(shown) <= 24
+    assert max(map(cell_len, shown)) <= 80
+    for number in range(1, count + 1):
+        assert any(line.startswith(f"IMU {number}: held back by it") for line in shown)
+    assert sum(line.startswith("estimate") for line in shown) == count
+
+
+def test_of_two_accelerometers_all_is_shown():
+    shown = lines([accelerometer(1), accelerometer(2)])
+    for row in ("in force", "estimate", "coverage", "sigma"):
+        assert sum(line.startswith(row) for line in shown) == 2
+    assert any("1.02123" in line and "-0.10000" in line for line in shown)
+    assert any("residual 1.00 -> 0.10 m/s" in line for line in shown)
+    assert "--full" in shown[-1]

@@ -1,0 +1,44 @@
+"""What a person may allow: said by the service, so that page and terminal need not guess."""
+
+from __future__ import annotations
+
+import pytest
+from daemons import calibration
+from test_written import parameters
+
+from onboard.daemon.proposals import Proposal, Proposals, approvable
+from onboard.errors import RefusedError
+from onboard.push.plan import propose
+from onboard.push.policy import PolicySettings
+
+
+@pytest.mark.parametrize(
+    ("held_back", "expected"),
+    [
+        ([], False),
+        (["armed"], False),
+        (["approval"], True),
+        (["approval", "armed"], True),
+        (["refused"], True),
+        (["physics_missing"], True),
+        (["not_diagnosed"], True),
+        (["not_diagnosed", "armed"], False),
+        (["approval", "nothing_to_change"], False),
+        (["refused", "nothing_to_change"], False),
+        (["approval", "no_improvement"], False),
+        (["sigma_too_large"], False),
+    ],
+)
+def test_a_reason_that_a_person_lifts_makes_it_approvable(held_back, expected):
+    assert approvable(dict.fromkeys(held_back, "because")) is expected
+
+
+@pytest.mark.parametrize("despite", [False, True])
+def test_nothing_to_change_is_not_approved_as_about_to_be_written(despite):
+    proposals = Proposals(PolicySettings(), approval=True)
+    held_back = dict.fromkeys(("approval", "nothing_to_change", "not_diagnosed"), "because")
+    pushing = propose(calibration(), parameters(), system_id=1)
+    proposals.current = {1: Proposal(pushing, held_back)}
+    assert not proposals.view()[0].approvable
+    with pytest.raises(RefusedError, match=r"^nothing waits for approval$"):
+        proposals.approve((1,), despite_diagnosis=despite)

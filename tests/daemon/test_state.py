@@ -1,0 +1,149 @@
+"""The one sentence about an accelerometer: it never says two things at once."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+from daemons import calibration
+
+from onboard.core.result import Coverage, Status
+from onboard.daemon.snapshot import ChangeView, ProposalView
+from onboard.daemon.state import NAMES, Circumstances, next_step, state_of
+from onboard.daemon.view import imu_view
+
+SENTENCES = {
+    "armed": "armed, and the push policy is 'landed'",
+    "disarmed_too_short": "disarmed for 1.2 s, 5 s needed",
+    "approval": "a person has to approve",
+    "not_diagnosed": "no flight was diagnosed yet: that is done after a landing",
+    "diagnosing": "the flight is being diagnosed",
+    "physics_missing": "physics missing: the offset follows the temperature",
+    "nothing_to_change": "no value differs from the one in force by 2 sigma",
+    "sigma_too_large": "INS_ACCSCAL_X: sigma 0.006 is above 0.005",
+    "no_improvement": "the held-out residual would go from 0.9 to 0.89 only",
+    "policy_never": "the push policy is 'never': values are proposed only",
+    "refused": "a person rejected it; `onboard approve 1` lifts that",
+    "failed_before": "the last try failed: the next one in 17 s",
+    "unconfirmed": "learned before the autopilot last started",
+}
+
+
+def proposal(*held, approved=False):
+    change = ChangeView(name="INS_ACCSCAL_X", before=1.0, after=1.02, sigma=0.001)
+    return ProposalView(
+        imu=1,
+        changes=(change,),
+        held_back={name: SENTENCES[name] for name in held},
+        approved=approved,
+        rejected="refused" in held,
+        approvable="approval" in held or "unconfirmed" in held,
+    )
+
+
+def state(*held, approved=False, **circumstances):
+    return state_of(
+        calibration(), Circumstances(proposal=proposal(*held, approved=approved), **circumstances)
+    )
+
+
+@pytest.mark.parametrize(
+    ("held", "name", "title"),
+    [
+        ((), "calibrated", "about to be written"),
+        (("armed",), "calibrated", "calibrated"),
+        (("armed", "not_diagnosed"), "calibrated", "calibrated"),
+        (("diagnosing",), "calibrated", "calibrated"),
+        (("approval",), "approval", "waits for your approval"),
+        (("approval", "armed"), "calibrated", "calibrated"),
+        (("approval", "not_diagnosed"), "held_back", "not diagnosed yet"),
+        (("physics_missing", "approval"), "held_back", "held back by the diagnosis"),
+        (("physics_missing", "nothing_to_change"), "held_back", "held back by the diagnosis"),
+        (("nothing_to_change", "approval"), "up_to_date", "up to date"),
+        (("refused", "approval"), "rejected", "rejected"),
+        (("policy_never", "approval"), "calibrated", "calibrated, not written"),
+        (("no_improvement", "approval"), "up_to_date", "up to date"),
+        (("no_improvement", "sigma_too_large"), "held_back", "held back"),
+        (("policy_never",), "calibrated", "calibrated, not written"),
+        (("sigma_too_large", "armed"), "held_back", "held back"),
+        (("unconfirmed",), "held_back", "held back"),
+    ],
+)
+def test_of_many_reasons_the_telling_one_decides(held, name, title):
+    said = state(*held)
+    assert (said.name, said.title) == (name, title)
+
+
+def test_values_that_could_not_be_compared_are_not_called_up_to_date():
+    unknown = calibration(held_out_before=math.nan)
+    said = state_of(unknown, Circumstances(proposal=proposal("no_improvement")))
+    assert said.name == "held_back"
+
+
+def test_a_reason_that_nobody_here_has_heard_of_is_told_in_its_own_words():
+    said = state("unconfirmed")
+    assert said.sentence.endswith("not written: learned before the autopilot last started")
+    assert "approve" in said.next
+
+
+def test_approved_with_nothing_to_change_is_not_about_to_be_written():
+    said = state("nothing_to_change", approved=True)
+    assert (said.name, said.next) == ("up_to_date", "")
+    assert "written as soon" not in said.sentence
+
+
+def test_what_is_being_written_is_no_estimate_and_no_proposal():
+    said = state("approval", writing=True)
+    assert (said.name, said.next) == ("writing", "")
+
+
+def test_collecting_is_never_beside_nothing_more_needed():
+    """All six are covered, but it hovered: then this is what is said, and what to do."""
+    hovered = calibration(
+        status=Status.COLLECTING, note="hovering or standing: fly fast, brake hard, turn both ways."
+    )
+    view = imu_view(hovered)
+    assert view.coverage.advice == ""
+    assert view.state.name == "collecting"
+    assert "hovering or standing" in view.state.sentence
+    assert view.state.next
+    assert next_step([view]).text == view.state.next
+
+
+def test_what_to_fly_is_that_of_the_accelerometer_that_needs_most():
+    few = Coverage(20.0, (20.0,) * 6, "y scale", "fly fast to the left and right")
+    learning = imu_view(calibration(2, status=Status.COLLECTING, coverage=few))
+    done = imu_view(calibration())
+    said = next_step([done, learning])
+    assert (said.imu, said.text) == (2, "fly fast to the left and right")
+    assert next_step([done]).text == "nothing more needed"
+    assert next_step([]) is None
+
+
+def test_seconds_that_pass_do_not_make_another_state():
+    a = proposal("failed_before")
+    b = proposal("failed_before")
+    b.held_back["failed_before"] = "the last try failed: the next one in 16 s"
+    said = [state_of(calibration(), Circumstances(proposal=p)) for p in (a, b)]
+    assert said[0] == said[1]
+
+
+def test_every_state_has_a_name_of_the_table_a_title_and_a_sentence():
+    for status in Status:
+        for held in itertools.combinations(SENTENCES, 2):
+            for flying, writing, written, approved in itertools.product((False, True), repeat=4):
+                said = state_of(
+                    calibration(status=status),
+                    Circumstances(
+                        proposal=proposal(*held, approved=approved),
+                        writing=writing,
+                        written=written,
+                        flying=flying,
+                    ),
+                )
+                assert said.name in NAMES
+                assert said.title
+                assert said.sentence
+                assert said.severity in {"good", "info", "warning", "error"}
+                assert len(f"OBC: IMU 1: {said.title}") <= 50
