@@ -89,7 +89,10 @@ def judge_physics(
     suspects = [e for e in diagnosis.effects if e.name not in IN_EVERY_MODEL]
     fuller = diagnosis.calibration
     missing, modelled = "", False
-    if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
+    if not diagnosis.mismatch.supported:
+        m = diagnosis.mismatch
+        missing = f"only {m.fixes} of {m.believed} GPS fixes fit one model of this flight"
+    elif diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = _listed(suspects)
         missing = "the residual is not noise, and " + (
             f"what was found ({found}) does not explain all of it"

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from onboard.recordings.dataflash_index import DataflashIndex, Format, Records
 
 Floats = NDArray[np.float64]
+Series = tuple[Floats, Floats]
+"""Times (n,) and values (n,)."""
 
 GPS_NAMES = ("GPS", "GPS2")
 EKF2 = 2.0
@@ -24,14 +26,16 @@ class Context:
     """What a converter must know of the rest of the log.
 
     ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
-    follow the GPS record that they belong to; ``vertical_speed`` says per receiver whether it
+    follow the GPS record that they belong to, ``message_time`` the like for their time from which
+    the EKF counts back (SMS, s); ``vertical_speed`` says per receiver whether it
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
     widths at none and at full; ``first_time`` (s) is given to records without a time that
     stand before all others.
     """
 
-    speed_accuracy: Mapping[int, tuple[Floats, Floats]]
+    speed_accuracy: Mapping[int, Series]
+    message_time: Mapping[int, Series]
     vertical_speed: Mapping[int, bool]
     ekf_status_from: str
     motor_channels: tuple[str, ...]
@@ -43,7 +47,8 @@ def context_of(index: DataflashIndex, first_time: float) -> Context:
     """Look through the records that say it."""
     counts, parameters = index.counts(), _parameters(index)
     return Context(
-        speed_accuracy=_speed_accuracy(index),
+        speed_accuracy=_beside_fixes(index, "SAcc", 1.0),
+        message_time=_beside_fixes(index, "SMS", 1e3),
         vertical_speed=_vertical_speed(index),
         ekf_status_from=_ekf_status(parameters, counts),
         motor_channels=() if counts.get("CTUN") else _motor_channels(parameters),
@@ -69,21 +74,22 @@ def _parameters(index: DataflashIndex) -> dict[str, float]:
     return values
 
 
-def _speed_accuracy(index: DataflashIndex) -> dict[int, tuple[Floats, Floats]]:
-    parts: dict[int, list[tuple[Floats, Floats]]] = {}
+def _beside_fixes(index: DataflashIndex, column: str, divisor: float) -> dict[int, Series]:
+    """A field of the GPA records by receiver; none of layouts that lack it."""
+    parts: dict[int, list[Series]] = {}
     for form, records in index.all_of("GPA"):
-        if not form.has("SAcc", "TimeUS"):
+        if not form.has(column, "TimeUS"):
             continue
         receivers = np.array(receiver_of(form, records))
-        t, sigma = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "SAcc")
+        t, x = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, column) / divisor
         for receiver in np.unique(receivers).tolist():
             mine = receivers == receiver
-            parts.setdefault(receiver, []).append((t[mine], sigma[mine]))
+            parts.setdefault(receiver, []).append((t[mine], x[mine]))
     series = {}
     for receiver, pieces in parts.items():
-        t, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        t, x = (np.concatenate(values) for values in zip(*pieces, strict=True))
         order = np.argsort(t, kind="stable")
-        series[receiver] = t[order], sigma[order]
+        series[receiver] = t[order], x[order]
     return series
 
 

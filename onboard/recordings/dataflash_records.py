@@ -27,13 +27,22 @@ from onboard.core.samples import (
     VehicleState,
     Vibration,
 )
-from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, receiver_of
+from onboard.recordings.dataflash_context import (
+    GPS_NAMES,
+    Context,
+    Floats,
+    Series,
+    receiver_of,
+)
 from onboard.recordings.dataflash_index import Format, Records
 
 SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
+LONGEST_WAIT_S = 1.0
+"""ArduPilot's own correction of a message's time takes off no more (max_lag_ms, JitterCorrection.h
+has 500): what is further off is damaged, or of a receiver that has just been found."""
 HDOP_UNKNOWN = 99.0
 STATUS_BITS = 0x3FF
 """The low ten bits of the EKF's nav_filter_status are those of EKF_STATUS_REPORT."""
@@ -110,7 +119,7 @@ def attitude(batch: Batch, _context: Context) -> Converted:
 
 
 def gps(batch: Batch, context: Context) -> Converted:
-    """GPS, GPS2; the speed accuracy comes from GPA, the receiver's time from GMS and GWk."""
+    """GPS, GPS2; speed accuracy and the EKF's time are in GPA, the receiver's in GMS and GWk."""
     form, records = batch.form, batch.records
     speed = form.numbers(records, "Spd")
     course = np.radians(form.numbers(records, "GCrs"))
@@ -140,17 +149,28 @@ def gps(batch: Batch, context: Context) -> Converted:
                 satellites=satellites[k] if satellites[k] >= 0 else None,
                 hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
                 speed_accuracy=_nearest(context.speed_accuracy.get(receiver), t),
+                t_message=_of_same_fix(context.message_time.get(receiver), t),
             )
         )
     return fixes
 
 
-def _nearest(series: tuple[Floats, Floats] | None, t: float) -> float | None:
+def _nearest(series: Series | None, t: float) -> float | None:
     """The value of the record written with, or last before, the one of time ``t``."""
     if series is None:
         return None
     k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
     if k < 0 or t - series[0][k] > 2.0 or not series[1][k] > 0.0:
+        return None
+    return float(series[1][k])
+
+
+def _of_same_fix(series: Series | None, t: float) -> float | None:
+    """A time in the record that was written with the one of time ``t``; None if it is none."""
+    if series is None:
+        return None
+    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
+    if k < 0 or t - series[0][k] > SAME_FIX_S or not abs(t - series[1][k]) < LONGEST_WAIT_S:
         return None
     return float(series[1][k])
 

@@ -18,7 +18,13 @@ from onboard.core.result import SIX_NAMES, Calibration, Status
 from onboard.report.words import effect_title
 
 REAL32 = 9
-INTEGERS = {"GPS1_DELAY_MS": 4, "INS_ACCEL_FILTER": 4, "INS_TCAL": 2, "COMPASS_ORIENT": 2}
+INTEGERS = {
+    "GPS1_DELAY_MS": 4,
+    "GPS_DELAY_MS": 4,
+    "INS_ACCEL_FILTER": 4,
+    "INS_TCAL": 2,
+    "COMPASS_ORIENT": 2,
+}
 """MAV_PARAM_TYPE of what is not a real number, by the beginning of its name."""
 
 
