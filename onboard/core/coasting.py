@@ -211,7 +211,10 @@ def _small(error: Array, sigma: float) -> bool:
 
 
 def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Array]], float]:
-    """Jumps between means over a second to either side: (index, (2,) m/s); and their sigma, m/s."""
+    """Jumps between means over a second to either side: (index, (2,) m/s); and their sigma, m/s.
+
+    What goes on growing the second before or after is no jump: that is an inertia that is lost.
+    """
     n = max(round(MEAN_S / float(np.median(np.diff(t)))), 1) if len(t) > 1 else 1
     variance = (
         2.0 * levels.velocity**2 / n
@@ -226,9 +229,12 @@ def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Arr
             jump[k] = y[k : k + n].mean(axis=0) - y[k - n : k].mean(axis=0)
     out: list[tuple[int, Array]] = []
     size = np.linalg.norm(jump, axis=1)
-    while len(size) and not _small(jump[k := int(np.argmax(size))], sigma):
-        out.append((k, jump[k]))
-        size[max(k - n, 0) : k + n + 1] = 0.0
+    left = size.copy()
+    while len(left) and not _small(jump[k := int(np.argmax(left))], sigma):
+        beside = max(size[max(k - n, 0)], size[min(k + n, len(size) - 1)])
+        left[max(k - n, 0) : k + n + 1] = 0.0
+        if beside < 0.5 * size[k]:
+            out.append((k, jump[k]))
     return sorted(out, key=lambda step: step[0]), sigma
 
 

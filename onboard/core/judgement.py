@@ -158,7 +158,9 @@ class Judge:
             regimes=regime_residuals(self.traces, self.engine.chunks, before.theta, after.theta),
             series=self._series(before.theta, after.theta),
             note=note,
-            unused=self.unused,
+            unused=self.unused
+            if verdict is not Verdict.INSUFFICIENT
+            else _not_compared(self.unused),
         )
 
     def _held(self, names: Sequence[str]) -> Array:
@@ -430,3 +432,8 @@ class Judge:
                     )
                 )
         return out
+
+
+def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:
+    """Of a flight that says nothing, an inertia that says nothing of the fixes either."""
+    return tuple(replace(u, contradicted=None) for u in unused)

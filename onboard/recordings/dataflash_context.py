@@ -15,6 +15,9 @@ Series = tuple[Floats, Floats]
 """Times (n,) and values (n,)."""
 
 GPS_NAMES = ("GPS", "GPS2")
+LONGEST_WAIT_S = 1.0
+"""ArduPilot's correction of a message's time takes off half a second at the most (max_lag_ms in
+JitterCorrection.h): what is further off is damaged, or of a receiver that has just been found."""
 EKF2 = 2.0
 MOTOR_FUNCTIONS = frozenset((*range(33, 41), *range(82, 86), 70))
 """SERVOn_FUNCTION of motors 1 ... 12, and of a plane's throttle."""
@@ -25,9 +28,10 @@ CHANNELS = 14
 class Context:
     """What a converter must know of the rest of the log.
 
-    ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
-    follow the GPS record that they belong to, ``message_time`` the like for their time from which
-    the EKF counts back (SMS, s); ``vertical_speed`` says per receiver whether it
+    Per receiver: ``speed_accuracy`` has the times (n,) and values (n,) of the GPA records, which
+    follow the GPS record that they belong to; ``message_time`` the like for the time from which the
+    EKF counts back (SMS, s); ``written_late`` is how much later records are written on the average,
+    s; ``vertical_speed`` says whether it
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
     widths at none and at full; ``first_time`` (s) is given to records without a time that
@@ -36,6 +40,7 @@ class Context:
 
     speed_accuracy: Mapping[int, Series]
     message_time: Mapping[int, Series]
+    written_late: Mapping[int, float]
     vertical_speed: Mapping[int, bool]
     ekf_status_from: str
     motor_channels: tuple[str, ...]
@@ -46,9 +51,11 @@ class Context:
 def context_of(index: DataflashIndex, first_time: float) -> Context:
     """Look through the records that say it."""
     counts, parameters = index.counts(), _parameters(index)
+    message_time = {n: _plausible(x) for n, x in _beside_fixes(index, "SMS", 1e3).items()}
     return Context(
         speed_accuracy=_beside_fixes(index, "SAcc", 1.0),
-        message_time=_beside_fixes(index, "SMS", 1e3),
+        message_time=message_time,
+        written_late={n: float(np.mean(t - x)) for n, (t, x) in message_time.items() if len(t)},
         vertical_speed=_vertical_speed(index),
         ekf_status_from=_ekf_status(parameters, counts),
         motor_channels=() if counts.get("CTUN") else _motor_channels(parameters),
@@ -91,6 +98,13 @@ def _beside_fixes(index: DataflashIndex, column: str, divisor: float) -> dict[in
         order = np.argsort(t, kind="stable")
         series[receiver] = t[order], x[order]
     return series
+
+
+def _plausible(series: Series) -> Series:
+    """Without times that cannot be of a message that was written then."""
+    t, message = series
+    near = np.abs(t - message) < LONGEST_WAIT_S
+    return t[near], message[near]
 
 
 def _vertical_speed(index: DataflashIndex) -> dict[int, bool]:

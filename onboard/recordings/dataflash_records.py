@@ -40,9 +40,6 @@ SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
-LONGEST_WAIT_S = 1.0
-"""ArduPilot's own correction of a message's time takes off no more (max_lag_ms, JitterCorrection.h
-has 500): what is further off is damaged, or of a receiver that has just been found."""
 HDOP_UNKNOWN = 99.0
 STATUS_BITS = 0x3FF
 """The low ten bits of the EKF's nav_filter_status are those of EKF_STATUS_REPORT."""
@@ -119,7 +116,11 @@ def attitude(batch: Batch, _context: Context) -> Converted:
 
 
 def gps(batch: Batch, context: Context) -> Converted:
-    """GPS, GPS2; speed accuracy and the EKF's time are in GPA, the receiver's in GMS and GWk."""
+    """GPS, GPS2; speed accuracy and the EKF's time are in GPA, the receiver's in GMS and GWk.
+
+    A record is stamped when it is written, and how long a fix waits for that changes in flight, by
+    tens of milliseconds: the stamp is that of the EKF's time and the log's mean wait.
+    """
     form, records = batch.form, batch.records
     speed = form.numbers(records, "Spd")
     course = np.radians(form.numbers(records, "GCrs"))
@@ -132,7 +133,10 @@ def gps(batch: Batch, context: Context) -> Converted:
     status, satellites = batch.integers("Status"), batch.integers("NSats", -1)
     fixes = []
     for k, receiver in enumerate(receiver_of(form, records)):
-        t = float(batch.t[k])
+        written = t = float(batch.t[k])
+        message = _of_same_fix(context.message_time.get(receiver), written)
+        if message is not None:
+            t = message + context.written_late[receiver]
         vertical = down is not None and context.vertical_speed.get(receiver, False)
         fixes.append(
             GpsFix(
@@ -148,8 +152,8 @@ def gps(batch: Batch, context: Context) -> Converted:
                 t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if week[k] else None,
                 satellites=satellites[k] if satellites[k] >= 0 else None,
                 hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
-                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), t),
-                t_message=_of_same_fix(context.message_time.get(receiver), t),
+                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), written),
+                t_message=message,
             )
         )
     return fixes
@@ -170,7 +174,7 @@ def _of_same_fix(series: Series | None, t: float) -> float | None:
     if series is None:
         return None
     k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
-    if k < 0 or t - series[0][k] > SAME_FIX_S or not abs(t - series[1][k]) < LONGEST_WAIT_S:
+    if k < 0 or t - series[0][k] > SAME_FIX_S:
         return None
     return float(series[1][k])
 
