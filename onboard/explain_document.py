@@ -22,6 +22,8 @@ from onboard.document import (
     timing_document,
 )
 from onboard.push.physics import headline, severity_of_effect
+from onboard.report.verdict import unused_in_words
+from onboard.report.words import DISTRUST
 
 EXPLAIN_SCHEMA = "onboard.explain/1"
 
@@ -85,6 +87,8 @@ class MismatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     held_out_velocity_rms_before_m_s: float | None
     held_out_velocity_rms_after_m_s: float | None
     where: list[WhereDocument]
+    fixes: int
+    fixes_believed: int
 
 
 class AmbiguityDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,6 +103,16 @@ class NotTestableDocument(msgspec.Struct, frozen=True, kw_only=True):
 
     name: str
     why: str
+
+
+class UnusedDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Flight whose fixes were not used."""
+
+    start_s: float | None
+    end_s: float | None
+    reason: str
+    why: str
+    contradicted: bool | None
 
 
 class RungDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -140,6 +154,7 @@ class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
     ambiguous: list[AmbiguityDocument]
     not_testable: list[NotTestableDocument]
     ladder: list[RungDocument]
+    unused: list[UnusedDocument]
     advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
     schema: str = EXPLAIN_SCHEMA
 
@@ -173,7 +188,7 @@ def explain_document(
         verdict=diagnosis.verdict.value,
         headline=sentence,
         severity=severity,
-        note=diagnosis.note,
+        note=" ".join(x for x in (diagnosis.note, *unused_in_words(diagnosis)) if x),
         mismatch=MismatchDocument(
             detected=m.detected,
             whitened_rms_before=finite(m.whitened_rms_before),
@@ -186,6 +201,8 @@ def explain_document(
             held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
             held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
             where=[_where(w) for w in m.where],
+            fixes=m.fixes,
+            fixes_believed=m.believed,
         ),
         effects=[_effect(e, autopilot) for e in diagnosis.effects],
         ambiguous=[
@@ -202,6 +219,16 @@ def explain_document(
                 held_out_velocity_rms_m_s=finite(r.held_out_velocity),
             )
             for r in diagnosis.ladder
+        ],
+        unused=[
+            UnusedDocument(
+                start_s=finite(u.start_s),
+                end_s=finite(u.end_s),
+                reason=u.reason,
+                why=DISTRUST.get(u.reason, u.reason),
+                contradicted=u.contradicted,
+            )
+            for u in diagnosis.unused
         ],
         advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
     )

@@ -142,6 +142,7 @@ class Assembly:
             np.array([[f.v_n, f.v_e, np.nan if f.v_d is None else f.v_d] for f in fixes]),
             np.array([f.altitude for f in fixes]),
             np.array([f.latitude for f in fixes]),
+            t - np.array([f.t if f.t_message is None else f.t_message for f in fixes]),
         )
         out: dict[int, list[Chunk]] = {}
         if grounded or (grounded is None and self._still(live, even)):

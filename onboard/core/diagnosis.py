@@ -33,6 +33,7 @@ from onboard.core.clipping import saturation_effect
 from onboard.core.engine import Chunk, moved
 from onboard.core.examination import Examination
 from onboard.core.findings import Diagnosis, Effect, NotTestable
+from onboard.core.gps_clock import fix_clock
 from onboard.core.judgement import Evidence, Judge
 from onboard.core.jumps import boundary_of, candidate_of, jump_near
 from onboard.core.physics.catalogue import catalogue
@@ -40,6 +41,7 @@ from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.gains import Gain, ScaleNonlinearity
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
+from onboard.core.refusals import believed, unused_flight
 from onboard.core.report import timing_of
 from onboard.core.screening import false_fixes, unclipped
 from onboard.core.search import searched
@@ -142,10 +144,11 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         if len(kept) < len(families):
             families = kept
             final = _again(full, families, final).with_rows().doubting_attitude()
+    unused = unused_flight(flight, calibrator.trust.refusals, fault, origin.t0, asked=not clipped)
     return Judge(
         calibrator,
         imu,
-        Evidence(full, choice, final, tuple(families), doubts),
+        Evidence(full, choice, final, tuple(families), doubts, believed(flight), unused),
         origin,
         absent,
         tuple(e for e in (rail, fault) if e is not None),
@@ -230,7 +233,8 @@ def _second_thoughts(
     Returns:
         Those that are large enough; of them, those beside which another effect could stand.
     """
-    told = calibrator.parameters.gps_delay_told
+    clock = fix_clock(calibrator.parameters, full.chunks)
+    told = clock.told_on_stamp
     index = choice.fitter.model.index
     standing: Standing = {}
     for _ in range(len(STANDING)):
@@ -239,7 +243,9 @@ def _second_thoughts(
             fit.theta, fit.covariance, choice.fitter.sums.N, choice.fitter.weaken, 1.0, 1.0
         )
         timing = timing_of(full, solution)
-        standing = standing_effects(timing, solution, index, full.point, calibrator.parameters, imu)
+        standing = standing_effects(
+            timing, solution, index, full.point, calibrator.parameters, imu, clock
+        )
         taken = False
         for name in standing:
             target = Candidate(name, tuple(index[c] for c in STANDING[name]), ())

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.coasting import FEWEST_FIXES, MOST_SCATTER, Contradiction
 from onboard.core.engine import Chunk
 from onboard.core.findings import Effect, Quantity
 from onboard.core.regimes import spans
@@ -17,12 +18,10 @@ from onboard.core.traces import EpochTrace
 Array = NDArray[np.float64]
 
 FAULT_S = 1.0
-FEWEST_FIXES = 5
-MOST_SCATTER = 0.5
-"""Of a fault's size; one that is refused until the inertia itself is lost scatters by a third."""
-FAULT_M_S = 0.7
 ONSET_FIXES = 3
 LONGEST_FAULT_S = 120.0
+BESIDE_S = 2.0
+"""Spells of one fault are parted by fewer good fixes: those before the EKF complained."""
 NEIGHBOURS_S = 1.1
 """Fixes that follow on each other: between them inertia changes by next to nothing."""
 
@@ -35,6 +34,7 @@ def fault_effect(
     least: float,
     coast_s: float,
     distrusted: Sequence[tuple[float, float]] = (),
+    contradicted: Sequence[Contradiction] = (),
 ) -> Effect | None:
     """GPS velocities that cannot be true: refused by the innovation gate for a while.
 
@@ -47,12 +47,14 @@ def fault_effect(
         coast_s: how long the filter goes on without a velocity, s.
         distrusted: s since ``t0`` in which the receiver contradicted itself; they stand for a
             fault where the inertia, lost itself, cannot tell.
+        contradicted: fixes refused in flight that the inertia has contradicted; not in ``traces``.
     """
     refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
     heard = {x.t: (x.innovation - x.columns @ theta)[:2] for x in traces if x.velocities}
     seen = {**heard, **refused}
     every = [_spell(run, seen, t0, least, coast_s) for run in _runs(traces, refused)]
     spells = [s for s in _paired(every, _jumps(seen, refused, t0)) if not s.lost]
+    spells = _with_contradicted(spells, contradicted, t0)
     spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
     intervals = [(s.start, s.end) for s in spells]
     worst = max(spells, key=lambda s: s.size, default=None)
@@ -63,11 +65,12 @@ def fault_effect(
         # A receiver that contradicts itself while the inertia is lost does not show its error.
         spread = float(np.hypot(least / 8.0, worst.spread))
         sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
-    inside = [x for x in traces if any(a <= x.t - t0 <= b for a, b in intervals)]
+    t = np.unique(np.concatenate([c.fixes.t for c in chunks])) - t0
+    inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
     return Effect(
         name="gps_fault",
         unknowns=sizes,
-        share_of_mismatch=len(inside) / max(len(traces), 1),
+        share_of_mismatch=float(np.mean(inside)),
         delta_bic=0.0,
         held_out_before=float("nan"),
         held_out_after=float("nan"),
@@ -76,6 +79,21 @@ def fault_effect(
         where=spans(chunks, t0, intervals, _earth_axis(spells)),
         intervals=tuple(intervals),
     )
+
+
+def _with_contradicted(
+    spells: Sequence[_Spell], contradicted: Sequence[Contradiction], t0: float
+) -> list[_Spell]:
+    """Both kinds in order of time; what the gate refused right beside one is of the same fault."""
+    out = list(spells)
+    for c in contradicted:
+        start, end = c.start - t0, c.end - t0
+        beside = [s for s in out if s.start <= end + BESIDE_S and s.end >= start - BESIDE_S]
+        out = [s for s in out if s not in beside]
+        start = min([start, *(s.start for s in beside)])
+        end = max([end, *(s.end for s in beside)])
+        out.append(_Spell(start, end, c.off, c.size, c.off, c.sigma))
+    return sorted(out, key=lambda s: s.start)
 
 
 @dataclass(frozen=True, slots=True)

@@ -146,7 +146,10 @@ class Rung:
 
 @dataclass(frozen=True, slots=True)
 class Mismatch:
-    """The residual of the six numbers and timing thresholds alone, and after all effects."""
+    """The residual of the six numbers and timing thresholds alone, and after all effects.
+
+    Both are of the same ``fixes``, out of ``believed``: those that were to be used.
+    """
 
     detected: bool
     whitened_rms_before: float
@@ -159,6 +162,30 @@ class Mismatch:
     where: tuple[Where, ...] = ()
     held_out_velocity_before: float = NAN
     held_out_velocity_after: float = NAN
+    fixes: int = 0
+    believed: int = 0
+
+    @property
+    def supported(self) -> bool:
+        """Whether most fixes that were to be used could be.
+
+        Of a flight of which more than half is refused nobody can say which half is false: no
+        estimate withstands more (the breakdown point; Donoho and Huber 1983).
+        """
+        return not self.believed or self.fixes >= 0.5 * self.believed
+
+
+@dataclass(frozen=True, slots=True)
+class Unused:
+    """Flight whose fixes were not used: why, and whether inertia contradicts them.
+
+    ``reason`` is the trust window's; ``contradicted`` is None where there was nothing to compare.
+    """
+
+    start_s: float
+    end_s: float
+    reason: str
+    contradicted: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,3 +248,4 @@ class Diagnosis:
     series: Series
     note: str
     plain: Plain | None = None
+    unused: tuple[Unused, ...] = ()

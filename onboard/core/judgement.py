@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from onboard.core.calibration_columns import AntennaPlace
 from onboard.core.calibrator import Calibrator
+from onboard.core.chi_square import survival
 from onboard.core.choice import HELD_OUT_GAIN, MARGIN, SIGNIFICANT, Candidate, Choice, rivals_of
 from onboard.core.epochs import Epochs, rms
 from onboard.core.examination import Examination
@@ -23,9 +24,11 @@ from onboard.core.findings import (
     Rival,
     Rung,
     Series,
+    Unused,
     Verdict,
     Where,
 )
+from onboard.core.gps_clock import fix_clock
 from onboard.core.laws import law_of
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
@@ -53,17 +56,28 @@ APART = {
 """Manoeuvres that tell a timing error from what looks alike."""
 AMBIGUOUS = 10.0
 """Rivals within this difference of BIC cannot be told apart."""
+NOT_AT_FIRST = (
+    *("gps_delay", "window_squared", "attitude_delay"),
+    *("tilt_roll", "tilt_pitch", "heading"),
+)
+"""Unknowns of every model that the six numbers alone do without."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """The models: everything, what was chosen of it, the one that is reported, what is in doubt."""
+    """The models: everything, what was chosen of it, the one that is reported, what is in doubt.
+
+    ``believed`` is the number of fixes of the flight that were to be used, ``unused`` flight
+    without any.
+    """
 
     full: Examination
     choice: Choice
     final: Examination
     families: tuple[EffectColumns, ...]
     doubts: Mapping[str, Sequence[str]]
+    believed: int = 0
+    unused: tuple[Unused, ...] = ()
 
 
 class Judge:
@@ -84,8 +98,9 @@ class Judge:
         self.families, self.origin = list(evidence.families), origin
         self.choice, self.absent = evidence.choice, list(absent)
         self.full_point, self.doubts = evidence.full.point, evidence.doubts
+        self.believed, self.unused = evidence.believed, evidence.unused
         self.excluded = list(excluded)
-        self.told = calibrator.parameters.gps_delay_told
+        self.clock = fix_clock(calibrator.parameters, final.chunks)
         self.traces = final.traces
         self.epochs = Epochs.of(final.traces, final.all_portions, final.model.size)
         self.calibration: Calibration = calibrator.calibration_with(imu, final)
@@ -113,6 +128,7 @@ class Judge:
             self.engine.point,
             self.calibrator.parameters,
             self.imu,
+            self.clock,
         )
         # A name has one effect: what stands beside columns of its own is their consequence.
         named = {f.effect for f in self.families}
@@ -127,7 +143,7 @@ class Judge:
         effects += self.excluded
         insufficient = not self.engine.moving
         mismatch = self._mismatch(before, after, effects, ladder)
-        verdict, note = self._verdict(effects, insufficient=insufficient)
+        verdict, note = self._verdict(effects, mismatch, insufficient=insufficient)
         note = " ".join(x for x in (note, trim_in_words(self.calibrator.parameters)) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
@@ -146,16 +162,19 @@ class Judge:
             series=self._series(before.theta, after.theta),
             note=note,
             plain=plain_six(self.engine, self.families) if self.families else None,
+            unused=self.unused
+            if verdict is not Verdict.INSUFFICIENT
+            else _not_compared(self.unused),
         )
 
     def _held(self, names: Sequence[str]) -> Array:
         """Unknowns of ``names`` at the value that means *not in the model*."""
-        return without(names, self.index, self.engine.point, self.engine.absent, self.told)
+        told = self.clock.told_on_stamp
+        return without(names, self.index, self.engine.point, self.engine.absent, told)
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
         """Six numbers only, + timing, + constant attitude errors, + each effect."""
-        timing = ["gps_delay", "window_squared", "attitude_delay"]
-        constant = ["tilt_roll", "tilt_pitch", "heading"]
+        timing, constant = NOT_AT_FIRST[:3], NOT_AT_FIRST[3:]
         late, turned = ([self.index[n] for n in names] for names in (timing, constant))
         mine = self.engine.indices_of(self.families)
         free = [i for i in self.all if i not in (*late, *turned, *mine)]
@@ -228,7 +247,8 @@ class Judge:
         choice, full = self.choice, self.choice.fitter.model.index
         target = Candidate(name, tuple(full[c] for c in columns), ())
         rest = [i for i in choice.free if i not in target.index]
-        held = without(columns, full, self.full_point, choice.fitter.absent, self.told)
+        told = self.clock.told_on_stamp
+        held = without(columns, full, self.full_point, choice.fitter.absent, told)
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(rivals_of(choice.fitter, rest, target, others, held))
 
@@ -313,14 +333,14 @@ class Judge:
     def _mismatch(
         self, before: Fit, after: Fit, effects: Sequence[Effect], ladder: Sequence[Rung]
     ) -> Mismatch:
-        n = len(self.all)
         gain = self.fitter.gain(before, after)
+        added = len(NOT_AT_FIRST) + len(self.engine.indices_of(self.families))
         series = self._series(before.theta, after.theta)
         return Mismatch(
-            detected=bool(gain > n * np.log(max(self.fitter.rows, 2.0)) + MARGIN),
+            detected=bool(gain > added * self.fitter.log_rows + MARGIN),
             whitened_rms_before=self.fitter.rms(before),
             whitened_rms_after=self.fitter.rms(after),
-            p_value=float(np.exp(-0.5 * min(max(gain, 0.0), 1400.0))),
+            p_value=survival(max(gain, 0.0), added),
             velocity_rms_before=rms(series.before),
             velocity_rms_after=rms(series.after),
             held_out_before=self.fitter.held_rms(before),
@@ -328,6 +348,8 @@ class Judge:
             where=self._where(self._found(effects), before.theta, after.theta),
             held_out_velocity_before=ladder[0].held_out_velocity,
             held_out_velocity_after=ladder[-1].held_out_velocity,
+            fixes=int(np.any(np.isfinite(series.after), axis=1).sum()),
+            believed=self.believed,
         )
 
     def _series(self, before: Array, after: Array) -> Series:
@@ -338,10 +360,17 @@ class Judge:
         """Velocity residual, m/s, on portions that a fit of ``free`` has not seen."""
         return self.epochs.held_out_rms(self.fitter.held_fits(free, held))
 
-    def _verdict(self, effects: list[Effect], *, insufficient: bool) -> tuple[Verdict, str]:
+    def _verdict(
+        self, effects: list[Effect], mismatch: Mismatch, *, insufficient: bool
+    ) -> tuple[Verdict, str]:
         note = self.calibration.note
         if insufficient:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
+        if not mismatch.supported:
+            return Verdict.INSUFFICIENT, (
+                f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "
+                "flight, and of more than half that do not nothing tells which are false. " + note
+            )
         left = self.solution.inflation > CONTRADICTION
         if any(e.name == "empirical" for e in effects):
             named = [e for e in effects if e.name != "empirical"]
@@ -402,3 +431,8 @@ class Judge:
                     )
                 )
         return out
+
+
+def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:
+    """Of a flight that says nothing, an inertia that says nothing of the fixes either."""
+    return tuple(replace(u, contradicted=None) for u in unused)

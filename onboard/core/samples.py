@@ -56,7 +56,9 @@ class AttitudeSample:
 class GpsFix:
     """One report of a GPS receiver.  Repeats of a fix are passed on; the core drops them.
 
-    ``t_receiver`` is the receiver's own time of the epoch (s, any origin; DataFlash GMS),
+    ``t_receiver`` is the receiver's own time of the epoch (s, any origin; DataFlash GMS).
+    ``t_message`` (s, boot clock) is the time from which the autopilot counts the receiver's latency
+    where ``t`` is another one (DataFlash GPA.SMS); None: that is ``t``, or not known.
     ``v_d`` is None where the message has no vertical speed (GPS_RAW_INT).  ``speed_step``
     is the step (m/s) to which the horizontal speed was truncated, 0 if it was not.
     ``speed_accuracy`` is the receiver's own sigma of velocity; None or 0: unknown.
@@ -76,6 +78,7 @@ class GpsFix:
     hdop: float | None = None
     speed_accuracy: float | None = None
     speed_step: float = 0.0
+    t_message: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

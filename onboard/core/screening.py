@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.calibrator import Calibrator
+from onboard.core.coasting import FAULT_M_S, Contradiction, contradictions
 from onboard.core.engine import Chunk, Engine
 from onboard.core.examination import Examination
-from onboard.core.faults import FAULT_M_S, fault_effect
+from onboard.core.faults import fault_effect
 from onboard.core.findings import Effect
 from onboard.core.noise import NoiseLevels
 from onboard.core.passes import Pass
+from onboard.core.refusals import OPINIONS, refused
 from onboard.core.traces import EpochTrace
 from onboard.core.trust import Reason
 
@@ -30,8 +32,6 @@ MARGIN_S = 0.4
 SHORTEST_S = 4.0
 """Pieces of flight between two clipped ones that are worth an alignment."""
 FEWEST_REFUSED = 3
-CONTRADICTED = ("gps_glitch", "ekf_gps_glitch", "ekf_unhealthy")
-"""Reasons of distrust that are opinions of others about a receiver that says it is well."""
 OFF = 8.0
 """Times the receiver's noise, or the usual innovation: no fix of a receiver that is well."""
 FAR_OFF = 12.0
@@ -87,12 +87,40 @@ def false_fixes(
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
     """
-    glitches = sum(calibrator.trust.rejected.get(name, 0) for name in CONTRADICTED)
-    solution = full.found()
-    levels, least, jumped = _robust(full, solution.theta)
-    refused = max(full.refused["velocity"], like.refused["velocity"], glitches)
-    if refused < FEWEST_REFUSED and not jumped:
+    doubted = [r for r in refused(full.chunks, calibrator.trust.refusals) if r.reason in OPINIONS]
+    levels, least, jumped = _robust(full, full.found().theta)
+    rejected = max(full.refused["velocity"], like.refused["velocity"])
+    if rejected < FEWEST_REFUSED and not jumped and not doubted:
         return None, list(full.chunks)
+    contradicted = contradictions(full, levels, doubted)
+    fault = fault_effect(
+        _asked_again(full, levels, contradicted, again=bool(doubted)),
+        full.found().theta,
+        full.chunks,
+        t0,
+        least,
+        full.settings.coast_s,
+        _distrusted(calibrator, full, t0),
+        contradicted,
+    )
+    if fault is None:
+        return None, list(full.chunks)
+    out = []
+    for chunk in full.chunks:
+        t = full.point.true_time(chunk.fixes.t) - t0
+        bad = _inside(t, fault.intervals)
+        out.append(replace(chunk, trusted=chunk.trusted & ~bad))
+    return fault, out
+
+
+def _asked_again(
+    full: Examination, levels: NoiseLevels, known: Sequence[Contradiction], *, again: bool
+) -> list[EpochTrace]:
+    """Epochs of a pass whose gates judge every fix; ``again`` also those refused in flight.
+
+    Not those that are ``known`` to be false: a filter would take them for true in the end.
+    """
+    solution = full.found()
     made = Pass(
         full.model,
         full.point,
@@ -105,30 +133,20 @@ def false_fixes(
     traces: list[EpochTrace] = []
     for chunk in full.chunks:
         asked = chunk
-        if glitches:
-            # What the receiver's own contradictions have closed is asked again, of the inertia.
+        if again:
             heard = np.all(np.isfinite(chunk.fixes.v_n[:, :2]), axis=1)
-            asked = replace(chunk, trusted=heard)
+            t = full.point.true_time(chunk.fixes.t)
+            asked = replace(chunk, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
         traces.extend(Engine.through(full, made, asked).traces)
-    fault = fault_effect(
-        traces,
-        solution.theta,
-        full.chunks,
-        t0,
-        least,
-        full.settings.coast_s,
-        _distrusted(calibrator, full, t0),
-    )
-    if fault is None:
-        return None, list(full.chunks)
-    out = []
-    for chunk in full.chunks:
-        t = chunk.fixes.t - t0
-        bad = np.zeros(len(t), dtype=bool)
-        for a, b in fault.intervals:
-            bad |= (t >= a - 1e-3) & (t <= b + 1e-3)
-        out.append(replace(chunk, trusted=chunk.trusted & ~bad))
-    return fault, out
+    return traces
+
+
+def _inside(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """(n,) whether times are in one of the intervals."""
+    inside = np.zeros(len(t), dtype=bool)
+    for a, b in intervals:
+        inside |= (t >= a - 1e-3) & (t <= b + 1e-3)
+    return inside
 
 
 def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:

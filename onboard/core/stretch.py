@@ -20,12 +20,17 @@ NEAR_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
-    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed."""
+    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed.
+
+    ``late`` (n,): how much later they are stamped than the time from which the autopilot counts the
+    receiver's latency, s; empty where that is not known to differ.
+    """
 
     t: Array
     v_n: Array
     height: Array
     latitude: Array
+    late: Array = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -33,7 +38,9 @@ class Fixes:
     def between(self, start: int, stop: int) -> Fixes:
         """Epochs ``start:stop``."""
         cut = slice(start, stop)
-        return Fixes(self.t[cut], self.v_n[cut], self.height[cut], self.latitude[cut])
+        return Fixes(
+            self.t[cut], self.v_n[cut], self.height[cut], self.latitude[cut], self.late[cut]
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.findings import Quantity
+from onboard.core.gps_clock import FixClock
 from onboard.core.linearisation import Linearisation
 from onboard.core.parameters import ParametersInForce
 from onboard.core.physics.mount import attitude_advice
@@ -50,9 +51,10 @@ def standing_effects(
     point: Linearisation,
     parameters: ParametersInForce,
     imu: int,
+    clock: FixClock,
 ) -> Standing:
     """Timing and constant attitude errors that are large enough and sure enough to report."""
-    out = _timing(timing, parameters.gps_delay_told)
+    out = _timing(timing, clock)
     sigma = np.sqrt(np.diag(solution.covariance)).copy()
     for name, floor in EKF_FLOOR.items():
         sigma[index[name]] = np.hypot(sigma[index[name]], floor)
@@ -81,14 +83,14 @@ def standing_effects(
     return out
 
 
-def _timing(timing: Mapping[str, Estimate], told: float) -> Standing:
+def _timing(timing: Mapping[str, Estimate], clock: FixClock) -> Standing:
     out: Standing = {}
     delay = timing["gps_delay_s"]
-    if abs(delay.value - told) > LATENCY_S and abs(delay.value - told) > SURE * delay.sigma:
+    off = abs(delay.value - clock.told_on_stamp)
+    if off > LATENCY_S and off > SURE * delay.sigma:
         out["gps_latency"] = (
             {"delay": Quantity(delay.value, delay.sigma, "s")},
-            "tell the autopilot the receiver's latency",
-            {"GPS1_DELAY_MS": float(round(1e3 * delay.value))},
+            *_of_latency(delay.value, clock),
         )
     window = timing["gps_smoothing_window_s"]
     if window.value > WINDOW_S and window.value > SURE * window.sigma:
@@ -105,6 +107,23 @@ def _timing(timing: Mapping[str, Estimate], told: float) -> Standing:
             {},
         )
     return out
+
+
+def _of_latency(delay: float, clock: FixClock) -> tuple[str, dict[str, float]]:
+    """What to do about a latency against the recording's stamps, and the parameter to set."""
+    if clock.off(delay) < LATENCY_S:
+        taken = " or ".join(f"{1e3 * lag:.0f}" for lag in clock.assumed)
+        return f"none: {clock.name} is 0, for which this receiver's driver takes {taken} ms", {}
+    cure = "tell the autopilot the receiver's latency"
+    if not clock.told and clock.assumed:
+        taken = " or ".join(f"{1e3 * lag:.0f}" for lag in clock.assumed)
+        cure += f" (0 stands for {taken} ms, by its driver)"
+    if round(1e3 * clock.late):
+        cure += (
+            f"; the log stamps fixes {1e3 * clock.late:.0f} ms later than the time that the EKF "
+            "counts from"
+        )
+    return cure, {clock.name: clock.setting(delay)}
 
 
 def without(

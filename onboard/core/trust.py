@@ -15,8 +15,9 @@ what it has.  Time is that of the samples; there is no clock here.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -87,6 +88,8 @@ EKF_UNINITIALIZED: Final = 1 << 10
 EKF_GPS_GLITCHING: Final = 1 << 15
 
 _LATE_IN_A_ROW: Final = 5
+MOST_REFUSALS: Final = 512
+"""Spans that are remembered: a receiver that flaps for hours must not fill the memory."""
 GIVEN_UP_S: Final = 60.0
 """Another receiver's fixes, while there is none of the first: longer than a cold start differs."""
 
@@ -133,6 +136,15 @@ class WindowClosed:
 WindowEvent: TypeAlias = WindowOpened | WindowClosed
 
 
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Fixes in a row that were refused for one reason: the first and the last of them, s."""
+
+    start: float
+    end: float
+    reason: Reason
+
+
 class TrustWindow:
     """Fed with every sample in order of arrival; says whether the latest fix may be used.
 
@@ -159,6 +171,8 @@ class TrustWindow:
         self._late = 0
         self._trusted_s = 0.0
         self._rejected: dict[Reason, int] = {}
+        self._refusals: deque[Refusal] = deque(maxlen=MOST_REFUSALS)
+        self._in_a_row = False
 
     @property
     def phase(self) -> Phase:
@@ -196,6 +210,11 @@ class TrustWindow:
         return {
             reason.value: self._rejected[reason] for reason in Reason if reason in self._rejected
         }
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """When fixes were refused and why, the latest last; of this run."""
+        return tuple(self._refusals)
 
     def restore(self, trusted_s: float, rejected: Mapping[str, int]) -> None:
         """Continue the counts of an earlier run; unknown names are of another version: dropped."""
@@ -357,9 +376,11 @@ class TrustWindow:
         if self._held:
             reason = self.reasons[0]
             self._count(reason)
+            self._refuse(t, reason)
             events = self._close(t, reason)
             self._reason = reason
             return events
+        self._in_a_row = False
         if self.is_open:
             if last is not None:
                 self._trusted_s += t - last
@@ -413,6 +434,14 @@ class TrustWindow:
         if self._phase is not Phase.ENDED:
             self._phase, self._reason = Phase.ENDED, reason
         return events
+
+    def _refuse(self, t: float, reason: Reason) -> None:
+        last = self._refusals[-1] if self._refusals else None
+        if self._in_a_row and last is not None and last.reason is reason and t >= last.end:
+            self._refusals[-1] = replace(last, end=t)
+        else:
+            self._refusals.append(Refusal(t, t, reason))
+        self._in_a_row = True
 
     def _count(self, reason: Reason) -> None:
         self._rejected[reason] = self._rejected.get(reason, 0) + 1

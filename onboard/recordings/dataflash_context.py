@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 from onboard.recordings.dataflash_index import DataflashIndex, Format, Records
 
 Floats = NDArray[np.float64]
+Series = tuple[Floats, Floats]
+"""Times (n,) and values (n,)."""
 
 GPS_NAMES = ("GPS", "GPS2")
+LONGEST_WAIT_S = 1.0
+"""ArduPilot's correction of a message's time takes off half a second at the most (max_lag_ms in
+JitterCorrection.h): what is further off is damaged, or of a receiver that has just been found."""
 EKF2 = 2.0
 MOTOR_FUNCTIONS = frozenset((*range(33, 41), *range(82, 86), 70))
 """SERVOn_FUNCTION of motors 1 ... 12, and of a plane's throttle."""
@@ -23,15 +28,19 @@ CHANNELS = 14
 class Context:
     """What a converter must know of the rest of the log.
 
-    ``speed_accuracy`` has, per receiver, the times (n,) and values (n,) of the GPA records, which
-    follow the GPS record that they belong to; ``vertical_speed`` says per receiver whether it
+    Per receiver: ``speed_accuracy`` has the times (n,) and values (n,) of the GPA records, which
+    follow the GPS record that they belong to; ``message_time`` the like for the time from which the
+    EKF counts back (SMS, s); ``written_late`` is how much later records are written on the average,
+    s; ``vertical_speed`` says whether it
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
     widths at none and at full; ``first_time`` (s) is given to records without a time that
     stand before all others.
     """
 
-    speed_accuracy: Mapping[int, tuple[Floats, Floats]]
+    speed_accuracy: Mapping[int, Series]
+    message_time: Mapping[int, Series]
+    written_late: Mapping[int, float]
     vertical_speed: Mapping[int, bool]
     ekf_status_from: str
     motor_channels: tuple[str, ...]
@@ -42,8 +51,11 @@ class Context:
 def context_of(index: DataflashIndex, first_time: float) -> Context:
     """Look through the records that say it."""
     counts, parameters = index.counts(), _parameters(index)
+    message_time = {n: _plausible(x) for n, x in _beside_fixes(index, "SMS", 1e3).items()}
     return Context(
-        speed_accuracy=_speed_accuracy(index),
+        speed_accuracy=_beside_fixes(index, "SAcc", 1.0),
+        message_time=message_time,
+        written_late={n: float(np.mean(t - x)) for n, (t, x) in message_time.items() if len(t)},
         vertical_speed=_vertical_speed(index),
         ekf_status_from=_ekf_status(parameters, counts),
         motor_channels=() if counts.get("CTUN") else _motor_channels(parameters),
@@ -69,22 +81,30 @@ def _parameters(index: DataflashIndex) -> dict[str, float]:
     return values
 
 
-def _speed_accuracy(index: DataflashIndex) -> dict[int, tuple[Floats, Floats]]:
-    parts: dict[int, list[tuple[Floats, Floats]]] = {}
+def _beside_fixes(index: DataflashIndex, column: str, divisor: float) -> dict[int, Series]:
+    """A field of the GPA records by receiver; none of layouts that lack it."""
+    parts: dict[int, list[Series]] = {}
     for form, records in index.all_of("GPA"):
-        if not form.has("SAcc", "TimeUS"):
+        if not form.has(column, "TimeUS"):
             continue
         receivers = np.array(receiver_of(form, records))
-        t, sigma = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "SAcc")
+        t, x = form.numbers(records, "TimeUS") / 1e6, form.numbers(records, column) / divisor
         for receiver in np.unique(receivers).tolist():
             mine = receivers == receiver
-            parts.setdefault(receiver, []).append((t[mine], sigma[mine]))
+            parts.setdefault(receiver, []).append((t[mine], x[mine]))
     series = {}
     for receiver, pieces in parts.items():
-        t, sigma = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        t, x = (np.concatenate(values) for values in zip(*pieces, strict=True))
         order = np.argsort(t, kind="stable")
-        series[receiver] = t[order], sigma[order]
+        series[receiver] = t[order], x[order]
     return series
+
+
+def _plausible(series: Series) -> Series:
+    """Without times that cannot be of a message that was written then."""
+    t, message = series
+    near = np.abs(t - message) < LONGEST_WAIT_S
+    return t[near], message[near]
 
 
 def _vertical_speed(index: DataflashIndex) -> dict[int, bool]:

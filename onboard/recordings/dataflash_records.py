@@ -27,7 +27,13 @@ from onboard.core.samples import (
     VehicleState,
     Vibration,
 )
-from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, receiver_of
+from onboard.recordings.dataflash_context import (
+    GPS_NAMES,
+    Context,
+    Floats,
+    Series,
+    receiver_of,
+)
 from onboard.recordings.dataflash_index import Format, Records
 
 SECONDS_PER_WEEK = 604800.0
@@ -110,7 +116,11 @@ def attitude(batch: Batch, _context: Context) -> Converted:
 
 
 def gps(batch: Batch, context: Context) -> Converted:
-    """GPS, GPS2; the speed accuracy comes from GPA, the receiver's time from GMS and GWk."""
+    """GPS, GPS2; speed accuracy and the EKF's time are in GPA, the receiver's in GMS and GWk.
+
+    A record is stamped when it is written, and how long a fix waits for that changes in flight, by
+    tens of milliseconds: the stamp is that of the EKF's time and the log's mean wait.
+    """
     form, records = batch.form, batch.records
     speed = form.numbers(records, "Spd")
     course = np.radians(form.numbers(records, "GCrs"))
@@ -123,7 +133,10 @@ def gps(batch: Batch, context: Context) -> Converted:
     status, satellites = batch.integers("Status"), batch.integers("NSats", -1)
     fixes = []
     for k, receiver in enumerate(receiver_of(form, records)):
-        t = float(batch.t[k])
+        written = t = float(batch.t[k])
+        message = _of_same_fix(context.message_time.get(receiver), written)
+        if message is not None:
+            t = message + context.written_late[receiver]
         vertical = down is not None and context.vertical_speed.get(receiver, False)
         fixes.append(
             GpsFix(
@@ -139,18 +152,29 @@ def gps(batch: Batch, context: Context) -> Converted:
                 t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if week[k] else None,
                 satellites=satellites[k] if satellites[k] >= 0 else None,
                 hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
-                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), t),
+                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), written),
+                t_message=message,
             )
         )
     return fixes
 
 
-def _nearest(series: tuple[Floats, Floats] | None, t: float) -> float | None:
+def _nearest(series: Series | None, t: float) -> float | None:
     """The value of the record written with, or last before, the one of time ``t``."""
     if series is None:
         return None
     k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
     if k < 0 or t - series[0][k] > 2.0 or not series[1][k] > 0.0:
+        return None
+    return float(series[1][k])
+
+
+def _of_same_fix(series: Series | None, t: float) -> float | None:
+    """A time in the record that was written with the one of time ``t``; None if it is none."""
+    if series is None:
+        return None
+    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
+    if k < 0 or t - series[0][k] > SAME_FIX_S:
         return None
     return float(series[1][k])
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 import math
 import re
 
-import numpy as np
-
 from onboard.advice import Advice, cure_parameters
 from onboard.core.findings import Diagnosis, Effect, Verdict
 from onboard.push import physics
 from onboard.report.sizes import size_in_words
-from onboard.report.words import capital, effect_title, fixed, number, setting, signed
+from onboard.report.words import (
+    DISTRUST,
+    capital,
+    effect_title,
+    fixed,
+    number,
+    setting,
+    signed,
+)
 
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 """For terminals, by severity."""
@@ -20,8 +26,10 @@ EXCLUDED = ("gps_fault", "saturation")
 MOST_NAMED = 2
 NOISE = 1.3
 """Held-out residual, in units of the noise, up to which it may be called noise."""
-FEW = 0.5
+MOST_SPANS = 3
+WHERE_BELIEVED = " where GPS was believed"
 SAID_ABOVE = (
+    "Only",
     "Too little excitation",
     "What was found does not explain",
     "The residual is not noise",
@@ -35,7 +43,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         return "This flight cannot tell"
     if diagnosis.verdict is Verdict.CLEAN:
-        return "Nothing is missing"
+        return "Nothing is missing" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if e.name != "empirical"]
     if not named:
         return "Something is missing, and nothing known explains it"
@@ -58,6 +66,10 @@ def severity(diagnosis: Diagnosis) -> str:
 def missing(diagnosis: Diagnosis) -> list[str]:
     """What is missing, with sizes: one sentence for each effect."""
     if diagnosis.verdict is Verdict.INSUFFICIENT:
+        m = diagnosis.mismatch
+        if not m.supported:
+            fit = f"Only {m.fixes} of {m.believed} GPS fixes fit one model of this flight"
+            return [f"{fit}: of more than half that do not, nothing tells which are false."]
         return ["There is too little motion with trusted GPS to say what is missing."]
     said = [sized(e) + "." for e in diagnosis.effects]
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
@@ -68,7 +80,8 @@ def missing(diagnosis: Diagnosis) -> list[str]:
     if said:
         return said
     if diagnosis.verdict is Verdict.CLEAN:
-        return ["Scale, offset and timing explain this flight down to the noise."]
+        where = WHERE_BELIEVED if diagnosis.unused else ""
+        return [f"Scale, offset and timing explain this flight down to the noise{where}."]
     return ["The residual is not noise, but no effect of the catalogue fits it."]
 
 
@@ -92,7 +105,8 @@ def proof(diagnosis: Diagnosis) -> str:
     noise = m.held_out_after
     if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
         return "The residual could not be judged on data not used in the fit."
-    said = f"On flight not used in the fit, velocity is off by {number(after, 2)} m/s"
+    rests = f" ({m.fixes} of {m.believed} fixes)" if m.believed else ""
+    said = f"On flight not used in the fit{rests}, velocity is off by {number(after, 2)} m/s"
     if noise > NOISE:
         said += f", {noise:.1f} times what noise would leave"
     elif diagnosis.verdict in (Verdict.CLEAN, Verdict.EXPLAINED):
@@ -174,12 +188,26 @@ def to_fly(diagnosis: Diagnosis) -> list[str]:
 
 
 def remarks(diagnosis: Diagnosis) -> list[str]:
-    """What else there is to say: the other sentences of the note, and how little was usable."""
+    """What else there is to say: the other sentences of the note, and what was not used."""
     out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(SAID_ABOVE)]
-    fixes = len(diagnosis.series.t)
-    used = int(np.any(np.isfinite(diagnosis.series.after), axis=1).sum())
-    if fixes and used < FEW * fixes:
-        out.append(f"Only {used} of {fixes} GPS fixes could be used.")
+    return out + unused_in_words(diagnosis)
+
+
+def unused_in_words(diagnosis: Diagnosis) -> list[str]:
+    """Flight that was not used, one sentence for each reason: how long, when, why, what it was."""
+    out = []
+    for reason in dict.fromkeys(u.reason for u in diagnosis.unused):
+        mine = [u for u in diagnosis.unused if u.reason == reason]
+        whole = sum(u.end_s - u.start_s for u in mine)
+        when = [f"{u.start_s:.0f} to {u.end_s:.0f} s" for u in mine[:MOST_SPANS]]
+        more = f" and {len(mine) - len(when)} more times" if len(mine) > len(when) else ""
+        why = DISTRUST.get(reason, reason.replace("_", " "))
+        said = f"{whole:.0f} s of flight were not used ({', '.join(when)}{more}; {why})"
+        if any(u.contradicted for u in mine):
+            said += ": inertia contradicts GPS there"
+        elif any(u.contradicted is False for u in mine):
+            said += ": nothing there contradicts GPS"
+        out.append(f"{said}.")
     return out
 
 
