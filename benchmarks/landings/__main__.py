@@ -9,35 +9,14 @@ A seed that fails prints its history.
 from __future__ import annotations
 
 import argparse
-import asyncio
 import random
 import sys
-import tempfile
-from pathlib import Path
 
-from benchmarks.landings.boards import draw_boards
-from benchmarks.landings.chapters import Chapter, draw_chapter
-from benchmarks.landings.story import Story
+from benchmarks.landings.chapters import draw_chapter
+from benchmarks.landings.story import play
 from benchmarks.landings.table import table
-from sitl.virtual_time import VirtualTimeLoop
 
 BOARDS = 3
-
-
-def play(chapters: list[Chapter], *, seed: int, imus: int, telling: bool = True) -> Story:
-    """Play chapters from the beginning, in a fresh state directory."""
-
-    async def played(directory: Path) -> Story:
-        boards = draw_boards(random.Random(f"boards {seed}"), BOARDS, imus, telling=telling)  # noqa: S311 - chance
-        story = Story(boards, directory, seed=seed)
-        await story.play(chapters)
-        return story
-
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        asyncio.Runner(loop_factory=VirtualTimeLoop) as runner,
-    ):
-        return runner.run(played(Path(folder)))
 
 
 def main() -> int:
@@ -57,7 +36,7 @@ def main() -> int:
         f"tell {'their id' if telling else 'no id'}",
         flush=True,
     )
-    story = play(chapters, seed=chosen.seed, imus=imus, telling=telling)
+    story = play(chapters, seed=chosen.seed, boards=BOARDS, imus=imus, telling=telling)
     if story.checker.faults or chosen.history:
         print("\n".join(story.history.lines), end="\n\n")
     print(table(story))

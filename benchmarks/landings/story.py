@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import random
+import tempfile
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from benchmarks.landings.boards import Board
+from benchmarks.landings.boards import Board, draw_boards
 from benchmarks.landings.chapters import Chapter, Incident
 from benchmarks.landings.checker import Checker, in_force
 from benchmarks.landings.history import Approval, Flight, History
@@ -16,6 +17,7 @@ from benchmarks.landings.room import Room
 from onboard.errors import RefusedError
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.truth import Truth
+from sitl.virtual_time import VirtualTimeLoop
 
 FIRST_FIX_S = 30.0
 """Before the first flight: parameters are read, GPS becomes trusted."""
@@ -241,3 +243,29 @@ class Story:
     def _need(done: bool) -> None:  # noqa: FBT001 - what the simulator answered
         if not done:
             raise RuntimeError("the simulator refused")
+
+
+def play(
+    chapters: list[Chapter], *, seed: int, boards: int, imus: int, telling: bool = True
+) -> Story:
+    """Play chapters from the beginning, in a state directory of their own.
+
+    Args:
+        chapters: what happens.
+        seed: of all chance.
+        boards: how many there are of the model.
+        imus: accelerometers of the model.
+        telling: whether the boards tell their unique id.
+    """
+
+    async def played(directory: Path) -> Story:
+        rng = random.Random(f"boards {seed}")  # noqa: S311 - chance, no secret
+        story = Story(draw_boards(rng, boards, imus, telling=telling), directory, seed=seed)
+        await story.play(chapters)
+        return story
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        asyncio.Runner(loop_factory=VirtualTimeLoop) as runner,
+    ):
+        return runner.run(played(Path(folder)))
