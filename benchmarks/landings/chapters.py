@@ -27,8 +27,8 @@ class Chapter:
 
     ``meddle``: a ground station changes a parameter in the middle of a push; ``disturb``: in
     flight; ``crash_aloft``: the daemon crashes in flight; ``unseen``: it is off during the
-    flight; ``approve``: a person approves what waits after the landing; ``needs_approval``: what
-    the daemon is configured for at its next start.
+    flight; ``approve``: a person approves what waits, after incidents and after the landing;
+    ``needs_approval``: what the daemon is configured for at its next start.
     """
 
     incidents: tuple[Incident, ...] = ()

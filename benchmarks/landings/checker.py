@@ -30,8 +30,6 @@ SCALE_FLOOR, OFFSET_FLOOR = 5e-4, 5e-3
 UNHEARD_S = 1.5
 """A heartbeat a second tells of arming, and a change is announced when it is stored: what
 happened less than this ago the daemon cannot know."""
-NAMED_S = 30.0
-"""A landing is told from another one by its time; two are never closer than this."""
 
 
 @dataclass(slots=True)
@@ -144,7 +142,7 @@ class Checker:
     def _planned(self, at: float, entry: Mapping[str, Any]) -> None:
         plan, board = entry["plan"], self._history.board
         imu, purpose = plan["imu"], entry.get("purpose", "push")
-        push = Push(entry["transaction"], at, board, imu, purpose, _named(entry))
+        push = Push(entry["transaction"], at, board, imu, purpose, self._named(entry))
         self.pushes[push.transaction] = self._open = push
         told = plan["vehicle"].get("board", "")
         self._expect(1, not told or told == board.uid, f"the plan is for board {told}")
@@ -183,9 +181,19 @@ class Checker:
             return False, f"the push of IMU {imu} names no flight that supports it"
         if support["approved"]:
             return approved, f"the push of IMU {imu} is called approved, but nobody approved it"
-        known = any(abs(flight.landed - support["landed_at"]) < NAMED_S for flight in flights)
+        known = self._history.landed_at(support["landed_at"]) in flights
         right = support["board"] in {"", self._history.board.uid}
         return known and right, f"the flight that the push of IMU {imu} names does not support it"
+
+    def _named(self, entry: Mapping[str, Any]) -> str:
+        """What the journal says of the support of a push, in a word or two."""
+        support = entry.get("support")
+        if not support:
+            return "not named"
+        if support["approved"]:
+            return "approved"
+        flight = self._history.landed_at(support["landed_at"])
+        return "unknown flight" if flight is None else f"flight {flight.number}"
 
     def _true(self, plan: Mapping[str, Any]) -> None:
         """The numbers that it claims to know, against the board that is there.
@@ -227,16 +235,6 @@ class Checker:
     def _fault(self, rule: int, sentence: str) -> None:
         self.faults.append(f"({rule}) {sentence}")
         self._history.say(self._room.unix(), f"*** ({rule}) {sentence}")
-
-
-def _named(entry: Mapping[str, Any]) -> str:
-    """What the journal says of the support of a push, in a word or two."""
-    support = entry.get("support")
-    if not support:
-        return "not named"
-    if support["approved"]:
-        return "approved"
-    return f"flight {support['flight'][:8]}"
 
 
 def in_force(room: Room) -> dict[str, float]:

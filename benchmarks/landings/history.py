@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from benchmarks.landings.boards import Board
 from benchmarks.landings.room import EPOCH
 
+SAME_S = 30.0
+"""A landing is told from another one by its time; two are never closer than this."""
+
 
 @dataclass(slots=True, eq=False)
 class Flight:
@@ -47,8 +50,12 @@ class History:
     flights: list[Flight] = field(default_factory=list)
     approvals: list[Approval] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
+    live: bool = False
+    """Whether lines are printed as they come."""
     daemon_started: float = 0.0
     powered: float = 0.0
+    put_in: float = 0.0
+    """When the board that is there was put in."""
     foreign: dict[str, float] = field(default_factory=dict)
     """When somebody else gave a parameter the value that it has; what the daemon wrote is not
     in it."""
@@ -56,12 +63,23 @@ class History:
     def say(self, now: float, text: str) -> None:
         """A line for whoever has to understand a failure."""
         self.lines.append(f"{now - EPOCH:9.1f}  {text}")
+        if self.live:
+            print(self.lines[-1], flush=True)
 
     def set_by_other(self, now: float, changed: Iterable[str]) -> None:
         """Somebody else has changed these."""
         self.foreign |= dict.fromkeys(changed, now)
         if self.flights and not self.flights[-1].landed:
             self.flights[-1].disturbed = True
+
+    @property
+    def flown(self) -> bool:
+        """Whether the board that is there has flown since it was put in."""
+        return bool(self.flights) and self.flights[-1].took_off > self.put_in
+
+    def landed_at(self, at: float) -> Flight | None:
+        """The flight that landed then."""
+        return next((f for f in self.flights if abs(f.landed - at) < SAME_S), None)
 
     def since_start(self) -> list[Flight]:
         """Flights on this board that ended since daemon and autopilot last started."""

@@ -24,6 +24,8 @@ FIRST_FIX_S = 30.0
 LOOP_HZ = 50
 POLL_S = 1.0
 LONGEST_S = 600.0
+DECIDED_S = 10.0
+"""For what a person has allowed."""
 ARMED_S = 10.0
 NUDGE_SCALE, NUDGE_OFFSET = 0.008, 0.08
 """What a ground station changes: plainly more than any estimate is uncertain by."""
@@ -41,7 +43,9 @@ class Landed:
 class Story:
     """Plays chapters; ``seed`` decides all chance in it, ``boards[0]`` is in the vehicle first."""
 
-    def __init__(self, boards: tuple[Board, ...], directory: Path, *, seed: int) -> None:
+    def __init__(
+        self, boards: tuple[Board, ...], directory: Path, *, seed: int, live: bool = False
+    ) -> None:
         self.landings: list[Landed] = []
         self._boards = boards
         self._rng = random.Random(f"story {seed}")  # noqa: S311 - chance, no secret
@@ -51,7 +55,7 @@ class Story:
             "plane", truth, parameters=first.stored, loop_rate=LOOP_HZ, longest=LONGEST_S
         )
         self.room = Room(self.autopilot, directory, seed=seed)
-        self.history = History(first)
+        self.history = History(first, live=live)
         self.checker = Checker(self.room, self.history, directory / "journal.jsonl")
         self.room.observer = self.checker
         self._needs_approval = False
@@ -78,6 +82,9 @@ class Story:
             self._say(incident.value)
             await self._happen(incident)
             await self._wait(chapter.pause_s)
+            if chapter.approve:
+                await self._approve()
+                await self._wait(DECIDED_S)
         flight = await self._flight(chapter)
         landed = Landed(flight, chapter.incidents)
         self.landings.append(landed)
@@ -127,6 +134,7 @@ class Story:
         self._need(self.autopilot.swap_board(board.uid, board.imus, board.stored, off=off))
         self._say(f"board {old.name} is taken out, board {board.name} put in")
         self.history.board = board
+        self.history.put_in = self.room.unix()
         self._powered(off)
         self.history.foreign.clear()
         self.history.set_by_other(self.room.unix(), board.stored)
@@ -200,9 +208,9 @@ class Story:
                 landed.held_back.update(proposal.held_back.keys())
 
     async def _approve(self) -> None:
-        """A person approves what is shown for the board that has flown, if that waits for it."""
+        """A person approves what waits for it; not for a board that has not flown yet."""
         service, board = self.room.service, self.history.board
-        if service is None or not any(f.board is board for f in self.history.flights):
+        if service is None or not self.history.flown:
             return
         for proposal in service.snapshot().push.proposals:
             try:
@@ -246,7 +254,13 @@ class Story:
 
 
 def play(
-    chapters: list[Chapter], *, seed: int, boards: int, imus: int, telling: bool = True
+    chapters: list[Chapter],
+    *,
+    seed: int,
+    boards: int,
+    imus: int,
+    telling: bool = True,
+    live: bool = False,
 ) -> Story:
     """Play chapters from the beginning, in a state directory of their own.
 
@@ -256,11 +270,13 @@ def play(
         boards: how many there are of the model.
         imus: accelerometers of the model.
         telling: whether the boards tell their unique id.
+        live: print the history as it happens.
     """
 
     async def played(directory: Path) -> Story:
         rng = random.Random(f"boards {seed}")  # noqa: S311 - chance, no secret
-        story = Story(draw_boards(rng, boards, imus, telling=telling), directory, seed=seed)
+        model = draw_boards(rng, boards, imus, telling=telling)
+        story = Story(model, directory, seed=seed, live=live)
         await story.play(chapters)
         return story
 
