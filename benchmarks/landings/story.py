@@ -217,7 +217,7 @@ class Story:
                 await service.approve((proposal.imu,))
             except RefusedError:
                 continue
-            shown = {c.name: (c.before, c.wanted) for c in proposal.changes}
+            shown = {c.name: (c.before, c.after) for c in proposal.changes}
             now = self.room.unix()
             self.history.approvals.append(Approval(now, board, proposal.imu, shown))
             self._say(f"a person approves IMU {proposal.imu}")
