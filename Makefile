@@ -1,10 +1,10 @@
-# make setup | demo | test | check | bench | clean.   Needs Python 3.11+, pip and make.
+# make setup | demo | test | simulate | check | bench | clean.   Needs Python 3.11+, pip and make.
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: setup demo test check bench format clean
+.PHONY: setup demo test simulate check bench format clean
 
 setup: $(STAMP)
 
@@ -18,6 +18,9 @@ demo: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(ARGS)
+
+simulate: $(STAMP)
+	$(BIN)/python -m benchmarks.landings $(ARGS)
 
 check: $(STAMP)
 	$(BIN)/ruff check .

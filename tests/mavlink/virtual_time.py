@@ -1,33 +1,11 @@
-"""An event loop whose clock jumps to the next timer, for tests without real sockets or threads."""
+"""Coroutine tests on an event loop whose clock jumps to the next timer."""
 
 from __future__ import annotations
 
 import asyncio
 import functools
-import selectors
 
-
-class _Selector(selectors.DefaultSelector):
-    loop: VirtualTimeLoop
-
-    def select(self, timeout=None):
-        ready = super().select(0)
-        if not ready and timeout is None:
-            raise RuntimeError("nothing will ever happen any more")
-        if not ready and timeout > 0:
-            self.loop.now += timeout
-        return ready
-
-
-class VirtualTimeLoop(asyncio.SelectorEventLoop):
-    def __init__(self) -> None:
-        self.now = 0.0
-        selector = _Selector()
-        selector.loop = self
-        super().__init__(selector)
-
-    def time(self) -> float:
-        return self.now
+from sitl.virtual_time import VirtualTimeLoop
 
 
 def virtual_time(test):
