@@ -55,11 +55,11 @@ class JudgedFlight:
         return replace(self, current=False)
 
     def of_these_sensors(self, parameters: ParametersInForce) -> JudgedFlight | None:
-        """What of it is about accelerometers with the identifiers that are there; None: nothing."""
+        """Without what is about accelerometers with other identifiers; None: nothing is left."""
         there = {
             imu: judged
             for imu, judged in self.imus.items()
-            if parameters.device_id(imu) == judged.device_id
+            if parameters.device_id(imu) in (None, judged.device_id)
         }
         return replace(self, imus=there) if there else None
 

@@ -1,8 +1,7 @@
 """The learner: samples in, calibrations out; its sums survive the process.
 
 It lives on the worker's thread and is only called there; what it gives back is frozen.  It
-knows no link.  While a push waits for the flight that judges it, a second, fresh estimator
-learns from what is flown between arming and disarming.
+knows no link.
 
 **Gaps.**  While the service is off, or the autopilot reboots or is silent, somebody can change the
 board for another one or calibrate it on a bench.  After each gap :meth:`Learner.identify` is told
@@ -28,12 +27,13 @@ from onboard.core.calibrator import Advanced, Calibrator, FlightEnded, Restarted
 from onboard.core.findings import Verdict
 from onboard.core.parameters import ParametersInForce
 from onboard.core.result import Calibration, Six, Status
-from onboard.core.samples import ParameterValue, Sample, VehicleState
+from onboard.core.samples import ParameterValue, Sample
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
 from onboard.daemon.examiner import Examiner
 from onboard.daemon.flight import JudgedFlight, compared_now, decode, encode, in_force
 from onboard.daemon.heap import trim
+from onboard.daemon.proof import ProofFlight, answers
 from onboard.daemon.snapshot import TrustView
 from onboard.daemon.store import Store
 from onboard.daemon.view import trust_view
@@ -68,10 +68,10 @@ class News:
 class Learned:
     """Where the learner stands after a batch.
 
-    ``calibrations`` are of the last flight as it was judged, while flying of what was flown so
-    far; ``flown`` is the answer of the flight that has just ended, if a push waits for it;
-    ``flight`` the last one that was judged, ``diagnosing`` the accelerometers of one that is being
-    judged.
+    ``calibrations`` are of the last flight as it was judged, or of what was flown since then;
+    ``flown`` is the answer of the flight that has just ended, if a push waits for it; ``flight``
+    the one that was judged, None if none was or a new one is not judged yet; ``diagnosing`` the
+    accelerometers of one that is being judged.
     """
 
     calibrations: dict[int, Calibration]
@@ -108,12 +108,12 @@ class Learner:
         self._identity: Identity | None = None
         self._before_gap: dict[int, Six | None] = {}
         self._calibrator = Calibrator(settings)
-        self._judging: Calibrator | None = None
+        self._proof = ProofFlight(settings)
         self._flown: dict[int, Calibration] = {}
-        self._judging_armed = False
         self._examiner = Examiner(clock, wall_clock)
         self._flight: JudgedFlight | None = None
         self._in_air = False
+        self._unjudged = False
         self._windows = 0
         self._parameters: dict[str, ParameterValue] = {}
         self._answers: dict[int, Calibration] = {}
@@ -189,8 +189,8 @@ class Learner:
         self._examiner.begin_anew(calibrator)
         self._calibrated.clear()
         self._answers = {}
-        self._judging = None
-        self._in_air = False
+        self._proof.drop()
+        self._in_air = self._unjudged = False
         self._stale = self._urgent = True
 
     # What comes in
@@ -211,9 +211,10 @@ class Learner:
             for event in self._calibrator.feed(sample):
                 self._note(event)
             if judging:
-                self._fly(sample)
+                flown = self._proof.feed(sample, self._parameters.values())
+                self._flown = self._flown if flown is None else flown
         if not judging:
-            self._judging = None
+            self._proof.drop()
         self._of_these_sensors()
         learned = self._learned()
         if in_flight and self._in_air:
@@ -271,6 +272,7 @@ class Learner:
 
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what the diagnosis said; a flight that says nothing takes nothing away."""
+        self._unjudged = False
         silent = all(
             d.verdict == Verdict.INSUFFICIENT.value
             and d.calibration.status is not Status.CALIBRATED
@@ -292,11 +294,8 @@ class Learner:
     def _of_these_sensors(self) -> None:
         """A flight of before the restart is forgotten where other sensors say who they are."""
         flight = self._flight
-        if flight is None or flight.current:
-            return
-        parameters = self._calibrator.parameters
-        if all(parameters.device_id(imu) is not None for imu in flight.imus):
-            self._flight = flight.of_these_sensors(parameters)
+        if flight is not None and not flight.current:
+            self._flight = flight.of_these_sensors(self._calibrator.parameters)
 
     # What goes out
 
@@ -311,18 +310,18 @@ class Learner:
             counters={**self._counters, **self._examiner.counters},
             news=news,
             flown=flown,
-            flight=self._flight,
+            flight=None if self._unjudged else self._flight,
             diagnosing=self._examiner.waiting,
         )
 
     def _calibrations(self) -> dict[int, Calibration]:
-        """In flight the estimator's own answers, on the ground those of the flight as judged."""
+        """Of the flight as it was judged, or the estimator's own answers since then."""
         judged = {}
         for imu, found in (self._flight.diagnosed if self._flight else {}).items():
             now = in_force(self._calibrator.parameters, imu)
             if now is not None:
                 judged[imu] = compared_now(found.calibration, self._answers.get(imu), now)
-        both = judged | self._answers if self._in_air else self._answers | judged
+        both = judged | self._answers if self._unjudged else self._answers | judged
         return dict(sorted(both.items()))
 
     def _solve(self) -> None:
@@ -331,7 +330,7 @@ class Learner:
         if not self._stale or (began < self._next_solution and not self._urgent):
             return
         self._stale = self._urgent = False
-        self._answers = _answers(self._calibrator)
+        self._answers = answers(self._calibrator)
         self._next_solution = began + (self._clock() - began) / SOLVING_SHARE
         for imu, answer in self._answers.items():
             if answer.status is Status.CALIBRATED and imu not in self._calibrated:
@@ -343,21 +342,6 @@ class Learner:
 
     # How
 
-    def _fly(self, sample: Sample) -> None:
-        """Let the judging estimator have what is flown; its answer when the flight ends."""
-        if isinstance(sample, VehicleState) and sample.armed is not None:
-            if sample.armed and not self._judging_armed and self._judging is None:
-                self._judging = Calibrator(self._settings)
-                for parameter in self._parameters.values():
-                    self._judging.feed(parameter)
-            ended = self._judging_armed and not sample.armed
-            self._judging_armed = sample.armed
-            if ended and self._judging is not None:
-                self._judging.feed(sample)
-                self._flown = _answers(self._judging)
-        if self._judging is not None and (self._judging_armed or type(sample) is ParameterValue):
-            self._judging.feed(sample)
-
     def _note(self, event: object) -> None:
         self._stale = True
         match event:
@@ -368,6 +352,8 @@ class Learner:
                 why = reason.value.replace("_", " ")
                 self._tell("window_closed", f"GPS is not trusted: {why}")
             case Advanced():
+                # What was found of the flight before is not about this one.
+                self._unjudged |= not self._in_air
                 self._in_air = True
                 self._counters["event_Advanced"] += 1
             case _:
@@ -399,13 +385,3 @@ def _surely_another(before: Identity, there: Identity) -> bool:
     if before.system_id != there.system_id:
         return True
     return bool(before.board and there.board) and before.board != there.board
-
-
-def _answers(calibrator: Calibrator) -> dict[int, Calibration]:
-    answers = {}
-    for imu in calibrator.imus:
-        try:
-            answers[imu] = calibrator.calibration(imu)
-        except KeyError:  # heard, but not enough for any answer yet
-            continue
-    return answers

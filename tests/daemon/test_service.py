@@ -162,9 +162,10 @@ async def test_an_approval_in_spite_of_one_diagnosis_is_none_in_spite_of_the_nex
 
 async def test_what_nobody_has_diagnosed_is_not_written(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        convinced(service, WANTED)
-        service.learning._learner._examiner.diagnosed = {}
         vehicle.armed = True
+        await until(lambda: service.learning.identified)
+        convinced(service, WANTED)
+        service.learning._learner._flight = None
         await until(lambda: "not_diagnosed" in held_back(service))
         vehicle.armed = False
         await until(lambda: held_back(service).keys() == {"not_diagnosed"})
@@ -340,7 +341,7 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
             in_force_offset=tuple(in_force(vehicle)[3:]),
             held_out_before=9.0,
         )
-        monkeypatch.setattr("onboard.daemon.learner._answers", lambda _: {1: flown})
+        monkeypatch.setattr("onboard.daemon.proof.answers", lambda _: {1: flown})
         vehicle.armed, vehicle.landed = True, False
         await until(lambda: service.snapshot().link.armed)
         vehicle.armed, vehicle.landed = False, True
@@ -363,10 +364,11 @@ async def test_a_restart_goes_on_from_the_saved_sums(document, daemon, port):
 
 
 async def test_damaged_sums_are_told_and_not_used(document, daemon, port, tmp_path):
-    file = tmp_path / "state" / "sums-1.bin"
+    vehicle = Vehicle(port)
+    file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
     file.parent.mkdir()
     file.write_bytes(b"not sums")
-    async with daemon(document) as service, Vehicle(port):
+    async with daemon(document) as service, vehicle:
         await until(lambda: service.snapshot().counters.get("state_refused") == 1)
         assert any("set aside" in notice.text for notice in service.snapshot().notices)
 
@@ -480,8 +482,8 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
 
 async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
     document["estimator"] = {"save_every_s": 0.01}
-    async with daemon(document) as service, Vehicle(port):
-        file = tmp_path / "state" / "sums-1.bin"
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
         await until(file.exists)
         before = service.learning._learner._calibrator
         await service.reset(())

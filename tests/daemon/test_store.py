@@ -1,5 +1,6 @@
 """The sums on disk: whole or not at all."""
 
+import msgspec
 import pytest
 
 from onboard.daemon.store import Store
@@ -24,6 +25,24 @@ def test_vehicles_do_not_mix(tmp_path):
     saved(tmp_path, b"other", system=2)
     assert store.load(1).sums == SUMS
     assert store.load(3) is None
+
+
+def test_boards_of_one_vehicle_do_not_mix(tmp_path):
+    store = saved(tmp_path)
+    store.save(1, b"of a board", version="1", saved_at=1.0, board="0a0b")
+    assert store.load(1).sums == SUMS
+    assert store.load(1, "0a0b").sums == b"of a board"
+    assert store.load(1, "0c0d") is None
+    with pytest.raises(ValueError, match="no board's id"):
+        store.path(1, "../etc")
+
+
+def test_what_an_older_version_has_saved_is_set_aside(tmp_path):
+    store = saved(tmp_path)
+    old = msgspec.msgpack.decode(store.path(1).read_bytes()) | {"schema": 1}
+    store.path(1).write_bytes(msgspec.msgpack.encode(old))
+    with pytest.raises(StateError, match="of version 1"):
+        store.load(1)
 
 
 @pytest.mark.parametrize("keep", [0, 1, 100, 5000])
