@@ -83,6 +83,7 @@ def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagn
         t0=first,
         antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
         trim=calibrator.parameters.trim,
+        imu=imu,
     )
     rail = saturation_effect(flight, origin.t0, imu)
     chunks = flight

@@ -24,6 +24,7 @@ class Origin:
     temperature: float = 35.0
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    imu: int = 1
 
 
 class EffectColumns(Family):
