@@ -59,7 +59,7 @@ IF_LEVELLED = "if AHRS_TRIM is from levelling on the ground, it holds this tilt,
 
 
 class ForceTilt(Gain):
-    """Accelerometer turned against gyroscope and attitude: ``measured = true - tilt x ...``.
+    """Accelerometer turned against gyroscope and attitude: ``measured = true + tilt x true``.
 
     The unknowns are by how much the attitude is too large *for the accelerometer*: minus the angles
     by which it is turned itself.
