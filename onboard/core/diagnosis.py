@@ -90,6 +90,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         t0=first,
         antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
         trim=calibrator.parameters.trim,
+        imu=imu,
     )
     rail = saturation_effect(flight, origin.t0, imu)
     chunks = flight

@@ -134,6 +134,8 @@ def test_a_trim_of_another_size_is_the_boards_unless_it_was_levelled():
     assert "X 0.020, Y 0.020" in cure
     near = ForceTilt(Origin(0.0, trim=(0.03 + 0.5 * TRIM_RAD, 0.0, 0.0)))
     assert near.advice({"roll": -0.03, "pitch": 0.0})[1] == {"AHRS_TRIM_X": 0.0, "AHRS_TRIM_Y": 0.0}
+    second = ForceTilt(Origin(0.0, trim=(0.03, 0.0, 0.0), imu=2))  # not what was levelled with
+    assert second.advice({"roll": -0.03, "pitch": 0.0})[1] == {}
 
 
 def test_what_arducopter_levels_to_is_what_levelled_says():
@@ -159,7 +161,7 @@ def test_an_attitude_levelled_with_a_wrong_offset_wants_the_calibration_not_a_tr
     ("parameters", "imu", "words"),
     [
         (told(), 2, "another one's"),
-        (ParametersInForce(), 1, "none, if AHRS_TRIM is X -0.030, Y 0.000"),
+        (ParametersInForce(), 1, "nothing, if AHRS_TRIM is X -0.030, Y 0.000"),
         (told(AHRS_TRIM_X=0.02), 1, "X 0.050, Y 0.000 in all"),
     ],
     ids=["another board", "no parameters", "a trim already"],

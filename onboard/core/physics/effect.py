@@ -26,6 +26,7 @@ class Origin:
     temperature: float = REFERENCE_DEGC
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    imu: int = 1
 
 
 class EffectColumns(Family):

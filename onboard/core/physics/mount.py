@@ -59,7 +59,7 @@ IF_LEVELLED = "if AHRS_TRIM is from levelling on the ground, it holds this tilt,
 
 
 class ForceTilt(Gain):
-    """Accelerometer turned against gyroscope and attitude: ``measured = true - tilt x ...``.
+    """Accelerometer turned against gyroscope and attitude: ``measured = true + tilt x true``.
 
     The unknowns are by how much the attitude is too large *for the accelerometer*: minus the angles
     by which it is turned itself.
@@ -80,7 +80,8 @@ class ForceTilt(Gain):
     def __init__(self, origin: Origin) -> None:
         """Take the trim that is in force."""
         super().__init__(origin)
-        self._trim = np.array(origin.trim[:2])
+        # Levelling takes the first accelerometer's word: no trim is another one's tilt.
+        self._trim = np.array(origin.trim[:2] if origin.imu == 1 else (0.0, 0.0))
 
     def amount(self, f_b: Array) -> Array:
         """``f x e``: what one unit of each unknown takes off the force."""
@@ -115,7 +116,7 @@ def attitude_advice(extra: Array, six: Array, parameters: ParametersInForce, imu
     if imu != 1:
         return "mount the boards alike: the recorded attitude is that of another one's sensors", {}
     if "AHRS_TRIM_X" not in parameters.values:
-        return f"none, if AHRS_TRIM is {_pair(-extra)}: the recording does not have it", {}
+        return f"nothing, if AHRS_TRIM is {_pair(-extra)}: the recording does not have it", {}
     trim = np.array(parameters.trim[:2])
     if np.hypot(*trim) > TRIM_RAD:
         return f"if AHRS_TRIM holds the board's tilt alone, set {_pair(trim + extra)} in all", {}
