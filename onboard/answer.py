@@ -83,7 +83,7 @@ def judged(diagnosis: Diagnosis) -> Answer:
     """
     suspects = [e for e in diagnosis.effects if e.name not in IN_EVERY_MODEL]
     if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return Answer(_withdrawn(diagnosis, ""))
+        return Answer(_refused(diagnosis))
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(words_of(e) for e in suspects)
         missing = "the residual is not noise, and " + (
@@ -144,9 +144,18 @@ def diagnosed(given: Answer, document: Mapping[str, Any], *, resumed: bool = Fal
     )
 
 
+def _refused(diagnosis: Diagnosis) -> Diagnosis:
+    """A diagnosis that says nothing of the flight: nor do its numbers, for the same reason."""
+    c = diagnosis.calibration
+    if c.status is not Status.CALIBRATED:
+        return diagnosis
+    c = replace(c, status=Status.INSUFFICIENT, note=diagnosis.note or c.note)
+    return replace(diagnosis, calibration=c)
+
+
 def _withdrawn(diagnosis: Diagnosis, why: str) -> Diagnosis:
     """The diagnosis with a calibration that is not called one; ``why`` is noted with it."""
-    noted = _noted(diagnosis, f"{why}; see onboard explain" if why else "")
+    noted = _noted(diagnosis, f"{why}; see onboard explain")
     if noted.calibration.status is not Status.CALIBRATED:
         return noted
     return replace(noted, calibration=replace(noted.calibration, status=Status.INSUFFICIENT))
@@ -154,7 +163,7 @@ def _withdrawn(diagnosis: Diagnosis, why: str) -> Diagnosis:
 
 def _noted(diagnosis: Diagnosis, said: str) -> Diagnosis:
     c = diagnosis.calibration
-    note = f"{said}. {c.note}".rstrip() if said else c.note
+    note = f"{said}. {c.note}".rstrip()
     return replace(diagnosis, calibration=replace(c, note=note))
 
 

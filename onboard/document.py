@@ -262,7 +262,8 @@ def advice_document(advice: Advice | None, effects: Sequence[Effect] = ()) -> Ad
         held_back.setdefault(refusal.objection.value, refusal.sentence)
     return AdviceDocument(
         set=advice.to_set(effects),
-        held_back=held_back | dict(advice.against),
+        held_back=held_back
+        | {e.name: advice.against[e.name] for e in effects if e.name in advice.against},
         conditions=dict(advice.conditions),
     )
 

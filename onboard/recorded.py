@@ -24,6 +24,7 @@ from onboard.core.settings import EstimatorSettings
 
 PAUSE_S = 10.0
 """Between two recordings."""
+NO_FLIGHT = "no stretch of flight with trusted GPS and inertial data"
 KEEPING_ALL = EstimatorSettings(refine=False, buffer_s=math.inf)
 
 
@@ -93,15 +94,16 @@ class Recorded:
             found = examine(self.calibrator, imu)
             given = judged(found.diagnosis())
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
-            note = f"the flight could not be diagnosed ({error}). {plain.note}".rstrip()
-            return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note))
+            why = f"the flight could not be diagnosed ({error})"
+            note = f"{why}. {plain.note}".rstrip()
+            return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine)
         return given
 
 
-def unanswered(calibration: Calibration) -> Answer:
-    """The answer of a recording without a usable stretch of flight."""
+def unanswered(calibration: Calibration, why: str = NO_FLIGHT) -> Answer:
+    """The answer where there is no diagnosis: of a recording without a usable stretch of flight."""
     nan = float("nan")
     empty = np.zeros((0, 3))
     return Answer(
@@ -122,10 +124,12 @@ def unanswered(calibration: Calibration) -> Answer:
             ),
             effects=(),
             ambiguous=(),
-            not_testable=(NotTestable("everything", "no stretch of flight with trusted GPS"),),
+            not_testable=(NotTestable("everything", why),),
             ladder=(),
             regimes=(),
             series=Series(np.zeros(0), empty, empty, np.zeros(0, dtype=bool)),
-            note="no stretch of flight with trusted GPS and inertial data. " + calibration.note,
+            note=calibration.note
+            if calibration.note.startswith(why)
+            else f"{why}. {calibration.note}",
         )
     )

@@ -128,8 +128,10 @@ def test_a_residual_that_is_not_noise_forbids_it(verdict):
 
 
 def test_a_flight_that_says_too_little_is_never_calibrated():
-    found = judged(diagnosis(verdict=Verdict.INSUFFICIENT))
+    silent = dataclasses.replace(diagnosis(verdict=Verdict.INSUFFICIENT), note="half is false.")
+    found = judged(silent)
     assert found.calibration.status is Status.INSUFFICIENT
+    assert found.calibration.note == "half is false."
     assert found.missing == ""
 
 
