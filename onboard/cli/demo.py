@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Coroutine
@@ -114,7 +115,10 @@ def demo(
     logging.getLogger("onboard").addHandler(logging.NullHandler())
     out = Console(stderr=json_file == "-", highlight=False)
     options = Options(duration, port, speedup, seed, stays=sys.stdout.isatty() and not once)
-    outcome = asyncio.run(_demonstrate(options, out, json_file))
+    try:
+        outcome = asyncio.run(_demonstrate(options, out, json_file))
+    except asyncio.CancelledError:  # SIGTERM: the simulated autopilot has been ended, too
+        raise KeyboardInterrupt from None
     if outcome.shortcomings:
         raise DemoError("; ".join(outcome.shortcomings))
 
@@ -141,6 +145,9 @@ async def _demonstrate(options: Options, out: Console, json_file: str | None) ->
     from sitl.builtin.process import autopilot_process
     from sitl.builtin.truth import random_imus
 
+    task = asyncio.current_task()
+    if task is not None:
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     imus = random_imus(options.seed, 2)
     with Show(out) as show, tempfile.TemporaryDirectory(prefix="onboard-demo-") as folder:
         show.stage("starting a simulated ArduPilot copter, two accelerometers, clearly off")

@@ -30,6 +30,8 @@ NAMES: Final = (
 """All that a state may be called."""
 AFTER_LANDING: Final = frozenset({"armed", "disarmed_too_short", "in_air", "diagnosing"})
 """Reasons against a push that go away by themselves when the vehicle has landed."""
+WAITING: Final = frozenset({"approval", "unconfirmed"})
+"""Reasons that wait for a person who looks at the values."""
 BY_CHOICE: Final = frozenset({"policy_never", "advise_only", "not_selected"})
 """Reasons that somebody has configured: no fault, and nothing to wait for."""
 NOTHING_GAINED: Final = frozenset({"nothing_to_change", "no_improvement"})
@@ -138,8 +140,8 @@ def _proposed(
     if chosen and lasting.keys() <= BY_CHOICE | {"approval"}:
         why = "; ".join(chosen)
         return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
-    if lasting.keys() <= {"approval", "unconfirmed"}:
-        if not held.keys() <= {"approval", "unconfirmed"}:
+    if lasting.keys() <= WAITING:
+        if len(held) > len(lasting):
             then = "after the landing a person has to approve it"
             return _state("calibrated", "calibrated", f"{known}; {then}", GOOD, further)
         todo = "look at the values, then approve or reject them"

@@ -15,11 +15,15 @@ LATEST_SHOWN = 4
 """Pushes of one accelerometer besides its first, which is mostly the one that mattered."""
 
 
-def written_view(lines: Sequence[tuple[float, Entry]]) -> tuple[WrittenView, ...]:
+def written_view(
+    lines: Sequence[tuple[float, Entry]], system_id: int | None = None, board: str = ""
+) -> tuple[WrittenView, ...]:
     """Pushes that were completed, oldest first.
 
     Args:
         lines: the journal: Unix time and entry, oldest first.
+        system_id: of the vehicle that is there: of others nothing is shown; None: of all.
+        board: its unique id, empty if it tells none.
     """
     plans: dict[str, Planned] = {}
     verdicts: dict[str, Watched] = {}
@@ -27,7 +31,9 @@ def written_view(lines: Sequence[tuple[float, Entry]]) -> tuple[WrittenView, ...
     in_force: dict[int, str] = {}
     for at, entry in lines:
         match entry:
-            case Planned():
+            case Planned(plan=plan) if system_id is None or plan.vehicle.same_airframe(
+                system_id, board
+            ):
                 plans[entry.transaction] = entry
             case Watched():
                 verdicts[entry.transaction] = entry

@@ -26,6 +26,7 @@ SENTENCES = {
     "policy_never": "the push policy is 'never': values are proposed only",
     "refused": "a person rejected it; `onboard approve 1` lifts that",
     "failed_before": "the last try failed: the next one in 17 s",
+    "unheard_of": "the moon is full",
     "unconfirmed": "learned before the autopilot last started",
 }
 
@@ -67,7 +68,9 @@ def state(*held, approved=False, **circumstances):
         (("no_improvement", "sigma_too_large"), "held_back", "held back"),
         (("policy_never",), "calibrated", "calibrated, not written"),
         (("sigma_too_large", "armed"), "held_back", "held back"),
-        (("unconfirmed",), "held_back", "held back"),
+        (("unconfirmed",), "approval", "waits for your approval"),
+        (("unconfirmed", "approval"), "approval", "waits for your approval"),
+        (("unheard_of",), "held_back", "held back"),
     ],
 )
 def test_of_many_reasons_the_telling_one_decides(held, name, title):
@@ -82,8 +85,12 @@ def test_values_that_could_not_be_compared_are_not_called_up_to_date():
 
 
 def test_a_reason_that_nobody_here_has_heard_of_is_told_in_its_own_words():
-    said = state("unconfirmed")
-    assert said.sentence.endswith("not written: learned before the autopilot last started")
+    assert state("unheard_of").sentence.endswith("not written: the moon is full")
+
+
+def test_what_no_flight_has_confirmed_is_said_to_whoever_is_to_approve_it():
+    said = state("unconfirmed", "approval")
+    assert said.sentence.endswith("learned before the autopilot last started")
     assert "approve" in said.next
 
 

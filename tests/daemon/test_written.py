@@ -86,6 +86,16 @@ def test_what_is_in_force_is_what_a_roll_back_would_take_back(tmp_path, after, s
             assert view.in_force == (journal.last_completed(view.imu) is not None)
 
 
+def test_what_was_written_to_another_board_is_not_shown():
+    entries = list(
+        enumerate(pushed("a", propose(calibration(), parameters(), system_id=1, board="aa")))
+    )
+    assert len(written_view(entries, 1, "aa")) == 1
+    assert len(written_view(entries, 1)) == 1  # it does not tell which it is
+    assert written_view(entries, 1, "bb") == ()
+    assert written_view(entries, 2) == ()
+
+
 def test_the_first_push_survives_the_journals_cleaning(tmp_path):
     with Journal(tmp_path / "journal.jsonl", limit_bytes=20_000, keep=3) as journal:
         for i in range(30):
