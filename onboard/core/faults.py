@@ -88,10 +88,11 @@ def _with_contradicted(
     out = list(spells)
     for c in contradicted:
         start, end = c.start - t0, c.end - t0
-        beside = [s for s in out if s.start <= end + BESIDE_S and s.end >= start - BESIDE_S]
-        out = [s for s in out if s not in beside]
+        near = [s.start <= end + BESIDE_S and s.end >= start - BESIDE_S for s in out]
+        beside = [s for s, is_near in zip(out, near, strict=True) if is_near]
         start = min([start, *(s.start for s in beside)])
         end = max([end, *(s.end for s in beside)])
+        out = [s for s, is_near in zip(out, near, strict=True) if not is_near]
         out.append(_Spell(start, end, c.off, c.size, c.off, c.sigma))
     return sorted(out, key=lambda s: s.start)
 

@@ -37,8 +37,6 @@ MOVED_SIGMAS = 2.0
 """An approval is of the values shown: it lapses when an estimate moves by more than this."""
 PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
 """Reasons that a person lifts."""
-WAITING = frozenset({"approval", "unconfirmed"})
-"""Of these the ones that wait for a person and are no refusal."""
 DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
 """Reasons that a person lifts by saying so explicitly."""
 

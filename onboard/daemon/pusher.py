@@ -21,8 +21,9 @@ import msgspec
 from onboard.daemon.flight import JudgedFlight
 from onboard.daemon.learner import Learned
 from onboard.daemon.notices import Notices
-from onboard.daemon.proposals import WAITING, Proposals, named
+from onboard.daemon.proposals import Proposals, named
 from onboard.daemon.snapshot import PushView
+from onboard.daemon.state import WAITING
 from onboard.daemon.witness import Witness
 from onboard.daemon.written import written_view
 from onboard.errors import RefusedError, StateError

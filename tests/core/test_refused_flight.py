@@ -26,6 +26,11 @@ PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
 
 
+def complaining(health, begin, end):
+    bad = begin <= health.t <= end
+    return replace(health, flags=EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0))
+
+
 def flagged(seed, gps, complaint, *effects, duration=200.0):
     """Diagnosed with an EKF that complains of GPS from and to the times of ``complaint``, s."""
     spec = FlightSpec(
@@ -39,12 +44,7 @@ def flagged(seed, gps, complaint, *effects, duration=200.0):
     made, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):
-            if isinstance(sample, EkfHealth):
-                bad = complaint[0] <= sample.t <= complaint[1]
-                flags = EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0)
-                made.feed(replace(sample, flags=flags))
-            else:
-                made.feed(sample)
+            made.feed(complaining(sample, *complaint) if isinstance(sample, EkfHealth) else sample)
     made.finish()
     return diagnose(made, 1), made.first_sample
 
