@@ -184,12 +184,14 @@ class Story:
         await self._until_disarmed()
         flight.landed = self.room.unix()
         self._say(f"flight {flight.number} has landed")
+        while self.autopilot.flying:
+            await self._wait(POLL_S)
         if self.room.service is None:
             await self._start()
         return flight
 
     async def _until_disarmed(self) -> None:
-        while self.autopilot.flying or self.autopilot.armed:
+        while self.autopilot.armed:
             await self._wait(POLL_S)
 
     async def _stand(self, chapter: Chapter, landed: Landed) -> None:
