@@ -23,9 +23,11 @@ FIRST_FIX_S = 30.0
 """Before the first flight: parameters are read, GPS becomes trusted."""
 LOOP_HZ = 50
 POLL_S = 1.0
+QUICK_S = 0.05
+"""For who wants to hit the half second that a push writes in."""
 LONGEST_S = 600.0
 DECIDED_S = 10.0
-"""For what a person has allowed."""
+"""A person looks so often, and what was allowed has so long to happen."""
 ARMED_S = 10.0
 NUDGE_SCALE, NUDGE_OFFSET = 0.008, 0.08
 """What a ground station changes: plainly more than any estimate is uncertain by."""
@@ -182,26 +184,30 @@ class Story:
         await self._until_disarmed()
         flight.landed = self.room.unix()
         self._say(f"flight {flight.number} has landed")
+        while self.autopilot.flying:
+            await self._wait(POLL_S)
         if self.room.service is None:
             await self._start()
         return flight
 
     async def _until_disarmed(self) -> None:
-        while self.autopilot.flying or self.autopilot.armed:
+        while self.autopilot.armed:
             await self._wait(POLL_S)
 
     async def _stand(self, chapter: Chapter, landed: Landed) -> None:
         """After the landing: pushes, people, and other people."""
         end = self.room.clock() + chapter.stand_s
         meddle = chapter.meddle
+        looks = self.room.clock() + DECIDED_S
         while self.room.clock() < end:
-            await self._wait(0.05 if meddle else POLL_S)
+            await self._wait(QUICK_S if meddle else POLL_S)
             if meddle and self.checker.writing:
                 await self._wait(self._rng.uniform(0.0, 0.4))
                 self._say("a ground station meddles")
                 self._nudge()
                 meddle = False
-            if chapter.approve:
+            if chapter.approve and self.room.clock() >= looks:
+                looks += DECIDED_S
                 await self._approve()
         if self.room.service is not None:
             for proposal in self.room.service.snapshot().push.proposals:
