@@ -21,7 +21,7 @@ from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.effects import Vector3
 from sitl.builtin.impairment import Impairment
 from sitl.builtin.server import Server
-from sitl.builtin.truth import ImuTruth, Truth
+from sitl.builtin.truth import BOARD, ImuTruth, Truth
 from sitl.builtin.world import Vehicle
 from sitl.errors import SitlError
 
@@ -58,6 +58,9 @@ class Simulator(Protocol):
     async def parameter(self, name: str) -> float:
         """The value of a parameter."""
 
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Somebody else sets a parameter."""
+
 
 @contextlib.asynccontextmanager
 async def simulator(
@@ -69,6 +72,7 @@ async def simulator(
     imus: int = 1,
     impairment: Impairment | None = None,
     parameters: Mapping[str, float] | None = None,
+    board: str = BOARD,
 ) -> AsyncIterator[Simulator]:
     """Starts a simulator and stops it in the end.
 
@@ -80,13 +84,14 @@ async def simulator(
         imus: accelerometers of the built-in autopilot; ArduPilot SITL has two.
         impairment: of the built-in autopilot's links.
         parameters: what it is switched on with, beside its defaults.
+        board: unique id of the built-in autopilot; each of ArduPilot SITL has another one.
 
     Raises:
         NoBinaryError: no ArduPilot binary is to be found.
         SitlError: it does not start.
     """
     if kind == "builtin":
-        hardware = Truth(imus=(ImuTruth(),) * imus, seed=seed)
+        hardware = Truth(imus=(ImuTruth(),) * imus, seed=seed, board=board)
         autopilot = Autopilot(vehicle, hardware, parameters=parameters)
         server = Server(autopilot, speedup=speedup, impairment=impairment)
         port = await server.listen_udp()
@@ -175,6 +180,13 @@ class _Builtin:
     async def parameter(self, name: str) -> float:
         return self.autopilot.parameters[name]
 
+    async def set_parameter(self, name: str, value: float) -> None:
+        def change(autopilot: Autopilot) -> None:
+            for answer in autopilot.parameters.set(autopilot.now, name, value):
+                autopilot.say(answer)
+
+        await self._do(change)
+
     async def _do(self, action: Callable[[Autopilot], object]) -> None:
         done = asyncio.Event()
         loop = asyncio.get_running_loop()
@@ -218,3 +230,6 @@ class _Ardupilot:
 
     async def parameter(self, name: str) -> float:
         return await self._pilot.parameter(name)
+
+    async def set_parameter(self, name: str, value: float) -> None:
+        await self._pilot.set_parameter(name, value)
