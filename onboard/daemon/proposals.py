@@ -29,7 +29,7 @@ from onboard.daemon.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.physics import Diagnosed
 from onboard.push.plan import PushPlan, propose
-from onboard.push.policy import Accelerometer, PolicySettings, VehicleCondition, judge
+from onboard.push.policy import Accelerometer, Mode, PolicySettings, VehicleCondition, judge
 
 WAIT_AFTER_FAILURE_S = (30.0, 60.0, 120.0, 300.0)
 """Between a transaction that did not complete and the next for that accelerometer."""
@@ -176,7 +176,10 @@ class Proposals:
             written = self.standing(imu).written
             self._standing[imu] = Standing(self.current[imu].plan, despite, written=written)
         self.counters["approvals"] += len(waiting)
-        return f"{named(waiting)} approved: written as soon as policy and flight state allow"
+        when = "written as soon as policy and flight state allow"
+        if self.settings.mode is Mode.NEVER:
+            when = "not written, for the push policy is 'never'"
+        return f"{named(waiting)} approved: {when}"
 
     def reject(self, imus: Sequence[int]) -> str:
         """A person refuses, until it is approved or what was learned is reset.

@@ -278,7 +278,9 @@ class Pusher:
             last_outcome=None if self.last_outcome is None else _told(self.last_outcome),
             can_roll_back=tuple(i for i in range(1, 6) if self._last_completed(i)),
             judged=tuple(self._witness.judged.values()),
-            written=written_view(self._journal.entries, self._target[0] if self._target else None),
+            written=written_view(
+                self._journal.entries, self._target[0] if self._target else None, self._board
+            ),
         )
 
     # How
