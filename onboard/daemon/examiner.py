@@ -23,7 +23,8 @@ from onboard.answer import answer, diagnosed
 from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import since_reboot
 from onboard.core.findings import Diagnosis
-from onboard.core.result import Calibration, Status
+from onboard.core.parameters import ParametersInForce
+from onboard.core.result import Calibration, Six, Status
 from onboard.daemon.flight import Judged, JudgedFlight, in_force
 from onboard.explain_document import explain_document
 from onboard.push.conditioning import CHI_SQUARE_999
@@ -33,6 +34,7 @@ from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)
 
+IMUS = range(1, 6)
 IN_FLIGHT_SHARE = 0.02
 """Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later."""
 
@@ -44,6 +46,7 @@ class Frozen:
     flight: Calibrator
     support: Support
     waiting: list[int]
+    at_takeoff: dict[int, Six | None]
     imus: dict[int, Judged] = field(default_factory=dict)
 
 
@@ -63,7 +66,12 @@ class Examiner:
         self._wall_clock = wall_clock
         self._frozen: Frozen | None = None
         self._judged_s = 0.0
+        self._at_takeoff: dict[int, Six | None] = {}
         self._not_before = -np.inf
+
+    def took_off(self, parameters: ParametersInForce) -> None:
+        """A flight begins: these are the values that it is flown with, unless they are changed."""
+        self._at_takeoff = {imu: in_force(parameters, imu) for imu in IMUS}
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -104,12 +112,13 @@ class Examiner:
         trusted_s = flight.flown_s - self._judged_s
         support = Support(uuid.uuid4().hex, self._wall_clock(), self.board, trusted_s)
         frozen = flight.frozen()
-        self._frozen = Frozen(frozen, support, list(frozen.imus))
+        self._frozen = Frozen(frozen, support, list(frozen.imus), dict(self._at_takeoff))
 
     def _examine(self, frozen: Frozen, imu: int) -> None:
         flight = frozen.flight
         self.counters["diagnoses"] += 1
-        device_id, six = flight.parameters.device_id(imu), in_force(flight.parameters, imu)
+        device_id = flight.parameters.device_id(imu)
+        six = frozen.at_takeoff.get(imu) or in_force(flight.parameters, imu)
         if device_id is None or six is None:
             self.counters["diagnosis_of_unknown"] += 1
             return

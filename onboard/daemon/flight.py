@@ -23,7 +23,7 @@ from onboard.push.physics import Diagnosed
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One accelerometer of a flight: its identifier, the six in force at the end, the diagnosis.
+    """One accelerometer of a flight: its identifier, the six in force at take-off, the diagnosis.
 
     ``in_force`` are float32, in the order of ``parameter_names(imu).six``.
     """

@@ -30,7 +30,7 @@ from onboard.core.result import Calibration, Six, Status
 from onboard.core.samples import ParameterValue, Sample
 from onboard.core.settings import EstimatorSettings
 from onboard.core.trust import WindowClosed, WindowOpened
-from onboard.daemon.examiner import Examiner
+from onboard.daemon.examiner import IMUS, Examiner
 from onboard.daemon.flight import JudgedFlight, compared_now, decode, encode, in_force
 from onboard.daemon.heap import trim
 from onboard.daemon.proof import ProofFlight, answers
@@ -43,7 +43,6 @@ SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
 KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
 """Beginnings of the names that change what an estimator makes of the messages."""
-IMUS = range(1, 6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,8 +352,9 @@ class Learner:
                 self._tell("window_closed", f"GPS is not trusted: {why}")
             case Advanced():
                 # What was found of the flight before is not about this one.
-                self._unjudged |= not self._in_air
-                self._in_air = True
+                if not self._in_air:
+                    self._examiner.took_off(self._calibrator.parameters)
+                    self._in_air = self._unjudged = True
                 self._counters["event_Advanced"] += 1
             case _:
                 # A flight that ends with the power of the autopilot has ended, too.

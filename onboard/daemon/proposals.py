@@ -299,7 +299,7 @@ class Proposals:
             for c, old in zip(plan.changes, then, strict=True)
             if c.before != old
         ]
-        return f"somebody has changed {', '.join(changed)} since the flight"
+        return f"somebody has changed {', '.join(changed)} since the flight began"
 
     def _beyond_policy(self, imu: int, plan: PushPlan, now: float) -> dict[str, str]:
         standing = self.standing(imu)

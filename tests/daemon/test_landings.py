@@ -23,3 +23,11 @@ def test_nothing_is_written_that_no_flight_since_has_supported():
     assert story.checker.faults == [], "\n".join(story.history.lines)
     first, *_ = story.checker.pushes.values()
     assert (first.board.name, first.result) == ("A", "completed"), "what is flown is written"
+
+
+@pytest.mark.slow
+def test_what_somebody_sets_in_flight_is_not_overwritten_by_that_flight():
+    chapter = Chapter(flight_s=130.0, stand_s=45.0, disturb=True)
+    story = play([chapter], seed=3, boards=2, imus=1)
+    assert story.checker.faults == [], "\n".join(story.history.lines)
+    assert story.landings[0].held_back["unconfirmed"] == 1
