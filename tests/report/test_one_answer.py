@@ -40,6 +40,7 @@ def flight(request, tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_replay_explain_and_the_service_answer_alike(flight):
     """The second accelerometer, read with the first and without it."""
     recorded = Recorded()
@@ -60,6 +61,7 @@ def test_replay_explain_and_the_service_answer_alike(flight):
         assert np.max(np.abs(there - getattr(ours.calibration, name)) / sigma) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flight", ["jump"], indirect=True)
 def test_the_documents_say_the_same(flight, capsys):
     assert run(["replay", str(flight), "--imu", "1", "--json", "-"]) == 0
