@@ -130,12 +130,11 @@ class Learning:
         now = self._busy_since = self._clock()
         if self._before_gap is not None:
             await self._close_gap()
-        if not self._begun and not await self._begin(now):
-            self._busy_since = None
-            return
-        learned = await self._learn(self._next_batch())
-        self._taken = None
-        if learned.diagnosing and not self._closing:
+        if self._begun or await self._begin(now):
+            await self._learn(self._next_batch())
+            self._taken = None
+        # Also of a board that has gone: often the power goes right after the landing.
+        if self.learned is not None and self.learned.diagnosing and not self._closing:
             self._busy_since = self._clock()
             self._accept(await self._call(self._learner.examine))
             self._next_save = now  # the flight cannot be diagnosed again after a power cut
@@ -166,12 +165,12 @@ class Learning:
         self._begun = gaps == self.counters["gaps"]  # no other one while that was done
         return self._begun
 
-    async def _learn(self, samples: list[Sample]) -> Learned:
-        learned = await self._call(
-            self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+    async def _learn(self, samples: list[Sample]) -> None:
+        self._accept(
+            await self._call(
+                self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+            )
         )
-        self._accept(learned)
-        return learned
 
     def _next_batch(self) -> list[Sample]:
         samples, self._samples = self._samples, []

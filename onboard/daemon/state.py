@@ -34,7 +34,7 @@ WAITING: Final = frozenset({"approval", "unconfirmed"})
 """Reasons that wait for a person who looks at the values."""
 BY_CHOICE: Final = frozenset({"policy_never", "advise_only", "not_selected"})
 """Reasons that somebody has configured: no fault, and nothing to wait for."""
-NOTHING_GAINED: Final = frozenset({"nothing_to_change", "no_improvement"})
+NOTHING_GAINED: Final = frozenset({"nothing_to_change", "no_improvement", "not_calibrated"})
 """Reasons that leave nothing worth writing, and so nothing to approve."""
 STEADY: Final[Mapping[str, str]] = MappingProxyType(
     {"failed_before": "the last try to write it failed; it is tried again by itself"}

@@ -30,6 +30,7 @@ from onboard.push.entries import (
     Planned,
     Purpose,
     Refused,
+    Support,
     Undoing,
     Watched,
     Writing,
@@ -138,11 +139,11 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
     shown = []
     for at, entry in lines:
         match entry:
-            case Planned(transaction, plan, purpose):
+            case Planned(transaction, plan, purpose, support):
                 imus[transaction] = plan.imu
                 changed = sum(change.differs for change in plan.changes)
                 what = "push" if purpose is Purpose.PUSH else "roll-back"
-                text = f"{what} of {changed} values begins"
+                text = f"{what} of {changed} values begins{_resting_on(support)}"
             case Writing(name=name, before=before, value=value, undo=undo):
                 text = f"{name}: {before:.6g} -> {value:.6g}{' (undo)' if undo else ''}"
             case Undoing(sentence=sentence):
@@ -171,6 +172,14 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
             )
         )
     return tuple(shown)
+
+
+def _resting_on(support: Support | None) -> str:
+    """What a push rests on, in a few words."""
+    if support is None:
+        return ""
+    approved = ", approved by a person" if support.approved else ""
+    return f" after {support.trusted_s:.0f} s of flight{approved}"
 
 
 def diagnosis_in_words(verdict: str, effects: Sequence[str]) -> str:

@@ -26,6 +26,7 @@ from onboard.push.policy import PolicySettings
         (["approval", "nothing_to_change"], False),
         (["refused", "nothing_to_change"], False),
         (["approval", "no_improvement"], False),
+        (["physics_missing", "not_calibrated"], False),
         (["sigma_too_large"], False),
     ],
 )

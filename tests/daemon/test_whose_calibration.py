@@ -202,3 +202,22 @@ async def test_a_push_of_another_board_is_neither_audited_nor_rolled_back_on_thi
         await settled(service)
         assert vehicle.sets == []
         assert service.snapshot().push.can_roll_back == ()
+
+
+async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
+    document, daemon, port, monkeypatch
+):
+    """What was found is kept for the next start; it is not written then without more."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await settled(service, 1)
+        examined = []
+        learner = service.learning._learner
+        monkeypatch.setattr(type(learner._examiner), "waiting", (1,))
+        monkeypatch.setattr(
+            learner, "examine", lambda: examined.append(1) or learner.learn((), judging=False)
+        )
+        vehicle.stop_talking()
+        await until(lambda: service.snapshot().link.state == "silent")
+        examined.clear()
+        await until(lambda: examined)
+        assert not service.learning.identified
