@@ -50,6 +50,11 @@ class Recorded:
         return self.calibrator.imus
 
     @property
+    def standing_s(self) -> float:
+        """Time on the ground, which teaches nothing, s."""
+        return self.calibrator.standing_s
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The autopilot's parameters as they were reported last, by name."""
         return self.calibrator.parameters.values

@@ -44,6 +44,10 @@ class Reader(Protocol):
     def finish(self) -> object:
         """Process what is pending: there are no more recordings."""
 
+    @property
+    def standing_s(self) -> float:
+        """Time on the ground, which teaches nothing, s."""
+
 
 class Estimator(Reader, Protocol):
     """What replay needs of :class:`onboard.recorded.Recorded`."""
@@ -201,6 +205,7 @@ def read(
             if progress is not None and fed % PROGRESS_EVERY == 0:
                 progress(min(1.0, fed / total))
     reader.finish()
+    vehicle.standing_s = reader.standing_s
     if progress is not None:
         progress(1.0)
     if imu is not None and imu not in vehicle.imus:
@@ -234,6 +239,8 @@ class Vehicle:
 
     def __init__(self) -> None:
         self.counts: dict[str, int] = {}
+        self.standing_s = 0.0
+        """Time on the ground, s."""
         self._parameters: dict[str, float] = {}
         self._device: dict[int, tuple[np.float32, Recording]] = {}
 
@@ -270,10 +277,13 @@ class Vehicle:
 
     def silence(self, imu: int) -> str:
         """Why an accelerometer has no answer."""
-        return (
-            f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples, never at 10 a second or "
-            "more together with attitude and trusted GPS"
-        )
+        samples = f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples"
+        if self.standing_s > 0.0:
+            return (
+                f"{samples}, none of them in the air with trusted GPS: {self.standing_s:.0f} s of "
+                "standing teach nothing"
+            )
+        return f"{samples}, never at 10 a second or more together with attitude and trusted GPS"
 
     def unanswered(self, imu: int) -> Calibration:
         """What to say of an accelerometer of which the estimator could make nothing."""
@@ -302,10 +312,13 @@ class Vehicle:
             held_out_after=unknown,
             velocity_rms_before=unknown,
             velocity_rms_after=unknown,
-            coverage=Coverage(
-                0.0, (0.0,) * 6, "", "record it at 25 Hz or more, with attitude and GPS"
-            ),
+            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do()),
         )
+
+    def _to_do(self) -> str:
+        if self.standing_s > 0.0:
+            return "fly: fast, with hard braking and turns both ways"
+        return "record it at 25 Hz or more, with attitude and GPS"
 
     def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
         x, y, z = (self._parameters.get(name, default) for name in names)

@@ -49,6 +49,8 @@ class Assembly:
         self._fresh: dict[int, float] = {}
         self._gyro: dict[int, int] = {}
         self._R_bs: tuple[float, Array | None] = (0.0, None)
+        self.standing_s = 0.0
+        """Time between fixes on the ground: nothing of it is handed out."""
 
     def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
         """Take an inertial sample, raw by the parameters in force now."""
@@ -147,6 +149,7 @@ class Assembly:
         out: dict[int, list[Chunk]] = {}
         if grounded or (grounded is None and self._still(live, even)):
             self._fresh.clear()  # what flies after it begins anew
+            self.standing_s += float(t[-1] - t[0])
         else:
             for imu in live:
                 chunks = self._cut(imu, live, even, trusted, parameters)

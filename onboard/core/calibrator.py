@@ -119,6 +119,11 @@ class Calibrator:
         return self._first
 
     @property
+    def standing_s(self) -> float:
+        """Time on the ground, which teaches nothing, s."""
+        return self._assembly.standing_s
+
+    @property
     def trust(self) -> TrustWindow:
         """The trust window."""
         return self._trust

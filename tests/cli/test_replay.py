@@ -23,6 +23,7 @@ class Listener:
     def __init__(self) -> None:
         self.samples: list = []
         self.finished: list[int] = []
+        self.standing_s = 0.0
         self.restarted: list[int] = []
 
     def feed(self, sample: object) -> None:

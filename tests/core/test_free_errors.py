@@ -22,7 +22,7 @@ HORIZON_S = 10.0
 @pytest.fixture(scope="module")
 def flight():
     """Chain of integrals, states, and the six (scale, beta) in force and estimated."""
-    spec = FlightSpec(vehicle="copter", duration=70.0, imus=(TRUE,), seed=4)
+    spec = FlightSpec(vehicle="copter", duration=85.0, imus=(TRUE,), seed=4)
     parser, decoder = mav.MAVLink(None), Decoder(system=1, component=1)
     calibrator = Calibrator()
     for _, frame in recording.fly(spec):
