@@ -80,6 +80,8 @@ class Proposals:
         self.forbidden = ""
         self.current: dict[int, Proposal] = {}
         self.counters: Counter[str] = Counter()
+        self.writing: int | None = None
+        """Accelerometer of the transaction under way: its values change by our own doing."""
         self._imus = imus
         self._standing: dict[int, Standing] = {}
         self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
@@ -284,8 +286,8 @@ class Proposals:
     def _unconfirmed(self, imu: int, plan: PushPlan) -> str:
         """Why it takes another flight, or a person, to believe that this is of what is there."""
         flight = self._flight
-        if flight is None or imu not in flight.imus:
-            return ""  # not diagnosed: that is said
+        if flight is None or imu not in flight.imus or imu == self.writing:
+            return ""  # not diagnosed, which is said, or in our own hands
         if not flight.current:
             return (
                 "it was learned before the service or the autopilot last started, and no flight "

@@ -391,6 +391,7 @@ class Pusher:
 
     def _run(self, transaction: PushTransaction, now: float) -> None:
         self._transaction = transaction
+        self._proposals.writing = transaction.plan.imu
         self.idle.clear()
         self._act(transaction.start(now), now)
 
@@ -427,7 +428,7 @@ class Pusher:
         return JournalWritten()
 
     def _finished(self, outcome: Outcome, now: float) -> None:
-        self._transaction = None
+        self._transaction = self._proposals.writing = None
         self.idle.set()
         self.last_outcome = outcome
         self.counters[f"outcome_{outcome.result.value}"] += 1
