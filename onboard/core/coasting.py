@@ -187,14 +187,19 @@ def _between_steps(
     """Errors that come and go within a second, as the inertia cannot.
 
     How far the inertia has drifted by then does not matter: the error is what the velocity jumps
-    by.  Counted from the flight before, or, if that leaves an error where GPS is right again, back
-    from there: then it has crept in.
+    by.  Counted from the flight before, or, where it has crept in before the first step, back from
+    where GPS is right again.
     """
     t, y = flown
     steps, sigma = _steps(t, y, levels)
     error = np.cumsum([np.zeros(2), *(step for _, step in steps)], axis=0)
     if steps and anchored and not _small(error[-1], sigma * np.sqrt(len(steps))):
-        error -= error[-1]
+        n, first = _of_a_second(t), steps[0][0]
+        if not _small(y[first - n : first].mean(axis=0) - y[:n].mean(axis=0), sigma):
+            error -= error[-1]
+        elif len(steps) > 1:  # what is left over is what the inertia has drifted meanwhile
+            at = t[[first, *(k for k, _ in steps)]]
+            error -= ((at - at[0]) / (at[-1] - at[0]))[:, None] * error[-1]
     edges = [0, *(k for k, _ in steps), len(t)]
     out = []
     for k, (i, j) in enumerate(pairwise(edges)):
@@ -215,7 +220,7 @@ def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Arr
 
     What goes on growing the second before or after is no jump: that is an inertia that is lost.
     """
-    n = max(round(MEAN_S / float(np.median(np.diff(t)))), 1) if len(t) > 1 else 1
+    n = _of_a_second(t)
     variance = (
         2.0 * levels.velocity**2 / n
         + 2.0 * levels.velocity_colour**2 * (1.0 - np.exp(-MEAN_S / COLOUR_TIME_S))
@@ -236,6 +241,11 @@ def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Arr
         if beside < 0.5 * size[k]:
             out.append((k, jump[k]))
     return sorted(out, key=lambda step: step[0]), sigma
+
+
+def _of_a_second(t: Array) -> int:
+    """How many of the fixes at ``t`` make up :data:`MEAN_S`."""
+    return max(round(MEAN_S / float(np.median(np.diff(t)))), 1) if len(t) > 1 else 1
 
 
 def _runs(t: Sequence[float], y: Array, S: Array, white: float) -> Iterator[Contradiction]:

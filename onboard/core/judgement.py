@@ -141,7 +141,8 @@ class Judge:
         ]
         effects += [self._effect(f) for f in self.families]
         effects += self.excluded
-        insufficient = not self.engine.moving
+        # What was clipped is left out of the fit, and was flown all the same.
+        insufficient = not (self.engine.moving or self.calibrator.engine(self.imu).moving)
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, mismatch, insufficient=insufficient)
         note = " ".join(x for x in (note, trim_in_words(self.calibrator.parameters)) if x)

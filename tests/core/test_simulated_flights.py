@@ -242,7 +242,7 @@ def test_a_reboot_in_flight_keeps_what_was_learnt(copter):
     assert [e.reason for e in events if isinstance(e, Restarted)] == ["reboot"]
     got = made.calibration(1)
     assert_true(got)
-    assert got.trusted_s > 120.0
+    assert got.trusted_s > calibrated(copter).trusted_s - 15.0
     assert got.rejected["reboots"] == 1
 
 

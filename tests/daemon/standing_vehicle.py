@@ -35,7 +35,7 @@ class Vehicle(asyncio.DatagramProtocol):
         self.parameters = ardupilot_parameters() if parameters is None else parameters
         self.armed = False
         self.landed = True
-        self.board = "0a0b0c"
+        self.board = "0a0b0c" + 30 * "0"
         self.boot_ms = 60_000.0
         self.sets = []
         self.heard = []

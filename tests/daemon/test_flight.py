@@ -17,6 +17,11 @@ def in_a_hurry(document, tmp_path):
     return document
 
 
+def held_back(service):
+    proposals = service.snapshot().push.proposals
+    return proposals[0].held_back if proposals else {}
+
+
 async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemon, port, tmp_path):
     async with daemon(in_a_hurry) as service, flying(port) as (autopilot, _, station_port):
         # A list of parameters is read in real time, however fast the rest is.
@@ -36,6 +41,10 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         assert np.array_equal(six(autopilot), before), "nothing may be written in flight"
         # On the ground there is nothing to hurry for, and much to learn from what was flown.
         autopilot.parameters.load({"SIM_SPEEDUP": 1.0})
+        await until(lambda: "unconfirmed" in held_back(service), limit=400.0)
+        why = held_back(service)["unconfirmed"]
+        assert "INS_ACCOFFS_X" in why, "what somebody has set is not overwritten unasked"
+        await service.approve((1,))
         await until(lambda: service.snapshot().push.can_roll_back == (1,), limit=400.0)
         assert service.snapshot().diagnosis["verdict"] in {"clean", "explained"}
         await until(lambda: service.learning._busy_since is None, limit=400.0)
