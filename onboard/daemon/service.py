@@ -49,7 +49,6 @@ from onboard.mavlink.autopilot import (
     LinkEvent,
 )
 from onboard.mavlink.board import Board
-from onboard.mavlink.connection import ConnectionState
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.link import Link
@@ -104,7 +103,6 @@ class Service:
         self._stopping = asyncio.Event()
         self._learner_task: asyncio.Task[None] | None = None
         self._observed = Observed()
-        self._up: set[str] = set()
         self._silence, self._reboots = Outage(), Outage()
         self.notices = Notices(wall_clock)
         link = configuration.link
@@ -361,9 +359,6 @@ class Service:
                 post("connection_lost", text, warning=True)
             case ConnectionRestored(endpoint, over):
                 post("connection_back", f"{endpoint}: back after {over}")
-            case ConnectionChanged(endpoint, ConnectionState.UP) if str(endpoint) not in self._up:
-                self._up.add(str(endpoint))
-                logger.info("%s: up", endpoint)
             case ConnectionChanged(endpoint, state, reason):
                 logger.debug("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
         self._pusher.on_event(now, event)

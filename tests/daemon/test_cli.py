@@ -41,7 +41,7 @@ def start(*arguments):
 def test_run_serves_until_a_signal(config, number, status):
     process = start("run", "--config", config)
     for line in process.stderr:
-        if ": up" in line:
+        if "status and control at" in line:
             break
     process.send_signal(number)
     _, rest = process.communicate(timeout=60)
