@@ -116,7 +116,10 @@ def moved_most(diagnosis: Diagnosis) -> tuple[str, float, float] | None:
     if plain is None:
         return None
     by = np.array(fuller.scale + fuller.offset) - np.array(plain.value)
-    sigmas = np.where(plain.observable, np.abs(by) / np.array(plain.sigma), 0.0)
+    # The smaller claim: without what was found the portions may contradict each other, which
+    # widens that sigma; with it the columns share what the flight tells.
+    claimed = np.minimum(plain.sigma, fuller.scale_sigma + fuller.offset_sigma)
+    sigmas = np.where(fuller.observable, np.abs(by) / claimed, 0.0)
     worst = int(np.argmax(sigmas))
     # What is no number is not within its claim.
     if sigmas[worst] <= MOVED_SIGMAS:

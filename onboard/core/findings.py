@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.result import Calibration, Estimate, Six, SixFlags
+from onboard.core.result import Calibration, Estimate, Six
 
 Array = NDArray[np.float64]
 
@@ -218,13 +218,12 @@ class RegimeResidual:
 class Plain:
     """What the same sums say of the six without the effects that were found.
 
-    ``value`` and ``sigma`` are scale and offset in the order of SIX_NAMES; ``observable`` as in a
-    calibration.  Timing and constant attitude errors are in it: they are in every model.
+    ``value`` and ``sigma`` are scale and offset in the order of SIX_NAMES.  Timing and constant
+    attitude errors are in it: they are in every model.
     """
 
     value: Six
     sigma: Six
-    observable: SixFlags
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,9 @@ import numpy as np
 from onboard.core.engine import calibration_model
 from onboard.core.examination import Examination
 from onboard.core.findings import Plain
-from onboard.core.observability import assess
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.portions import Portion
-from onboard.core.report import six_covariance, six_information
+from onboard.core.report import six_covariance
 from onboard.core.solution import solve
 
 
@@ -49,9 +48,7 @@ def plain_six(final: Examination, families: Sequence[EffectColumns]) -> Plain:
     scale, beta = solution.theta[:3], solution.theta[3:6]
     value = np.concatenate([scale, -beta / scale])
     sigma = np.sqrt(np.diag(six_covariance(solution)))
-    seen = assess(six_information(solution), final.settings.needs)
     return Plain(
         tuple(float(x) for x in value),  # type: ignore[arg-type] # six by construction
         tuple(float(x) for x in sigma),  # type: ignore[arg-type] # six by construction
-        seen.observed,
     )

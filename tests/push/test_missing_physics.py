@@ -30,11 +30,11 @@ def effect(name, parameters=None, **unknowns):
 FOUND = calibration()
 
 
-def plain(sigmas=0.0, number=0, observable=(True,) * 6):
+def plain(sigmas=0.0, number=0):
     """The six without the effects: one scale is so many of its claimed sigmas lower."""
     value = list(FOUND.scale + FOUND.offset)
     value[number] -= sigmas * SIGMAS[number]
-    return Plain(tuple(value), SIGMAS, observable)
+    return Plain(tuple(value), SIGMAS)
 
 
 def diagnosis(*effects, without=None, verdict=None, **changes):
@@ -85,8 +85,8 @@ def test_an_effect_within_the_claim_forbids_nothing(sigmas, found):
 
 
 def test_a_number_that_the_flight_does_not_show_cannot_be_moved():
-    hidden = plain(50.0, observable=(False, True, True, True, True, True))
-    assert judged(diagnosis(ARM, without=hidden)).missing == ""
+    shown = (False, True, True, True, True, True)
+    assert judged(diagnosis(ARM, without=plain(50.0), observable=shown)).missing == ""
 
 
 def test_what_every_model_has_forbids_nothing():
