@@ -201,7 +201,7 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         if service.server is not None:
             show.stage(f"status page: {service.server.url}")
         show.stage("the service reads the parameters and asks for its message rates")
-        await _until(lambda: bool(service.snapshot().imus), "the first samples", PATIENCE_S)
+        await _until(lambda: service.snapshot().trust.open, "GPS to be trusted", PATIENCE_S)
         show.stage(f"first flight: {options.duration:.0f} s of random manoeuvres")
         await _flight(station, options.duration, options.speedup)
         show.stage("landed; the service writes when it has been disarmed for 5 s")

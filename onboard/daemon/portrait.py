@@ -15,8 +15,8 @@ from onboard.daemon.outlets import Outlets
 from onboard.daemon.parameters import ParameterWatch
 from onboard.daemon.proposals import Proposals
 from onboard.daemon.pusher import Pusher
-from onboard.daemon.snapshot import ImuView, PushView, Snapshot
-from onboard.daemon.state import Circumstances, next_step
+from onboard.daemon.snapshot import ImuView, PushView, Snapshot, StepView
+from onboard.daemon.state import INFO, Circumstances, next_step
 from onboard.daemon.traffic import Traffic
 from onboard.daemon.view import NO_TRUST, finite_values, imu_view, journal_view, link_view
 from onboard.mavlink.link import Link
@@ -87,7 +87,7 @@ class Portrait:
             notices=self.notices.kept,
             counters=self._counters(counters),
             diagnosis=self.diagnoses.document,
-            next_step=next_step(imus),
+            next_step=next_step(imus) if imus else self._first_step(),
         )
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
@@ -109,6 +109,12 @@ class Portrait:
             )
             for imu, calibration in (learned.calibrations.items() if learned else ())
         )
+
+    def _first_step(self) -> StepView | None:
+        """What to do while no accelerometer has an answer; None: nothing is known of a vehicle."""
+        if self.link.autopilot is None or self.learning.learned is None:
+            return None
+        return StepView(imu=None, text="fly: standing teaches nothing", severity=INFO)
 
     def sentence(self, now: float) -> str:
         """One line for systemctl status."""

@@ -489,3 +489,11 @@ async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
         await service.reset(())
         assert service.learning._learner._calibrator is not before
         assert service.snapshot().counters["resets"] == 1
+
+
+async def test_before_the_first_flight_it_says_what_to_do(document, daemon, port):
+    async with daemon(document) as service:
+        assert service.snapshot().next_step is None, "nobody is there"
+        async with Vehicle(port):
+            await until(lambda: service.learning.learned is not None)
+            assert service.snapshot().next_step.text.startswith("fly")
