@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
-from vehicles_state import accelerometer, seen
 
 from onboard.cli.demo import _stay
 from onboard.cli.demo_show import Show
+from tests.gcs.vehicles_state import accelerometer, seen
 
 WIDTH, HEIGHT = 80, 24
 

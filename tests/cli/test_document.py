@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 
 import pytest
-from results import CALIBRATED, NOTHING_KNOWN
 
 from onboard.core.accelerometer import SixParameters
 from onboard.document import (
@@ -13,6 +12,7 @@ from onboard.document import (
     ReplayDocument,
     imu_document,
 )
+from tests.cli.results import CALIBRATED, NOTHING_KNOWN
 
 RECORDING = RecordingDocument(
     files=["x.tlog"], autopilot="ardupilot", duration_s=300.2, samples={"imu 1": 9, "gps": 2}

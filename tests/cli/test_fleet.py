@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from dataflash_writer import modern_log
-from telemetry_writer import px4_log, telemetry
 
 from onboard.cli.main import run
+from tests.recordings.dataflash_writer import modern_log
+from tests.recordings.telemetry_writer import px4_log, telemetry
 
 
 @pytest.fixture

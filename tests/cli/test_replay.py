@@ -5,9 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from dataflash_writer import DataflashWriter, modern_log
-from results import CALIBRATED
-from telemetry_writer import px4_log, telemetry
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
@@ -15,6 +12,9 @@ from onboard.core.samples import GpsFix, ImuSample, ParameterValue
 from onboard.errors import RecordingError, UsageError
 from onboard.recorded import unanswered
 from onboard.replay import replay
+from tests.cli.results import CALIBRATED
+from tests.recordings.dataflash_writer import DataflashWriter, modern_log
+from tests.recordings.telemetry_writer import px4_log, telemetry
 
 
 class Listener:

@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from results import CALIBRATED, NOTHING_KNOWN
 from rich.console import Console
 
 from onboard.cli.table import replay_report
 from onboard.recorded import unanswered
 from onboard.recordings.recording import Recording
 from onboard.replay import Replay
+from tests.cli.results import CALIBRATED, NOTHING_KNOWN
 
 
 def shown(*calibrations: object, autopilot: str = "ardupilot", **about: object) -> str:

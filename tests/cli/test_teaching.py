@@ -12,10 +12,10 @@ from pathlib import Path
 
 import click
 import pytest
-from dataflash_writer import modern_log
 
 from onboard.cli import main
 from onboard.cli.main import run
+from tests.recordings.dataflash_writer import modern_log
 
 ROOT = Path(__file__).resolve().parents[2]
 

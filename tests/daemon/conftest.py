@@ -3,13 +3,13 @@
 import socket
 
 import pytest
-from daemons import running
 
 from onboard.daemon import learning
 from onboard.daemon import pusher as pusher_module
 from onboard.daemon import service as service_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
+from tests.daemon.daemons import running
 
 
 @pytest.fixture

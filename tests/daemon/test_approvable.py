@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from daemons import calibration
-from test_written import parameters
 
 from onboard.daemon.proposals import Proposal, Proposals, approvable
 from onboard.errors import RefusedError
 from onboard.push.plan import propose
 from onboard.push.policy import PolicySettings
+from tests.daemon.daemons import calibration
+from tests.daemon.test_written import parameters
 
 
 @pytest.mark.parametrize(

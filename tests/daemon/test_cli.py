@@ -8,11 +8,11 @@ import subprocess
 import sys
 
 import pytest
-from daemons import calibration, convinced, until
 from rich.cells import cell_len
-from standing_vehicle import Vehicle
 
 from onboard.cli.main import run as onboard
+from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.standing_vehicle import Vehicle
 
 EXECUTE = "from onboard.cli.main import main; main()"
 

@@ -5,12 +5,12 @@ import asyncio
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from daemons import until
-from flights import TRUE_SIX, GroundStation, flying, six
 
 from onboard.cli.main import cli
 from onboard.daemon.parameter_view import FINDINGS
 from sitl.builtin.effects import TemperatureDrift
+from tests.daemon.daemons import until
+from tests.daemon.flights import TRUE_SIX, GroundStation, flying, six
 
 ANTENNA = (0.3, 0.2, -0.2)
 FLIGHT_S = 240.0

@@ -5,12 +5,12 @@ from contextlib import asynccontextmanager
 
 import aiohttp
 import pytest
-from blank_snapshot import blank_snapshot
 
 from onboard.daemon.control import VIEWERS_MAX, ControlServer
 from onboard.daemon.door import Door, bound
 from onboard.daemon.snapshot import Snapshot
 from onboard.errors import ConfigurationError, RefusedError
+from tests.daemon.blank_snapshot import blank_snapshot
 
 TOKEN = "open"
 CHANGES = ("approve", "reject", "rollback", "reset")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from daemons import until
-from flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 
 from onboard.core.calibrator import Calibrator
 from onboard.replay import read
+from tests.daemon.daemons import until
+from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 
 
 @pytest.fixture

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from blank_snapshot import blank_snapshot
-from daemons import calibration
 from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.daemon.history import ROWS_MAX, SAVE_S, History, Ring, Row
 from onboard.daemon.view import imu_view
+from tests.daemon.blank_snapshot import blank_snapshot
+from tests.daemon.daemons import calibration
 
 SIX = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 

@@ -4,11 +4,11 @@ import asyncio
 import os
 
 import pytest
-from daemons import until
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.daemon.recording import RollingRecorder
 from onboard.errors import StateError
+from tests.daemon.daemons import until
 
 FRAME = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3).pack(mavlink.MAVLink(None))
 

@@ -10,8 +10,6 @@ import threading
 
 import aiohttp
 import pytest
-from daemons import calibration, convinced, until
-from standing_vehicle import PX4, Vehicle
 
 from onboard.core.accelerometer import parameter_names
 from onboard.core.result import Status
@@ -22,6 +20,8 @@ from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
 from onboard.daemon.snapshot import Snapshot
 from onboard.errors import ConfigurationError, LinkError, OnboardError, RefusedError, StateError
+from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.standing_vehicle import PX4, Vehicle
 
 SIX = parameter_names(1).six
 WANTED = calibration()

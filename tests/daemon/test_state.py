@@ -6,12 +6,12 @@ import itertools
 import math
 
 import pytest
-from daemons import calibration
 
 from onboard.core.result import Coverage, Status
 from onboard.daemon.snapshot import ChangeView, ProposalView
 from onboard.daemon.state import NAMES, Circumstances, next_step, state_of
 from onboard.daemon.view import imu_view
+from tests.daemon.daemons import calibration
 
 SENTENCES = {
     "armed": "armed, and the push policy is 'landed'",

@@ -3,12 +3,12 @@
 import asyncio
 
 import pytest
-from daemons import calibration, convinced, until
-from standing_vehicle import Vehicle
 
 from onboard.core.accelerometer import parameter_names
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
+from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.standing_vehicle import Vehicle
 
 SIX = parameter_names(1).six
 WANTED = calibration()

@@ -4,11 +4,11 @@ Device identifiers are no help: they are the same on every board of one model.
 """
 
 import pytest
-from daemons import calibration, convinced, until
-from standing_vehicle import Vehicle, ardupilot_parameters
-from test_unfinished_business import held_back, in_force, ticks
 
 from onboard.push.entries import Planned
+from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
+from tests.daemon.test_unfinished_business import held_back, in_force, ticks
 
 WANTED = calibration()
 ANOTHER = "0d0e0f"

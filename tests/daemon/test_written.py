@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 import pytest
-from daemons import calibration
 
 from onboard.core.accelerometer import parameter_names
 from onboard.daemon.view import imu_view
@@ -15,6 +14,7 @@ from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.entries import Closed, Planned, Purpose, Result, Verdict, Watched
 from onboard.push.journal import Journal
 from onboard.push.plan import propose
+from tests.daemon.daemons import calibration
 
 
 def parameters(imu=1, scale=(1.0, 1.0, 1.0), offset=(0.05, 0.06, 0.07)):

@@ -21,7 +21,7 @@ from onboard.web.page import status_page
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "daemon"))
-from blank_snapshot import blank_snapshot  # noqa: E402 - shared with the daemon's tests
+from tests.daemon.blank_snapshot import blank_snapshot  # noqa: E402 - shared with the daemon's tests
 
 MANUAL = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 JSON = {"Content-Type": "application/json"}

@@ -6,13 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
-from messages_in_code import objections, posted, raised, told
 
 from onboard.core.trust import Reason as Distrust
 from onboard.daemon.announcer import LINES
 from onboard.daemon.parameter_view import REASONS
 from onboard.push.policy import Objection
 from onboard.push.signals import Reason
+from tests.docs.messages_in_code import objections, posted, raised, told
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")

@@ -4,13 +4,13 @@ import contextlib
 from pathlib import Path
 
 import pytest
-from router import Router
 
 from onboard.daemon import learning
 from onboard.daemon import pusher as pusher_module
 from onboard.daemon import service as service_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
+from tests.gcs.router import Router
 
 DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
 """The daemon and the vehicle are those of its own tests."""
@@ -39,8 +39,8 @@ def airfield(tmp_path):
 
     @contextlib.asynccontextmanager
     async def run(sections=None):
-        from daemons import calibration, convinced, running, until  # noqa: PLC0415
-        from standing_vehicle import Vehicle  # noqa: PLC0415
+        from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
+        from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
 
         async with Router() as router:
             document = {

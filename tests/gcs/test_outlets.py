@@ -1,11 +1,11 @@
 """What the outlets make of a snapshot: the news in it, once."""
 
 import pytest
-from vehicles_state import accelerometer, proposal, seen
 
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.notices import Notices
 from onboard.daemon.outlets import Outlets
+from tests.gcs.vehicles_state import accelerometer, proposal, seen
 
 
 class Stage:

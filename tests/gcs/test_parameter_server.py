@@ -6,13 +6,13 @@ import struct
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stations import COMPONENT, SYSTEM, Line, Station
 
 from onboard.errors import RefusedError
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.mavlink.parameter_server import ParameterServer, Writable
+from tests.gcs.stations import COMPONENT, SYSTEM, Line, Station
 
 STEP = 0.1
 VALUES = {f"OBC_P_{n}": n / 7.0 for n in range(40)} | {"OBC_PUSH": 1.0, "OBC_GAIN": 0.5}

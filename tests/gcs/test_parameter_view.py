@@ -5,7 +5,6 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from vehicles_state import accelerometer, seen
 
 from onboard.core.findings import Verdict
 from onboard.core.result import Status
@@ -23,6 +22,7 @@ from onboard.daemon.parameter_view import (
 from onboard.daemon.state import NAMES
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.policy import Mode
+from tests.gcs.vehicles_state import accelerometer, seen
 
 
 def values(snapshot, **options):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from mavlink_peer import received
-
 from onboard.mavlink.dialect import MESSAGE_IDS, mavlink
+from tests.mavlink.mavlink_peer import received
 
 NAMES = {number: name for name, number in MESSAGE_IDS.items()}
 

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
 import pytest
-from mavlink_peer import LossyLine, received
 
 from onboard.mavlink.board import COMMANDS, Board, BoardIdentity
 from onboard.mavlink.dialect import mavlink
+from tests.mavlink.mavlink_peer import LossyLine, received
 
 UID2 = bytes(range(1, 13)) + bytes(6)
 OTHER = bytes(range(31, 43)) + bytes(6)

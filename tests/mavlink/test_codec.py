@@ -5,12 +5,12 @@ import itertools
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mavlink_peer import attitude, heartbeat, raw_imu
 from pymavlink.dialects.v20 import common, development
 
 from onboard.mavlink.codec import Codec, SourceStatistics
 from onboard.mavlink.dialect import mavlink, message_ids
 from onboard.mavlink.signing import EPOCH_UNIX_S, Signing
+from tests.mavlink.mavlink_peer import attitude, heartbeat, raw_imu
 
 NOW = EPOCH_UNIX_S + 3e8
 KEY = bytes(range(32))

@@ -5,7 +5,6 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mavlink_peer import attitude, heartbeat, raw_imu, received
 
 from onboard.core.samples import (
     AirData,
@@ -22,6 +21,7 @@ from onboard.core.samples import (
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import MESSAGE_IDS, mavlink
+from tests.mavlink.mavlink_peer import attitude, heartbeat, raw_imu, received
 
 MILLI_G = 9.80665e-3
 

@@ -9,8 +9,6 @@ from contextlib import asynccontextmanager
 from itertools import pairwise
 
 import pytest
-from mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
-from virtual_time import virtual_time
 
 from onboard.errors import LinkError
 from onboard.mavlink import connection as connection_module
@@ -34,6 +32,8 @@ from onboard.mavlink.endpoint import Endpoint, EndpointError
 from onboard.mavlink.link import HEARTBEAT_TIMEOUT_S, Link
 from onboard.mavlink.streams import StreamRequest, Streams
 from onboard.mavlink.timesync import TimeSync
+from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
+from tests.mavlink.virtual_time import virtual_time
 
 UDP = Endpoint.parse("udpin:127.0.0.1:14550")
 TCP = Endpoint.parse("tcp:127.0.0.1:5760")

@@ -7,14 +7,14 @@ from contextlib import asynccontextmanager
 from itertools import cycle
 
 import pytest
-from mavlink_peer import FakeAir, heartbeat
-from virtual_time import virtual_time
 
 from onboard.daemon.configuration import from_mapping
 from onboard.daemon.service import Service
 from onboard.mavlink import connection as connection_module
 from onboard.mavlink.connection import BACKOFF_CAP_S
 from onboard.outage import SETTLE_S, Outage
+from tests.mavlink.mavlink_peer import FakeAir, heartbeat
+from tests.mavlink.virtual_time import virtual_time
 
 REFUSED = ConnectionRefusedError(111, "Connection refused")
 ABSENT = FileNotFoundError(2, "No such file or directory")

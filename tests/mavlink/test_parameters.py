@@ -2,7 +2,6 @@ import math
 import random
 
 import pytest
-from autopilot_parameters import Autopilot, Weather, World, accelerometer_parameters, float32
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -24,6 +23,7 @@ from onboard.mavlink.parameters import (
     ValueChanged,
     ValueRead,
 )
+from tests.autopilot_parameters import Autopilot, Weather, World, accelerometer_parameters, float32
 
 SIX = [n for n in accelerometer_parameters() if not n.endswith("ID")]
 NAME = "INS_ACCSCAL_Y"

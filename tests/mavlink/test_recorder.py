@@ -6,7 +6,6 @@ import struct
 import threading
 
 import pytest
-from mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 
 from onboard.errors import ConfigurationError
 from onboard.mavlink import connection as connection_module
@@ -15,6 +14,7 @@ from onboard.mavlink.decode import Decoder
 from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.link import Link
 from onboard.mavlink.recorder import PENDING_LIMIT, Recorder
+from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 
 
 def frames(path):

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
 import pytest
-from autopilot_peer import StreamingAutopilot
-from mavlink_peer import LossyLine, received
 
 from onboard.mavlink.dialect import MESSAGE_IDS, mavlink
 from onboard.mavlink.streams import DEFAULT_STREAMS, StreamRequest, Streams, StreamState
+from tests.mavlink.autopilot_peer import StreamingAutopilot
+from tests.mavlink.mavlink_peer import LossyLine, received
 
 STEP = 0.004
 

@@ -5,10 +5,10 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mavlink_peer import received
 
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.timesync import TimeSync
+from tests.mavlink.mavlink_peer import received
 
 
 class Exchange:

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 
 import pytest
-from broker import Broker
-from published import Obedient, noticeboard, settings
 
 from onboard.mqtt import publisher as publisher_module
 from onboard.mqtt.publisher import Publisher
+from tests.mqtt.broker import Broker
+from tests.mqtt.published import Obedient, noticeboard, settings
 
 # Time that jumps is shared with the link's tests.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mavlink"))

@@ -4,12 +4,12 @@ import asyncio
 import logging
 
 import pytest
-from published import Obedient, settings, snapshot
-from virtual_time import virtual_time
 
 from onboard.daemon.notices import Notices
 from onboard.mqtt import publisher as publisher_module
 from onboard.mqtt.publisher import Publisher
+from tests.mavlink.virtual_time import virtual_time
+from tests.mqtt.published import Obedient, settings, snapshot
 
 
 class NoBroker:

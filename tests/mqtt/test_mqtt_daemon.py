@@ -6,7 +6,6 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from broker import Broker, Subscriber, free_port
 
 from onboard.daemon import learning
 from onboard.daemon import pusher as pusher_module
@@ -14,6 +13,7 @@ from onboard.daemon import service as service_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.mqtt import schema
 from onboard.push.course import TransactionSettings
+from tests.mqtt.broker import Broker, Subscriber, free_port
 
 DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
 """The daemon and the vehicle are those of its own tests."""
@@ -45,8 +45,8 @@ def check(topic, payload):
 
 
 async def test_a_push_approved_over_the_broker(tmp_path, broker):
-    from daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from standing_vehicle import Vehicle  # noqa: PLC0415
+    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
+    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
 
     port = free_port()
     async with Subscriber(broker.client()) as station:
@@ -85,8 +85,8 @@ async def test_a_push_approved_over_the_broker(tmp_path, broker):
 
 
 async def test_an_absent_broker_changes_nothing_for_the_vehicle(tmp_path):
-    from daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from standing_vehicle import Vehicle  # noqa: PLC0415
+    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
+    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
 
     port = free_port()
     document = configuration(tmp_path, port, free_port())
@@ -99,8 +99,8 @@ async def test_an_absent_broker_changes_nothing_for_the_vehicle(tmp_path):
 
 
 async def test_a_broker_that_comes_late_gets_everything(tmp_path):
-    from daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from standing_vehicle import Vehicle  # noqa: PLC0415
+    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
+    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
 
     port = free_port()
     broker = Broker(tmp_path)
@@ -127,8 +127,8 @@ async def test_a_broker_that_comes_late_gets_everything(tmp_path):
 
 
 async def test_missing_physics_is_retained_for_everybody_who_comes_later(tmp_path, broker):
-    from daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from standing_vehicle import Vehicle  # noqa: PLC0415
+    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
+    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
 
     port = free_port()
     async with running(configuration(tmp_path, port, broker.port)) as service, Vehicle(port):

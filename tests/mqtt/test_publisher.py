@@ -4,10 +4,10 @@ import asyncio
 import json
 
 import pytest
-from broker import Broker, Subscriber, free_port
-from published import Obedient, imu_view, journal_line, snapshot
 
 from onboard.daemon.snapshot import Snapshot
+from tests.mqtt.broker import Broker, Subscriber, free_port
+from tests.mqtt.published import Obedient, imu_view, journal_line, snapshot
 
 DIAGNOSIS = {"schema": "onboard.explain/1", "verdict": "clean", "effects": []}
 

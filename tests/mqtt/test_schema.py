@@ -4,7 +4,6 @@ import json
 
 import jsonschema
 import pytest
-from published import imu_view, journal_line, snapshot
 
 from onboard.mqtt import schema
 from onboard.mqtt.payloads import (
@@ -15,6 +14,7 @@ from onboard.mqtt.payloads import (
     event_message,
     read_command,
 )
+from tests.mqtt.published import imu_view, journal_line, snapshot
 
 PUBLISHED = json.loads(schema.FILE.read_text(encoding="utf-8"))
 

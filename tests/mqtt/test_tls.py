@@ -5,12 +5,12 @@ import gc
 import ssl
 
 import pytest
-from authority import Authority
-from broker import Broker, Subscriber
-from published import noticeboard, settings, snapshot
 
 from onboard.errors import ConfigurationError
 from onboard.mqtt.publisher import Publisher
+from tests.mqtt.authority import Authority
+from tests.mqtt.broker import Broker, Subscriber
+from tests.mqtt.published import noticeboard, settings, snapshot
 
 
 async def connected(publisher):

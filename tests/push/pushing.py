@@ -1,7 +1,5 @@
 """A push in virtual time: autopilot, link, journal on disk and a process that can be killed."""
 
-from autopilot_parameters import Autopilot, Weather, World, accelerometer_parameters, float32
-
 from onboard.core.accelerometer import parameter_names
 from onboard.errors import StateError
 from onboard.push.entries import Closed, Planned, Result, Undoing, Writing, audit
@@ -9,6 +7,7 @@ from onboard.push.journal import Journal
 from onboard.push.plan import Baseline, Change, PushPlan, Vehicle
 from onboard.push.signals import Finished, JournalFailed, JournalWritten, Record
 from onboard.push.transaction import PushTransaction
+from tests.autopilot_parameters import Autopilot, Weather, World, accelerometer_parameters, float32
 
 OLD = ((1.0, 1.0, 1.0), (0.02, -0.03, 0.04))
 NEW = ((1.013, 0.988, 1.007), (0.15, -0.21, 0.08))

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pushing import NEW, OLD, CrashError, PushWorld, Weather, make_plan
 
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
 from onboard.push.plan import UNCHANGED
 from onboard.push.signals import LinkLost, Rebooted, VehicleReport
+from tests.push.pushing import NEW, OLD, CrashError, PushWorld, Weather, make_plan
 
 
 def no_fsync(descriptor):

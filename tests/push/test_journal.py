@@ -4,7 +4,6 @@ import os
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pushing import make_plan
 
 from onboard.errors import StateError
 from onboard.push.entries import (
@@ -19,6 +18,7 @@ from onboard.push.entries import (
     Writing,
 )
 from onboard.push.journal import Journal
+from tests.push.pushing import make_plan
 
 PLAN = make_plan()
 

@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from calibrations import SIGMAS, calibration
 
 from onboard.answer import diagnosed, judged
 from onboard.core.findings import Diagnosis, Effect, Mismatch, Plain, Quantity, Series, Verdict
 from onboard.core.result import Status
 from onboard.push.physics import headline
+from tests.push.calibrations import SIGMAS, calibration
 
 NAN = float("nan")
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from autopilot_parameters import float32
-from calibrations import OFFSET, SCALE, calibration, covariance, current
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pushing import make_plan
 
 from onboard.core.accelerometer import SixParameters, parameter_names
 from onboard.errors import PushError
 from onboard.push.conditioning import condition
 from onboard.push.plan import GRAVITY, UNCHANGED, Change, PushPlan, Vehicle, offset_is_zero, propose
+from tests.autopilot_parameters import float32
+from tests.push.calibrations import OFFSET, SCALE, calibration, covariance, current
+from tests.push.pushing import make_plan
 
 values = st.floats(-3.5, 3.5).map(float32)
 vectors = st.tuples(*[st.one_of(st.just(0.0), values)] * 3)

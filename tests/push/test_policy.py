@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import pytest
-from calibrations import calibration, covariance, current
 
 from onboard.core.accelerometer import SixParameters, parameter_names
 from onboard.core.result import Status
@@ -21,6 +20,7 @@ from onboard.push.policy import (
     moment,
 )
 from onboard.push.policy import objections as values_objections
+from tests.push.calibrations import calibration, covariance, current
 
 LANDED = VehicleCondition(armed=False, disarmed_for=6.0, landed=True)
 HEALTHY = 0x001 | 0x002 | 0x004 | 0x008 | 0x010 | 0x020 | 0x100 | 0x200

@@ -1,5 +1,4 @@
 import pytest
-from pushing import NEW, OLD, PushWorld, make_plan
 
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import SendParamSet, ValueReceived
@@ -15,6 +14,7 @@ from onboard.push.signals import (
 )
 from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
 from onboard.push.transaction import PushTransaction
+from tests.push.pushing import NEW, OLD, PushWorld, make_plan
 
 
 @pytest.fixture(params=["eager", "patient"])

@@ -2,13 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from autopilot_parameters import float32
-from calibrations import OFFSET, SCALE, calibration, current
 
 from onboard.push.entries import Planned, Verdict
 from onboard.push.plan import propose
 from onboard.push.signals import VehicleReport
 from onboard.push.watch import PushWatch, WatchSettings
+from tests.autopilot_parameters import float32
+from tests.push.calibrations import OFFSET, SCALE, calibration, current
 
 PUSHED = Planned("t", propose(calibration(), current(), system_id=1))
 

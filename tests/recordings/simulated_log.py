@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from dataflash_writer import DataflashWriter
-
 from onboard.core.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
+from tests.recordings.dataflash_writer import DataflashWriter
 
 
 def logged(samples: Iterable[Sample], late: Callable[[float], float]) -> DataflashWriter:

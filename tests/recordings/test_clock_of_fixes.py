@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dataflash_writer import modern_log
-from simulated_log import logged
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import diagnose
@@ -18,6 +16,8 @@ from onboard.mavlink.decode import Decoder
 from onboard.recordings.opening import open_recording
 from sitl.builtin.truth import GpsTruth, random_imus
 from sitl.recording import FlightSpec, fly_messages
+from tests.recordings.dataflash_writer import modern_log
+from tests.recordings.simulated_log import logged
 
 
 def diagnosed(samples):

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dataflash_writer import DataflashWriter, modern_log, old_log
 from pymavlink.DFReader import DFReader_binary
 
 from onboard.core.samples import (
@@ -22,6 +21,7 @@ from onboard.errors import RecordingError
 from onboard.recordings.dataflash import WANTED
 from onboard.recordings.dataflash_index import index_dataflash
 from onboard.recordings.opening import open_recording
+from tests.recordings.dataflash_writer import DataflashWriter, modern_log, old_log
 
 
 def saved(tmp_path: Path, data: object) -> Path:

@@ -5,10 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
-from dataflash_writer import modern_log, old_log
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from telemetry_writer import px4_log, telemetry
 
 from onboard.core.samples import (
     AttitudeSample,
@@ -20,6 +18,8 @@ from onboard.core.samples import (
 )
 from onboard.errors import RecordingError
 from onboard.recordings.opening import open_recording
+from tests.recordings.dataflash_writer import modern_log, old_log
+from tests.recordings.telemetry_writer import px4_log, telemetry
 
 LOGS = {
     "modern.BIN": bytes(modern_log(1)),

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from telemetry_writer import TelemetryWriter, heartbeat, raw_imu, telemetry
 
 from onboard.core.samples import GpsFix, ImuSample, ParameterValue, VehicleState
 from onboard.errors import RecordingError
 from onboard.recordings.opening import open_recording
+from tests.recordings.telemetry_writer import TelemetryWriter, heartbeat, raw_imu, telemetry
 
 
 def saved(tmp_path: Path, data: object) -> Path:

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnoses_by_hand import IN_FORCE, NAN, advice_on, calibration, diagnosis, effect
-from test_report_parameters import loaded
 
 from onboard.advice import advise
 from onboard.answer import judged
@@ -15,6 +13,8 @@ from onboard.core.findings import Ambiguity, Law, Quantity, Rival, Verdict
 from onboard.core.result import Status
 from onboard.report.parameters import parameter_text
 from onboard.report.verdict import cures
+from tests.report.diagnoses_by_hand import IN_FORCE, NAN, advice_on, calibration, diagnosis, effect
+from tests.report.test_report_parameters import loaded
 
 STEP = effect(
     "bias_step",

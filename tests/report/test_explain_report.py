@@ -6,7 +6,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from diagnoses_by_hand import advice_on
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import diagnose
@@ -19,6 +18,7 @@ from onboard.report.parameters import parameter_text
 from sitl.builtin.effects import GpsLeverArm
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly_messages
+from tests.report.diagnoses_by_hand import advice_on
 
 VOID = {"meta", "line", "rect", "polyline", "br"}
 SIX = 6

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_answer import TRUE
 
 from onboard.answer import answer
 from onboard.cli.main import run
@@ -16,6 +15,7 @@ from onboard.recorded import Recorded
 from onboard.replay import read, replay
 from sitl.builtin import effects
 from sitl.recording import FlightSpec, write_tlog
+from tests.report.test_answer import TRUE
 
 OTHER = type(TRUE)(scale=(0.99, 1.01, 0.985), offset=(-0.1, 0.15, 0.2))
 HIDDEN = {

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 
 import pytest
-from test_advice import comment
-from test_report_parameters import loaded
 
 from onboard.explain import Explanation, explain
 from onboard.report.parameters import parameter_text
 from onboard.report.verdict import about_six
+from tests.report.test_advice import comment
+from tests.report.test_report_parameters import loaded
 
 pytestmark = pytest.mark.recordings
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from html_page import Page
 
 from onboard.chronicle import FREE_S, PAUSE_S
 from onboard.core.observability import SIX_NAMES
@@ -21,6 +20,7 @@ from onboard.report.words import seconds
 from sitl import recording
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec
+from tests.report.html_page import Page
 
 TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
 SIX = np.array([*TRUE.scale, *TRUE.offset])

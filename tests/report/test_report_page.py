@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
-from html_page import Page
 
 from onboard.core.findings import Diagnosis, Imprint, Law, Quantity, Verdict
 from onboard.explain import explain
 from onboard.report.explain import explain_html
+from tests.report.diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
+from tests.report.html_page import Page
 
 
 def page(d: Diagnosis, files=("flight.tlog",), autopilot: str = "ardupilot") -> tuple[str, Page]:

@@ -3,15 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from diagnoses_by_hand import (
-    IN_FORCE,
-    advice_on,
-    calibration,
-    diagnosis,
-    effect,
-    told_apart_not,
-    unknown,
-)
 from pymavlink.mavparm import MAVParmDict
 
 from onboard.advice import advise
@@ -20,6 +11,15 @@ from onboard.core.accelerometer import parameter_names
 from onboard.core.findings import Verdict
 from onboard.core.result import Status
 from onboard.report.parameters import calibration_text, parameter_text
+from tests.report.diagnoses_by_hand import (
+    IN_FORCE,
+    advice_on,
+    calibration,
+    diagnosis,
+    effect,
+    told_apart_not,
+    unknown,
+)
 
 
 def param_file(made, parameters=IN_FORCE, *, qgc: bool = False) -> str:

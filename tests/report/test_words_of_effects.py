@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from diagnoses_by_hand import NAN, advice_on, diagnosis, effect
 
 from onboard.core.findings import Quantity, Verdict
 from onboard.report.parameters import changes
 from onboard.report.sizes import size_in_words
 from onboard.report.verdict import cures, headline, missing, proof, remarks, sized, to_fly
 from onboard.report.words import EFFECTS
+from tests.report.diagnoses_by_hand import NAN, advice_on, diagnosis, effect
 
 
 def of(name: str, unit: str, /, intervals=(), **values: float):

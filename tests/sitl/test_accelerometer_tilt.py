@@ -5,13 +5,13 @@ SIM_ACC_TRIM turns the accelerometers and not the gyroscopes.  Runs with ``--sit
 
 import numpy as np
 import pytest
-from listener import Listener
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.diagnosis import diagnose
 from onboard.core.settings import EstimatorSettings
 from onboard.mavlink.decode import Decoder
 from sitl import harness
+from tests.sitl.listener import Listener
 
 SIMSTATE = {164: 50_000}
 TURNED = (0.03, -0.025)

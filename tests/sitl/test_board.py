@@ -2,9 +2,9 @@
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
-from test_parameter_manners import Peer
 
 from sitl.builtin.truth import BOARD, ImuTruth, random_imus
+from tests.sitl.test_parameter_manners import Peer
 
 OTHER = "31".ljust(36, "0")
 VERSION = int(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)

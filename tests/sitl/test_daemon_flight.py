@@ -49,7 +49,7 @@ def told(service, kind):
 @pytest.mark.slow
 async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, monkeypatch):
     monkeypatch.syspath_prepend(str(DAEMON_TESTS))
-    from daemons import running, until  # noqa: PLC0415 - on the path from here on
+    from tests.daemon.daemons import running, until  # noqa: PLC0415 - on the path from here on
 
     speedup = 15 if kind == "builtin" else 6
     async with harness.simulator(kind, "copter", speedup=speedup) as sitl:

@@ -4,7 +4,6 @@ Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
 """
 
 import pytest
-from listener import Listener
 
 from onboard.core.calibrator import Calibrator
 from onboard.core.result import Status
@@ -12,6 +11,7 @@ from onboard.mavlink.decode import Decoder
 from sitl import harness
 from sitl.ardupilot import process
 from sitl.errors import NoBinaryError
+from tests.sitl.listener import Listener
 
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 

@@ -3,8 +3,9 @@
 import shutil
 
 import pytest
-from browsing import Browser
-from page_server import PageServer
+
+from tests.web.browsing import Browser
+from tests.web.page_server import PageServer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")

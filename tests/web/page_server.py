@@ -4,13 +4,13 @@ import asyncio
 import threading
 
 import msgspec
-from story import story
 
 from onboard.daemon.control import ControlServer
 from onboard.daemon.door import bound
 from onboard.daemon.history import History
 from onboard.errors import RefusedError
 from onboard.web.page import status_page
+from tests.web.story import story
 
 
 class Told:

@@ -5,13 +5,13 @@ from importlib import resources
 
 import msgspec
 import pytest
-from browsing import LAPTOP, PHONE
-from page_server import PageServer
-from story import T0, story
 
 from onboard.daemon.snapshot import WrittenValue, WrittenView
 from onboard.push.physics import headline
 from onboard.report.words import EFFECTS
+from tests.web.browsing import LAPTOP, PHONE
+from tests.web.page_server import PageServer
+from tests.web.story import T0, story
 
 STALE = ("WebSocket", "Failed to load resource")
 
