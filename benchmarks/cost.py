@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.matched import draw, path
-from onboard.core.calibrator import Calibrator
-from onboard.core.engine import Engine
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
-from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.settings import EstimatorSettings
 
 REPEATS = 5
 BETWEEN_FLIGHTS_S = 3.0

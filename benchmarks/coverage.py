@@ -14,8 +14,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.result import SIX_NAMES, Status
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import SIX_NAMES, Status
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import GpsTruth, random_imus
 from sitl.recording import FlightSpec, fly_messages

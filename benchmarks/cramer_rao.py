@@ -17,10 +17,10 @@ import numpy as np
 from benchmarks.bound import bound
 from benchmarks.matched import LEVELS, draw, path
 from benchmarks.recorded import Array, Flight, error_of, fed
-from onboard.core.calibrator import Calibrator
-from onboard.core.engine import Engine
-from onboard.core.result import SIX_NAMES
-from onboard.core.settings import EstimatorSettings
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.estimate.settings import EstimatorSettings
 from sitl.builtin.world import Vehicle
 
 VEHICLES: tuple[Vehicle, ...] = ("copter", "plane")

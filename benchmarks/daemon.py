@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.autopilot import Autopilot, AutopilotFound
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message

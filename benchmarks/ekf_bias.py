@@ -20,8 +20,8 @@ from benchmarks.recorded import (
     moving_span,
     recorded,
 )
-from onboard.core.result import Calibration
-from onboard.core.samples import EkfBias, ImuSample
+from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.samples import EkfBias, ImuSample
 
 SETTLED_S = 60.0
 """A filter is given this long to learn before it is judged."""

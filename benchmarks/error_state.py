@@ -29,9 +29,9 @@ from benchmarks.recorded import (
     moving_span,
     recorded,
 )
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.parameters import filter_delay
-from onboard.core.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.parameters import filter_delay
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
+from onboard.core.maths.earth import STANDARD_GRAVITY
 
 RECORDINGS = ("a02.tlog", "b02.tlog", "c01.BIN")
 BEFORE_S = 8.0

@@ -23,10 +23,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.concealing import LEVELS, Challenge, Secret
-from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose
-from onboard.core.findings import Diagnosis, Effect
-from onboard.core.settings import EstimatorSettings
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.physics.finding import Effect
 from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages, truth_record
 

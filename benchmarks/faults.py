@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.samples import GpsFix, Sample
+from onboard.core.inputs.samples import GpsFix, Sample
 
 METRES_PER_RADIAN = 6.371e6
 

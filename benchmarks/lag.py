@@ -14,8 +14,8 @@ import numpy as np
 
 from benchmarks.error_state import streams
 from benchmarks.recorded import WHERE, Array, Flight, clean, fed, recorded
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.frames import rotation_from_euler
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import rotation_from_euler
 
 LAGS = np.arange(-0.1, 0.5, 0.001)
 

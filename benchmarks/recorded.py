@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.result import Calibration
-from onboard.core.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.answers.recorded import Recorded
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.mavlink.decode import Decoder
-from onboard.recorded import Recorded
 from onboard.recordings.opening import open_recording
 from sitl.recording import FlightSpec, fly_messages, truth_record
 

@@ -25,9 +25,9 @@ from benchmarks.recorded import (
     recorded,
     simulated,
 )
-from onboard.core.calibrator import Calibrator
-from onboard.core.result import Status
-from onboard.core.trust import WindowClosed
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Status
+from onboard.core.gps.trust import WindowClosed
 from sitl.builtin.truth import random_imus
 from sitl.builtin.world import Vehicle
 from sitl.recording import FlightSpec

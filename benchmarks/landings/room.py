@@ -1,10 +1,10 @@
 """The daemon and a simulated autopilot on one virtual clock, with a line of bytes between them.
 
-It is the whole service (:class:`onboard.daemon.service.Service`) on an event loop whose clock
-jumps to the next timer; only three things are not what they are on a companion computer: its
+It is the whole service (:class:`onboard.daemon.process.service.Service`) on an event loop whose
+clock jumps to the next timer; only three things are not what they are on a companion computer: its
 line is in memory, its clock is the loop's, and its worker computes in the loop and then lets as
-much time pass as a slow companion would take.  So a run is as fast as the machine allows, and
-the same one every time.
+much time pass as a slow companion would take.  So a run is as fast as the machine allows, and the
+same one every time.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from unittest import mock
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from onboard.daemon import learning
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
+from onboard.daemon.learning import learning
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.messages import packed

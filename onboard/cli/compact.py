@@ -7,8 +7,8 @@ from rich.table import Table
 from rich.text import Text
 
 from onboard.cli.panel import decimal, duration, gps, headline, last_push, residual, when, who
-from onboard.core.result import SIX_NAMES
-from onboard.daemon.snapshot import ImuView, Snapshot
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.daemon.view.snapshot import ImuView, Snapshot
 
 JOURNAL_LINES = 2
 ROOMY = 2

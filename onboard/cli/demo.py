@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING
 import click
 from rich.console import Console
 
-from onboard.daemon.interrupts import stop_signals
+from onboard.daemon.process.interrupts import stop_signals
 from onboard.errors import OnboardError
 
 if TYPE_CHECKING:
     from onboard.cli.demo_report import Outcome
     from onboard.cli.demo_show import Show
-    from onboard.daemon.service import Service
+    from onboard.daemon.process.service import Service
     from sitl.builtin.world import Vehicle
     from sitl.station import Station
 
@@ -140,8 +140,8 @@ def _tell(outcome: Outcome, out: Console, json_file: str | None) -> None:
 async def _demonstrate(options: Options, out: Console, json_file: str | None) -> Outcome:
     from onboard.cli.demo_report import Outcome
     from onboard.cli.demo_show import Show
-    from onboard.daemon import configuration
-    from onboard.daemon.service import Service
+    from onboard.daemon.process.service import Service
+    from onboard.daemon.setup import configuration
     from sitl.builtin.process import autopilot_process
     from sitl.builtin.truth import random_imus
 

@@ -10,13 +10,13 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from onboard.core.accelerometer import SixParameters, parameter_names
-from onboard.core.result import Calibration
-from onboard.document import PushedDocument, RecordingDocument, ReplayDocument, imu_document
+from onboard.answers.document import PushedDocument, RecordingDocument, ReplayDocument, imu_document
+from onboard.core.estimate.result import Calibration
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
 
 if TYPE_CHECKING:
-    from onboard.daemon.service import Service
-    from onboard.daemon.snapshot import WrittenView
+    from onboard.daemon.process.service import Service
+    from onboard.daemon.view.snapshot import WrittenView
     from sitl.builtin.truth import ImuTruth
 
 SCALE_LIMIT, OFFSET_LIMIT = 0.01, 0.05

@@ -15,11 +15,11 @@ from rich.table import Table
 from rich.text import Text
 
 from onboard.cli.panel import STYLES
-from onboard.core.result import SIX_NAMES
+from onboard.core.estimate.result import SIX_NAMES
 
 if TYPE_CHECKING:
-    from onboard.daemon.service import Service
-    from onboard.daemon.snapshot import ImuView
+    from onboard.daemon.process.service import Service
+    from onboard.daemon.view.snapshot import ImuView
     from sitl.station import Station
 
 REFRESH_HZ = 4.0

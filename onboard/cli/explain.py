@@ -10,17 +10,18 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from onboard.advice import Advice
+from onboard.answers import verdict
+from onboard.answers.advice import Advice
+from onboard.answers.explain import Explanation
+from onboard.answers.explain import explain as explain_recordings
+from onboard.answers.words import fixed, percent
 from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
-from onboard.core.findings import Diagnosis, Effect, Verdict
-from onboard.core.result import SIX_NAMES
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.physics.finding import Effect
 from onboard.errors import UsageError
-from onboard.explain import Explanation
-from onboard.explain import explain as explain_recordings
-from onboard.report import verdict
 from onboard.report.parameters import is_qgc, parameter_text
-from onboard.report.words import fixed, percent
 
 MOST_SPANS = 3
 EXAMPLES = """\

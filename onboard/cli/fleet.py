@@ -11,11 +11,11 @@ import click
 from rich.console import Console
 from rich.text import Text
 
+from onboard.answers.fleet import FleetDocument, Flown, fly, found
 from onboard.cli.progress import numbered
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
-from onboard.core.result import Calibration, Status
+from onboard.core.estimate.result import Calibration, Status
 from onboard.errors import UsageError
-from onboard.fleet import FleetDocument, Flown, fly, found
 
 NAME = 26
 WIDTH = 80

@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from onboard.core.accelerometer import parameter_names
-from onboard.core.result import SIX_NAMES
-from onboard.daemon.snapshot import ImuView, Snapshot, WrittenView
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.view.snapshot import ImuView, Snapshot, WrittenView
 
 JOURNAL_LINES = 5
 STYLES = {"good": "bold green", "info": "bold", "warning": "bold yellow", "error": "bold red"}

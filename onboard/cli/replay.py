@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from onboard.answers.recorded import Recorded
+from onboard.answers.replay import replay as replay_recordings
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
 from onboard.errors import UsageError
-from onboard.recorded import Recorded
-from onboard.replay import replay as replay_recordings
 
 STANDARD_OUTPUT = "-"
 

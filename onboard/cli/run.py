@@ -15,7 +15,7 @@ import click
 INTERRUPTED = 130
 
 if TYPE_CHECKING:
-    from onboard.daemon.configuration import Configuration
+    from onboard.daemon.setup.configuration import Configuration
 
 
 EXAMPLES = """\
@@ -58,7 +58,7 @@ def run(
     Serves until SIGTERM or Ctrl-C.  Without --config the defaults listen on UDP port 14550 of
     this machine and write only when the vehicle is disarmed.
     """
-    from onboard.daemon import configuration, settings
+    from onboard.daemon.setup import configuration, settings
 
     document = {} if config is None else configuration.read(Path(config))
     for section, key, value in (
@@ -80,7 +80,7 @@ def run(
 
 
 async def _serve(configuration: Configuration) -> signal.Signals | None:
-    from onboard.daemon.service import Service
+    from onboard.daemon.process.service import Service
 
     service = Service(configuration)
     await service.run(handle_signals=True)

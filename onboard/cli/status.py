@@ -18,7 +18,7 @@ from onboard.errors import LinkError, RefusedError, UsageError
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from onboard.daemon.snapshot import Snapshot
+    from onboard.daemon.view.snapshot import Snapshot
 
 TIMEOUT_S = 10.0
 WATCH_INTERVAL_S = 1.0
@@ -44,7 +44,7 @@ class Client:
         """
         import msgspec
 
-        from onboard.daemon.snapshot import Snapshot
+        from onboard.daemon.view.snapshot import Snapshot
 
         try:
             return Snapshot.from_json(self._request("GET", "/api/snapshot", b""))
@@ -97,7 +97,7 @@ def _reason(status: int, answer: bytes) -> str:
 
 def _client(url: str | None, config: str | None, token_file: str | None) -> Client:
     """Where the daemon listens: --url, else what its configuration says."""
-    from onboard.daemon import configuration
+    from onboard.daemon.setup import configuration
 
     settings = configuration.Configuration()
     if config is not None:

@@ -10,11 +10,11 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from onboard.advice import Advice
-from onboard.core.accelerometer import parameter_names
-from onboard.core.result import SIX_NAMES, Calibration, Estimate, Status
-from onboard.replay import Replay
-from onboard.report.verdict import about_six
+from onboard.answers.advice import Advice
+from onboard.answers.replay import Replay
+from onboard.answers.verdict import about_six
+from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
+from onboard.core.maths.accelerometer import parameter_names
 
 STATUS_WORDS = {
     Status.CALIBRATED: ("calibrated", "bold green"),

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import TypeAlias
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
     Battery,

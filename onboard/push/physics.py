@@ -1,6 +1,7 @@
 """What each effect of the catalogue means for a push, and the record of a flight's diagnosis.
 
-Which of these apply to a flight, and what becomes of its calibration, :mod:`onboard.answer` says.
+Which of these apply to a flight, and what becomes of its calibration, :mod:`onboard.answers.answer`
+says.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from onboard.core.findings import Effect
-from onboard.core.result import Calibration
+from onboard.core.estimate.result import Calibration
+from onboard.core.physics.finding import Effect
 
 IN_EVERY_MODEL = frozenset(
     {"gps_latency", "gps_smoothing", "imu_delay", "heading_error", "gps_fault"}
@@ -61,7 +62,7 @@ def headline(verdict: str, effects: Collection[str]) -> tuple[str, str]:
     """A diagnosis in one sentence, and its severity: good, info, warning or error.
 
     Args:
-        verdict: a value of :class:`onboard.core.findings.Verdict`.
+        verdict: a value of :class:`onboard.core.diagnosis.records.Verdict`.
         effects: names of what was found.
     """
     if verdict == "explained" and all(severity_of_effect(n) == "info" for n in effects):

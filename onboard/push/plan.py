@@ -30,9 +30,9 @@ from typing import cast
 
 import numpy as np
 
-from onboard.core.accelerometer import SixParameters, parameter_names
-from onboard.core.result import Calibration, Six
-from onboard.core.samples import Vector3
+from onboard.core.estimate.result import Calibration, Six
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.core.maths.arrays import Vector3
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.conditioning import condition

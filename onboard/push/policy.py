@@ -25,8 +25,8 @@ from enum import Enum
 
 import numpy as np
 
-from onboard.core.accelerometer import SixParameters, parameter_names
-from onboard.core.result import Calibration, Status
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.push.plan import GRAVITY, Change, PushPlan, offset_is_zero
 
 ALLOWED = frozenset(name for imu in range(1, 6) for name in parameter_names(imu).six)
@@ -200,7 +200,7 @@ def objections(
         values: the autopilot's parameters by name, for :func:`context_names`.
         others: the vehicle's other accelerometers, where their calibration is known.
         missing: physics that the autopilot lacks and that forbids it, in words
-            (:attr:`onboard.answer.Answer.missing`).
+            (:attr:`onboard.answers.answer.Answer.missing`).
     """
     found: list[Refusal] = []
     if missing:

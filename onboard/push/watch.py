@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.result import Calibration
+from onboard.core.estimate.result import Calibration
 from onboard.push.entries import Planned, Verdict, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.signals import VehicleReport

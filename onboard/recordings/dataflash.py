@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.samples import Sample
+from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_index import MAGIC, DataflashIndex, index_dataflash

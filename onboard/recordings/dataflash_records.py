@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
     Battery,

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from onboard.core.samples import ParameterValue, Sample
+from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog.core import ULog
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
     Battery,

@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from onboard.advice import Advice, cure_parameters
-from onboard.core.findings import Diagnosis, Effect, Verdict, Where
-from onboard.core.result import SIX_NAMES
-from onboard.report import residual_charts, verdict, words
+from onboard.answers import verdict, words
+from onboard.answers.advice import Advice, cure_parameters
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.physics.finding import Effect, Where
+from onboard.report import residual_charts
 from onboard.report.chart import pair_bar
 from onboard.report.page import render
 from onboard.report.parameters import changes

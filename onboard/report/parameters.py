@@ -2,8 +2,8 @@
 
 ``NAME,VALUE`` with ``#`` comments is what Mission Planner and MAVProxy load; QGroundControl wants
 lines of vehicle, component, name, value and type with tabs between them, by custom in a file
-whose name ends in ``.params``.  What the policy would not write (:mod:`onboard.advice`) stays in
-the file as a comment, with the reason.
+whose name ends in ``.params``.  What the policy would not write (:mod:`onboard.answers.advice`)
+stays in the file as a comment, with the reason.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from onboard.advice import Advice, cure_parameters
-from onboard.answer import Answer
-from onboard.core.findings import Diagnosis, Verdict
-from onboard.core.result import SIX_NAMES, Calibration
-from onboard.report.words import effect_title
+from onboard.answers.advice import Advice, cure_parameters
+from onboard.answers.answer import Answer
+from onboard.answers.words import effect_title
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.result import SIX_NAMES, Calibration
 
 REAL32 = 9
 INTEGERS = {

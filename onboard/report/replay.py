@@ -10,16 +10,16 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from onboard.advice import Advice
-from onboard.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
-from onboard.core.accelerometer import parameter_names
-from onboard.core.observability import Needs
-from onboard.core.result import SIX_NAMES, Calibration, Status
-from onboard.replay import Replay
-from onboard.report import words
+from onboard.answers import words
+from onboard.answers.advice import Advice
+from onboard.answers.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
+from onboard.answers.replay import Replay
+from onboard.answers.verdict import about_six
+from onboard.core.estimate.observability import Needs
+from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
 from onboard.report.page import render
-from onboard.report.verdict import about_six
 
 Array = NDArray[np.float64]
 

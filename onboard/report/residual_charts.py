@@ -7,9 +7,10 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from onboard.core.epochs import rms
-from onboard.core.findings import Diagnosis, Effect, Imprint, Law, Verdict
-from onboard.report import words
+from onboard.answers import words
+from onboard.core.diagnosis.epochs import rms
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.physics.finding import Effect, Imprint, Law
 from onboard.report.chart import Band, Line, Ribbon, line_chart
 
 COMPONENTS = ("North", "East", "Down")

@@ -1,4 +1,4 @@
-"""The status page as a page of :class:`onboard.daemon.control.ControlServer`.
+"""The status page as a page of :class:`onboard.daemon.outlets.control.ControlServer`.
 
 The files are in ``static``; all they ask for is there too, so that they work on a field without
 network.  The policy below forbids the browser everything else: no script, style or connection but

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from onboard.core.result import (
+from onboard.core.estimate.result import (
     Calibration,
     Certificate,
     Coverage,

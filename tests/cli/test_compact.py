@@ -10,7 +10,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from onboard.cli.compact import compact
-from onboard.daemon.snapshot import JournalLine
+from onboard.daemon.view.snapshot import JournalLine
 from tests.gcs.vehicles_state import accelerometer, seen
 
 LONG = "a sentence that goes on and on, as those of the core may do on a bad day " * 3

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.core.accelerometer import SixParameters
-from onboard.document import (
+from onboard.answers.document import (
     PushedDocument,
     RecordingDocument,
     ReplayDocument,
     imu_document,
 )
+from onboard.core.maths.accelerometer import SixParameters
 from tests.cli.results import CALIBRATED, NOTHING_KNOWN
 
 RECORDING = RecordingDocument(

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.accelerometer import parameter_names
-from onboard.core.result import Status
-from onboard.core.samples import GpsFix, ImuSample, ParameterValue
+from onboard.answers.recorded import unanswered
+from onboard.answers.replay import replay
+from onboard.core.estimate.result import Status
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.errors import RecordingError, UsageError
-from onboard.recorded import unanswered
-from onboard.replay import replay
 from tests.cli.results import CALIBRATED
 from tests.recordings.dataflash_writer import DataflashWriter, modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry

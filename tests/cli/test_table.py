@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from onboard.answers.recorded import unanswered
+from onboard.answers.replay import Replay
 from onboard.cli.table import replay_report
-from onboard.recorded import unanswered
 from onboard.recordings.recording import Recording
-from onboard.replay import Replay
 from tests.cli.results import CALIBRATED, NOTHING_KNOWN
 
 

@@ -1,6 +1,6 @@
 """A snapshot of a service that has heard nothing yet, for tests that only need some snapshot."""
 
-from onboard.daemon.snapshot import LinkView, PushView, Snapshot, TrustView
+from onboard.daemon.view.snapshot import LinkView, PushView, Snapshot, TrustView
 
 
 def blank_snapshot(*, uptime_s: float = 0.0) -> Snapshot:

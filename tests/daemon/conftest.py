@@ -4,9 +4,9 @@ import socket
 
 import pytest
 
-from onboard.daemon import learning
-from onboard.daemon import pusher as pusher_module
-from onboard.daemon import service as service_module
+from onboard.daemon.learning import learning
+from onboard.daemon.process import service as service_module
+from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
 from tests.daemon.daemons import running

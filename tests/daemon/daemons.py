@@ -5,10 +5,10 @@ import math
 import time
 from contextlib import asynccontextmanager
 
-from onboard.core.result import Calibration, Coverage, Status
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.flight import Judged, JudgedFlight
-from onboard.daemon.service import Service
+from onboard.core.estimate.result import Calibration, Coverage, Status
+from onboard.daemon.learning.flight import Judged, JudgedFlight
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.entries import Support
 from onboard.push.physics import Diagnosed

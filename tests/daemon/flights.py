@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.core.accelerometer import parameter_names
+from onboard.core.maths.accelerometer import parameter_names
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server

@@ -8,8 +8,8 @@ import struct
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.core.accelerometer import parameter_names
-from onboard.daemon.parameters import MEANING
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.pushing.parameters import MEANING
 
 ARDUPILOT, PX4 = 3, 12
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from onboard.daemon.proposals import Proposal, Proposals, approvable
+from onboard.daemon.pushing.proposals import Proposal, Proposals, approvable
 from onboard.errors import RefusedError
 from onboard.push.plan import propose
 from onboard.push.policy import PolicySettings

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from onboard.cli.main import cli
-from onboard.daemon.parameter_view import FINDINGS
+from onboard.daemon.outlets.parameter_view import FINDINGS
 from sitl.builtin.effects import TemperatureDrift
 from tests.daemon.daemons import until
 from tests.daemon.flights import TRUE_SIX, GroundStation, flying, six

@@ -1,7 +1,7 @@
 """The vehicle's condition as the push policy gets it: what is stale is unknown."""
 
-from onboard.core.samples import EkfHealth, VehicleState
-from onboard.daemon.condition import STALE_S, Observed
+from onboard.core.inputs.samples import EkfHealth, VehicleState
+from onboard.daemon.process.condition import STALE_S, Observed
 
 
 def armed(observed, value, now):

@@ -6,8 +6,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from onboard.daemon import configuration
-from onboard.daemon.configuration import Configuration, HttpSettings
+from onboard.daemon.setup import configuration
+from onboard.daemon.setup.configuration import Configuration, HttpSettings
 from onboard.errors import ConfigurationError
 
 TABLE = r"^\[([\w.]+)\]\n((?:(?!\[\w).*\n?)*)"

@@ -6,9 +6,9 @@ from contextlib import asynccontextmanager
 import aiohttp
 import pytest
 
-from onboard.daemon.control import VIEWERS_MAX, ControlServer
-from onboard.daemon.door import Door, bound
-from onboard.daemon.snapshot import Snapshot
+from onboard.daemon.outlets.control import VIEWERS_MAX, ControlServer
+from onboard.daemon.outlets.door import Door, bound
+from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import ConfigurationError, RefusedError
 from tests.daemon.blank_snapshot import blank_snapshot
 

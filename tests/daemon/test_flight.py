@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.replay import read
+from onboard.answers.replay import read
+from onboard.core.estimate.calibrator import Calibrator
 from tests.daemon.daemons import until
 from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.answer import Answer, diagnosed
-from onboard.core.result import Status
-from onboard.core.samples import ImuSample, ParameterValue, VehicleState
-from onboard.core.settings import EstimatorSettings
-from onboard.daemon import examiner as examiner_module
-from onboard.daemon.learner import Identity, Learner
-from onboard.daemon.store import Store
+from onboard.answers.answer import Answer, diagnosed
+from onboard.core.estimate.result import Status
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
+from onboard.daemon.learning import examiner as examiner_module
+from onboard.daemon.learning.learner import Identity, Learner
+from onboard.daemon.learning.store import Store
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, fly_messages

@@ -2,12 +2,12 @@
 
 import pytest
 
-from onboard.core.settings import EstimatorSettings
-from onboard.daemon import learning as learning_module
-from onboard.daemon.learner import Identity, Learner
-from onboard.daemon.learning import Learning
-from onboard.daemon.notices import Notices
-from onboard.daemon.store import Store
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.daemon.learning import learning as learning_module
+from onboard.daemon.learning.learner import Identity, Learner
+from onboard.daemon.learning.learning import Learning
+from onboard.daemon.learning.store import Store
+from onboard.daemon.view.notices import Notices
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from onboard.daemon.notify import Notifier, watchdog_interval
+from onboard.daemon.process.notify import Notifier, watchdog_interval
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import os
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.daemon.recording import RollingRecorder
+from onboard.daemon.setup.recording import RollingRecorder
 from onboard.errors import StateError
 from tests.daemon.daemons import until
 

@@ -11,14 +11,15 @@ import threading
 import aiohttp
 import pytest
 
-from onboard.core.accelerometer import parameter_names
-from onboard.core.result import Status
-from onboard.core.samples import ImuSample
-from onboard.daemon import learning, portrait
-from onboard.daemon import service as service_module
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
-from onboard.daemon.snapshot import Snapshot
+from onboard.core.estimate.result import Status
+from onboard.core.inputs.samples import ImuSample
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.learning import learning
+from onboard.daemon.process import portrait
+from onboard.daemon.process import service as service_module
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
+from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import ConfigurationError, LinkError, OnboardError, RefusedError, StateError
 from tests.daemon.daemons import calibration, convinced, until
 from tests.daemon.standing_vehicle import PX4, Vehicle
@@ -341,7 +342,7 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
             in_force_offset=tuple(in_force(vehicle)[3:]),
             held_out_before=9.0,
         )
-        monkeypatch.setattr("onboard.daemon.proof.answers", lambda _: {1: flown})
+        monkeypatch.setattr("onboard.daemon.learning.proof.answers", lambda _: {1: flown})
         vehicle.armed, vehicle.landed = True, False
         await until(lambda: service.snapshot().link.armed)
         vehicle.armed, vehicle.landed = False, True

@@ -7,10 +7,10 @@ import math
 
 import pytest
 
-from onboard.core.result import Coverage, Status
-from onboard.daemon.snapshot import ChangeView, ProposalView
-from onboard.daemon.state import NAMES, Circumstances, next_step, state_of
-from onboard.daemon.view import imu_view
+from onboard.core.estimate.result import Coverage, Status
+from onboard.daemon.view.snapshot import ChangeView, ProposalView
+from onboard.daemon.view.state import NAMES, Circumstances, next_step, state_of
+from onboard.daemon.view.view import imu_view
 from tests.daemon.daemons import calibration
 
 SENTENCES = {

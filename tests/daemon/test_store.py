@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from onboard.daemon.store import Store
+from onboard.daemon.learning.store import Store
 from onboard.errors import StateError
 
 SUMS = bytes(range(256)) * 20

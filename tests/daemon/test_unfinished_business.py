@@ -4,9 +4,9 @@ import asyncio
 
 import pytest
 
-from onboard.core.accelerometer import parameter_names
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from tests.daemon.daemons import calibration, convinced, until
 from tests.daemon.standing_vehicle import Vehicle
 

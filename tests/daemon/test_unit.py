@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.daemon import service
+from onboard.daemon.process import service
 
 UNIT = Path(__file__).parents[2] / "systemd" / "onboard.service"
 LIMIT = 2.0

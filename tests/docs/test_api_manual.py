@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -11,17 +10,16 @@ import aiohttp
 import msgspec
 import pytest
 
-from onboard.daemon import snapshot
-from onboard.daemon.control import BODY_MAX, VIEWERS_MAX, ControlServer
-from onboard.daemon.door import bound
-from onboard.daemon.history import ROWS_MAX, SCHEMA, History
-from onboard.daemon.snapshot import Record, Snapshot
+from onboard.daemon.outlets.control import BODY_MAX, VIEWERS_MAX, ControlServer
+from onboard.daemon.outlets.door import bound
+from onboard.daemon.view import snapshot
+from onboard.daemon.view.history import ROWS_MAX, SCHEMA, History
+from onboard.daemon.view.snapshot import Record, Snapshot
 from onboard.errors import RefusedError
 from onboard.web.page import status_page
+from tests.daemon.blank_snapshot import blank_snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "daemon"))
-from tests.daemon.blank_snapshot import blank_snapshot  # noqa: E402 - shared with the daemon's tests
 
 MANUAL = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 JSON = {"Content-Type": "application/json"}

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from onboard import explain_document
-from onboard.core.findings import Verdict
-from onboard.explain_document import EXPLAIN_SCHEMA
-from onboard.report.words import EFFECTS
+from onboard.answers import explain_document
+from onboard.answers.explain_document import EXPLAIN_SCHEMA
+from onboard.answers.words import EFFECTS
+from onboard.core.diagnosis.records import Verdict
 
 MANUAL = (Path(__file__).resolve().parents[2] / "docs" / "explaining.md").read_text("utf-8")
 DOCUMENTS = [

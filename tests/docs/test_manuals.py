@@ -11,8 +11,9 @@ import click
 import pytest
 
 from onboard.cli import main
-from onboard.core.accelerometer import parameter_names
-from onboard.daemon import configuration, parameters, settings
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.pushing import parameters
+from onboard.daemon.setup import configuration, settings
 from onboard.push.policy import ALLOWED
 
 ROOT = Path(__file__).resolve().parents[2]

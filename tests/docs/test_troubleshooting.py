@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.trust import Reason as Distrust
-from onboard.daemon.announcer import LINES
-from onboard.daemon.parameter_view import REASONS
+from onboard.core.gps.trust import Reason as Distrust
+from onboard.daemon.outlets.announcer import LINES
+from onboard.daemon.outlets.parameter_view import REASONS
 from onboard.push.policy import Objection
 from onboard.push.signals import Reason
 from tests.docs.messages_in_code import objections, posted, raised, told

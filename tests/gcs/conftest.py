@@ -1,19 +1,17 @@
 """A daemon, a vehicle and ground stations around one router, all on loopback."""
 
 import contextlib
-from pathlib import Path
 
 import pytest
 
-from onboard.daemon import learning
-from onboard.daemon import pusher as pusher_module
-from onboard.daemon import service as service_module
+from onboard.daemon.learning import learning
+from onboard.daemon.process import service as service_module
+from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
+from tests.daemon.daemons import calibration, convinced, running, until
+from tests.daemon.standing_vehicle import Vehicle
 from tests.gcs.router import Router
-
-DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
-"""The daemon and the vehicle are those of its own tests."""
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +20,6 @@ def impatient(monkeypatch):
     monkeypatch.setattr(service_module, "TICK_S", 0.05)
     monkeypatch.setattr(learning, "BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
-    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
 
 
 def waits(push):
@@ -39,9 +36,6 @@ def airfield(tmp_path):
 
     @contextlib.asynccontextmanager
     async def run(sections=None):
-        from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
-        from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
-
         async with Router() as router:
             document = {
                 "link": {"endpoints": [f"udpout:127.0.0.1:{router.port}"]},

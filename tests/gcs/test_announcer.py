@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.daemon import announcer
-from onboard.daemon.announcer import INTERVAL_S, LINES, TEXT_LENGTH, Announcer, statustext
-from onboard.daemon.snapshot import Notice
+from onboard.daemon.outlets import announcer
+from onboard.daemon.outlets.announcer import INTERVAL_S, LINES, TEXT_LENGTH, Announcer, statustext
+from onboard.daemon.view.snapshot import Notice
 from onboard.mavlink.codec import Codec
 
 WARNING, NOTICE, INFO, ERROR = 4, 5, 6, 3

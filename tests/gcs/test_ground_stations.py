@@ -9,8 +9,8 @@ import shutil
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.core.accelerometer import parameter_names
-from onboard.daemon.parameter_view import STATES
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.outlets.parameter_view import STATES
 
 WANTED = (1.02, 0.99, 1.01, 0.2, -0.1, 0.15)
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.notices import Notices
-from onboard.daemon.outlets import Outlets
+from onboard.daemon.outlets.outlets import Outlets
+from onboard.daemon.setup.configuration import from_mapping
+from onboard.daemon.view.notices import Notices
 from tests.gcs.vehicles_state import accelerometer, proposal, seen
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from onboard.core.findings import Verdict
-from onboard.core.result import Status
-from onboard.core.trust import Reason
-from onboard.daemon import parameter_view
-from onboard.daemon.parameter_view import (
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.result import Status
+from onboard.core.gps.trust import Reason
+from onboard.daemon.outlets import parameter_view
+from onboard.daemon.outlets.parameter_view import (
     FINDINGS,
     POLICIES,
     REASONS,
@@ -19,7 +19,7 @@ from onboard.daemon.parameter_view import (
     finding_number,
     parameter_values,
 )
-from onboard.daemon.state import NAMES
+from onboard.daemon.view.state import NAMES
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.policy import Mode
 from tests.gcs.vehicles_state import accelerometer, seen

@@ -1,6 +1,6 @@
 """Snapshots of a service in whatever state a test wants."""
 
-from onboard.daemon.snapshot import (
+from onboard.daemon.view.snapshot import (
     CalibrationView,
     ChangeView,
     CoverageView,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
     Battery,

@@ -8,8 +8,8 @@ from itertools import cycle
 
 import pytest
 
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection as connection_module
 from onboard.mavlink.connection import BACKOFF_CAP_S
 from onboard.outage import SETTLE_S, Outage

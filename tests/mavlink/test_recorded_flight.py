@@ -6,7 +6,7 @@ import bisect
 
 import pytest
 
-from onboard.core.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 

@@ -3,19 +3,14 @@
 import asyncio
 import contextlib
 import random
-import sys
 import time
-from pathlib import Path
 
 import pytest
 
-from onboard.mqtt import publisher as publisher_module
-from onboard.mqtt.publisher import Publisher
+from onboard.daemon.mqtt import publisher as publisher_module
+from onboard.daemon.mqtt.publisher import Publisher
 from tests.mqtt.broker import Broker
 from tests.mqtt.published import Obedient, noticeboard, settings
-
-# Time that jumps is shared with the link's tests.
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mavlink"))
 
 
 @pytest.fixture(autouse=True)

@@ -2,9 +2,9 @@
 
 import msgspec
 
-from onboard.daemon.configuration import MqttSettings
-from onboard.daemon.notices import Notices
-from onboard.daemon.snapshot import (
+from onboard.daemon.setup.configuration import MqttSettings
+from onboard.daemon.view.notices import Notices
+from onboard.daemon.view.snapshot import (
     CalibrationView,
     CoverageView,
     ImuView,

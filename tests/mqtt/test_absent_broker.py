@@ -5,9 +5,9 @@ import logging
 
 import pytest
 
-from onboard.daemon.notices import Notices
-from onboard.mqtt import publisher as publisher_module
-from onboard.mqtt.publisher import Publisher
+from onboard.daemon.mqtt import publisher as publisher_module
+from onboard.daemon.mqtt.publisher import Publisher
+from onboard.daemon.view.notices import Notices
 from tests.mavlink.virtual_time import virtual_time
 from tests.mqtt.published import Obedient, settings, snapshot
 

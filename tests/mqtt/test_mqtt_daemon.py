@@ -2,21 +2,20 @@
 
 import asyncio
 import json
-from pathlib import Path
 
 import jsonschema
 import pytest
 
-from onboard.daemon import learning
-from onboard.daemon import pusher as pusher_module
-from onboard.daemon import service as service_module
+from onboard.daemon.learning import learning
+from onboard.daemon.mqtt import schema
+from onboard.daemon.process import service as service_module
+from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
-from onboard.mqtt import schema
 from onboard.push.course import TransactionSettings
+from tests.daemon.daemons import calibration, convinced, running, until
+from tests.daemon.standing_vehicle import Vehicle
 from tests.mqtt.broker import Broker, Subscriber, free_port
 
-DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
-"""The daemon and the vehicle are those of its own tests."""
 TOPICS = ("state", "calibration", "event", "availability", "command/reply")
 
 
@@ -26,7 +25,6 @@ def hurry(monkeypatch):
     monkeypatch.setattr(service_module, "TICK_S", 0.05)
     monkeypatch.setattr(learning, "BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
-    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
 
 
 def configuration(tmp_path, port, broker_port, **mqtt):
@@ -45,9 +43,6 @@ def check(topic, payload):
 
 
 async def test_a_push_approved_over_the_broker(tmp_path, broker):
-    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
-
     port = free_port()
     async with Subscriber(broker.client()) as station:
         async with (
@@ -85,9 +80,6 @@ async def test_a_push_approved_over_the_broker(tmp_path, broker):
 
 
 async def test_an_absent_broker_changes_nothing_for_the_vehicle(tmp_path):
-    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
-
     port = free_port()
     document = configuration(tmp_path, port, free_port())
     document["push"]["approval"] = False
@@ -99,9 +91,6 @@ async def test_an_absent_broker_changes_nothing_for_the_vehicle(tmp_path):
 
 
 async def test_a_broker_that_comes_late_gets_everything(tmp_path):
-    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
-
     port = free_port()
     broker = Broker(tmp_path)
     async with (
@@ -127,9 +116,6 @@ async def test_a_broker_that_comes_late_gets_everything(tmp_path):
 
 
 async def test_missing_physics_is_retained_for_everybody_who_comes_later(tmp_path, broker):
-    from tests.daemon.daemons import calibration, convinced, running, until  # noqa: PLC0415
-    from tests.daemon.standing_vehicle import Vehicle  # noqa: PLC0415
-
     port = free_port()
     async with running(configuration(tmp_path, port, broker.port)) as service, Vehicle(port):
         why = "the GPS antenna is elsewhere (gps_lever_arm)"

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from onboard.daemon.snapshot import Snapshot
+from onboard.daemon.view.snapshot import Snapshot
 from tests.mqtt.broker import Broker, Subscriber, free_port
 from tests.mqtt.published import Obedient, imu_view, journal_line, snapshot
 

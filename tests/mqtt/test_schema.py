@@ -5,8 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from onboard.mqtt import schema
-from onboard.mqtt.payloads import (
+from onboard.daemon.mqtt import schema
+from onboard.daemon.mqtt.payloads import (
     CommandMessage,
     ReplyMessage,
     calibration_message,
@@ -28,7 +28,7 @@ def validate(topic, payload):
 
 def test_the_file_is_what_the_records_are_now():
     assert schema.FILE.read_text(encoding="utf-8") == schema.text(), (
-        "python -m onboard.mqtt.schema writes it anew"
+        "python -m onboard.daemon.mqtt.schema writes it anew"
     )
     jsonschema.Draft202012Validator.check_schema(PUBLISHED)
 

@@ -6,8 +6,8 @@ import ssl
 
 import pytest
 
+from onboard.daemon.mqtt.publisher import Publisher
 from onboard.errors import ConfigurationError
-from onboard.mqtt.publisher import Publisher
 from tests.mqtt.authority import Authority
 from tests.mqtt.broker import Broker, Subscriber
 from tests.mqtt.published import noticeboard, settings, snapshot

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.accelerometer import parameter_names
-from onboard.core.result import Calibration, Coverage, Status
+from onboard.core.estimate.result import Calibration, Coverage, Status
+from onboard.core.maths.accelerometer import parameter_names
 
 SCALE = (1.013, 0.988, 1.007)
 OFFSET = (0.15, -0.21, 0.08)

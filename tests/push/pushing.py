@@ -1,6 +1,6 @@
 """A push in virtual time: autopilot, link, journal on disk and a process that can be killed."""
 
-from onboard.core.accelerometer import parameter_names
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.errors import StateError
 from onboard.push.entries import Closed, Planned, Result, Undoing, Writing, audit
 from onboard.push.journal import Journal

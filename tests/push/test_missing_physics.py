@@ -5,9 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from onboard.answer import diagnosed, judged
-from onboard.core.findings import Diagnosis, Effect, Mismatch, Plain, Quantity, Series, Verdict
-from onboard.core.result import Status
+from onboard.answers.answer import diagnosed, judged
+from onboard.core.diagnosis.records import Diagnosis, Mismatch, Plain, Series, Verdict
+from onboard.core.estimate.result import Status
+from onboard.core.physics.finding import Effect, Quantity
 from onboard.push.physics import headline
 from tests.push.calibrations import SIGMAS, calibration
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from onboard.core.accelerometer import SixParameters, parameter_names
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.errors import PushError
 from onboard.push.conditioning import condition
 from onboard.push.plan import GRAVITY, UNCHANGED, Change, PushPlan, Vehicle, offset_is_zero, propose

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.core.accelerometer import SixParameters, parameter_names
-from onboard.core.result import Status
-from onboard.daemon.configuration import PushSettings
-from onboard.daemon.settings import policy_settings
+from onboard.core.estimate.result import Status
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.daemon.setup.configuration import PushSettings
+from onboard.daemon.setup.settings import policy_settings
 from onboard.push.plan import propose
 from onboard.push.policy import (
     ALLOWED,

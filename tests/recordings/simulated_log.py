@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from onboard.core.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 from tests.recordings.dataflash_writer import DataflashWriter
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose
-from onboard.core.findings import Verdict
-from onboard.core.samples import GpsFix, ImuSample
-from onboard.core.settings import EstimatorSettings
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.inputs.samples import GpsFix, ImuSample
 from onboard.mavlink.decode import Decoder
 from onboard.recordings.opening import open_recording
 from sitl.builtin.truth import GpsTruth, random_imus

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pymavlink.DFReader import DFReader_binary
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AttitudeSample,
     Battery,
     GpsFix,

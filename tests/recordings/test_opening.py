@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from onboard.core.samples import (
+from onboard.core.inputs.samples import (
     AttitudeSample,
     GpsFix,
     GpsIntegrity,

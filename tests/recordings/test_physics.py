@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.core.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
 from onboard.recordings.opening import open_recording
 
 pytestmark = pytest.mark.recordings

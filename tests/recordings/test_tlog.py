@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.core.samples import GpsFix, ImuSample, ParameterValue, VehicleState
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, VehicleState
 from onboard.errors import RecordingError
 from onboard.recordings.opening import open_recording
 from tests.recordings.telemetry_writer import TelemetryWriter, heartbeat, raw_imu, telemetry

@@ -6,23 +6,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from onboard.advice import Advice, advise
-from onboard.answer import Answer
-from onboard.core.findings import (
+from onboard.answers.advice import Advice, advise
+from onboard.answers.answer import Answer
+from onboard.core.diagnosis.records import (
     Ambiguity,
     Diagnosis,
-    Effect,
     Mismatch,
     NotTestable,
-    Quantity,
     RegimeResidual,
-    Rival,
     Rung,
     Series,
     Verdict,
-    Where,
 )
-from onboard.core.result import Calibration, Coverage, Estimate, Status
+from onboard.core.estimate.result import Calibration, Coverage, Estimate, Status
+from onboard.core.physics.finding import Effect, Quantity, Rival, Where
 
 NAN = float("nan")
 SIGMAS = (0.001, 0.001, 0.01, 0.01, 0.01, 0.2)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.advice import advise
-from onboard.answer import judged
-from onboard.core.findings import Ambiguity, Law, Quantity, Rival, Verdict
-from onboard.core.result import Status
+from onboard.answers.advice import advise
+from onboard.answers.answer import judged
+from onboard.answers.verdict import cures
+from onboard.core.diagnosis.records import Ambiguity, Verdict
+from onboard.core.estimate.result import Status
+from onboard.core.physics.finding import Law, Quantity, Rival
 from onboard.report.parameters import parameter_text
-from onboard.report.verdict import cures
 from tests.report.diagnoses_by_hand import IN_FORCE, NAN, advice_on, calibration, diagnosis, effect
 from tests.report.test_report_parameters import loaded
 

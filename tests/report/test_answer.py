@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from onboard.core.result import Status
-from onboard.recorded import Recorded
-from onboard.replay import replay
+from onboard.answers.recorded import Recorded
+from onboard.answers.replay import replay
+from onboard.core.estimate.result import Status
 from sitl.builtin import effects
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, write_tlog

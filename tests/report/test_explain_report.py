@@ -7,11 +7,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose
-from onboard.core.findings import Mismatch, Series, Verdict
-from onboard.core.settings import EstimatorSettings
-from onboard.explain_document import explain_document
+from onboard.answers.explain_document import explain_document
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Mismatch, Series, Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import EstimatorSettings
 from onboard.mavlink.decode import Decoder
 from onboard.report.explain import explain_html
 from onboard.report.parameters import parameter_text

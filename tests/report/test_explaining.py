@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.explain import explain
+from onboard.answers.explain import explain
+from onboard.answers.recorded import Recorded
+from onboard.answers.replay import read
 from onboard.mavlink.dialect import MESSAGE_IDS
-from onboard.recorded import Recorded
-from onboard.replay import read
 from sitl.builtin.effects import GpsFault
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly, write_tlog

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.answer import answer
+from onboard.answers.answer import answer
+from onboard.answers.explain import explain
+from onboard.answers.recorded import Recorded
+from onboard.answers.replay import read, replay
 from onboard.cli.main import run
-from onboard.explain import explain
-from onboard.recorded import Recorded
-from onboard.replay import read, replay
 from sitl.builtin import effects
 from sitl.recording import FlightSpec, write_tlog
 from tests.report.test_answer import TRUE

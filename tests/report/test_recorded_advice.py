@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from onboard.explain import Explanation, explain
+from onboard.answers.explain import Explanation, explain
+from onboard.answers.verdict import about_six
 from onboard.report.parameters import parameter_text
-from onboard.report.verdict import about_six
 from tests.report.test_advice import comment
 from tests.report.test_report_parameters import loaded
 

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.chronicle import FREE_S, PAUSE_S
-from onboard.core.observability import SIX_NAMES
-from onboard.core.result import Estimate, Status
-from onboard.recorded import Recorded, unanswered
-from onboard.replay import replay
+from onboard.answers.chronicle import FREE_S, PAUSE_S
+from onboard.answers.recorded import Recorded, unanswered
+from onboard.answers.replay import replay
+from onboard.answers.words import seconds
+from onboard.core.estimate.observability import SIX_NAMES
+from onboard.core.estimate.result import Estimate, Status
 from onboard.report.replay import replay_html
-from onboard.report.words import seconds
 from sitl import recording
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.core.findings import Diagnosis, Imprint, Law, Quantity, Verdict
-from onboard.explain import explain
+from onboard.answers.explain import explain
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.physics.finding import Imprint, Law, Quantity
 from onboard.report.explain import explain_html
 from tests.report.diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
 from tests.report.html_page import Page

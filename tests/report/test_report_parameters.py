@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from pymavlink.mavparm import MAVParmDict
 
-from onboard.advice import advise
-from onboard.answer import Answer
-from onboard.core.accelerometer import parameter_names
-from onboard.core.findings import Verdict
-from onboard.core.result import Status
+from onboard.answers.advice import advise
+from onboard.answers.answer import Answer
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.result import Status
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.report.parameters import calibration_text, parameter_text
 from tests.report.diagnoses_by_hand import (
     IN_FORCE,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from onboard.core.findings import Quantity, Verdict
+from onboard.answers.sizes import size_in_words
+from onboard.answers.verdict import cures, headline, missing, proof, remarks, sized, to_fly
+from onboard.answers.words import EFFECTS
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.physics.finding import Quantity
 from onboard.report.parameters import changes
-from onboard.report.sizes import size_in_words
-from onboard.report.verdict import cures, headline, missing, proof, remarks, sized, to_fly
-from onboard.report.words import EFFECTS
 from tests.report.diagnoses_by_hand import NAN, advice_on, diagnosis, effect
 
 

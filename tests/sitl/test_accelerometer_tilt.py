@@ -6,9 +6,9 @@ SIM_ACC_TRIM turns the accelerometers and not the gyroscopes.  Runs with ``--sit
 import numpy as np
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.diagnosis import diagnose
-from onboard.core.settings import EstimatorSettings
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import EstimatorSettings
 from onboard.mavlink.decode import Decoder
 from sitl import harness
 from tests.sitl.listener import Listener

@@ -3,16 +3,13 @@
 Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from onboard.core.accelerometer import parameter_names
+from onboard.core.maths.accelerometer import parameter_names
 from sitl import harness
+from tests.daemon.daemons import running, until
 
-DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
-"""How a daemon is run is known to its own tests."""
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 TRUTH = np.array(SCALE + OFFSET)
 SIX = parameter_names(1).six
@@ -48,9 +45,6 @@ def told(service, kind):
 
 @pytest.mark.slow
 async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, monkeypatch):
-    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
-    from tests.daemon.daemons import running, until  # noqa: PLC0415 - on the path from here on
-
     speedup = 15 if kind == "builtin" else 6
     async with harness.simulator(kind, "copter", speedup=speedup) as sitl:
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)

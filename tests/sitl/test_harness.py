@@ -5,8 +5,8 @@ Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
 
 import pytest
 
-from onboard.core.calibrator import Calibrator
-from onboard.core.result import Status
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Status
 from onboard.mavlink.decode import Decoder
 from sitl import harness
 from sitl.ardupilot import process

@@ -3,17 +3,14 @@
 Runs with ``--sitl=builtin`` (the default) or ``--sitl=ardupilot``.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from onboard.core.accelerometer import parameter_names
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.push.entries import Planned
 from sitl import harness
+from tests.daemon import daemons
 
-DAEMON_TESTS = Path(__file__).parents[1] / "daemon"
-"""How a daemon is run is known to its own tests."""
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 SIX = parameter_names(1).six
 FLIGHT_S = 150.0
@@ -27,14 +24,6 @@ def kind(request):
     if reason:
         pytest.skip(reason)
     return chosen
-
-
-@pytest.fixture
-def daemons(monkeypatch):
-    monkeypatch.syspath_prepend(str(DAEMON_TESTS))
-    import daemons  # noqa: PLC0415 - on the path from here on
-
-    return daemons
 
 
 def document(sitl, tmp_path, *, disarmed_s):
@@ -55,7 +44,7 @@ def held_back(service):
 
 
 @pytest.mark.slow
-async def test_what_one_board_has_flown_another_does_not_get(kind, daemons, tmp_path):
+async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
     speedup = 15 if kind == "builtin" else 5
     async with harness.simulator(kind, "copter", speedup=speedup, imus=2) as sitl:
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
@@ -90,7 +79,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, daemons, tmp_
 
 
 @pytest.mark.slow
-async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, daemons, tmp_path):
+async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, tmp_path):
     speedup = 15 if kind == "builtin" else 5
     theirs = 0.625
     async with harness.simulator(kind, "copter", speedup=speedup) as sitl:

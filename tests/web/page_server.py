@@ -5,9 +5,9 @@ import threading
 
 import msgspec
 
-from onboard.daemon.control import ControlServer
-from onboard.daemon.door import bound
-from onboard.daemon.history import History
+from onboard.daemon.outlets.control import ControlServer
+from onboard.daemon.outlets.door import bound
+from onboard.daemon.view.history import History
 from onboard.errors import RefusedError
 from onboard.web.page import status_page
 from tests.web.story import story

@@ -2,8 +2,8 @@
 
 import math
 
-from onboard.core.result import SIX_NAMES
-from onboard.daemon.snapshot import (
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.daemon.view.snapshot import (
     CalibrationView,
     ChangeView,
     CoverageView,
@@ -20,7 +20,7 @@ from onboard.daemon.snapshot import (
     StateView,
     TrustView,
 )
-from onboard.daemon.state import next_step
+from onboard.daemon.view.state import next_step
 
 T0 = 1_780_000_000.0
 SCALE = ((1.0243, 0.9871, 1.0112), (0.9912, 1.0178, 0.9954))

@@ -7,10 +7,10 @@ from contextlib import asynccontextmanager
 import numpy as np
 import pytest
 
-from onboard.core.accelerometer import parameter_names
-from onboard.daemon import service as service_module
-from onboard.daemon.configuration import from_mapping
-from onboard.daemon.service import Service
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.process import service as service_module
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server

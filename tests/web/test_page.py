@@ -6,9 +6,9 @@ from importlib import resources
 import msgspec
 import pytest
 
-from onboard.daemon.snapshot import WrittenValue, WrittenView
+from onboard.answers.words import EFFECTS
+from onboard.daemon.view.snapshot import WrittenValue, WrittenView
 from onboard.push.physics import headline
-from onboard.report.words import EFFECTS
 from tests.web.browsing import LAPTOP, PHONE
 from tests.web.page_server import PageServer
 from tests.web.story import T0, story

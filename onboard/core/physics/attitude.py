@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Direct, Unknown
-from onboard.core.nodes import Around
+from onboard.core.model.quadrature import Around
+from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import EffectColumns, Origin
-
-Array = NDArray[np.float64]
 
 
 class HeadingByThrottle(EffectColumns):

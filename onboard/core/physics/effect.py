@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Family, Unknown
-from onboard.core.nodes import Signals
-
-Array = NDArray[np.float64]
+from onboard.core.maths.arrays import Array
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Family, Unknown
 
 AXES = "xyz"
 REFERENCE_DEGC = 35.0

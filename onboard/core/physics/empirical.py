@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Unknown
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.engine import Chunk
-from onboard.core.nodes import Signals
+from onboard.core.inputs.segments import Chunk
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import AXES, EffectColumns, on_axes
-
-Array = NDArray[np.float64]
 
 LARGEST = 3.0
 """Prior sigma of a term's size, m/s^2 at a signal of one; signals are scaled to be about one."""

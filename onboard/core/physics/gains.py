@@ -5,14 +5,12 @@ from __future__ import annotations
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Unknown
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.nodes import Signals
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import EffectColumns, Origin, on_axes
-
-Array = NDArray[np.float64]
 
 PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 

@@ -17,8 +17,8 @@ accelerometer against gyroscope
 board against airframe
     Both sensors alike.  The board's attitude fits the board's accelerometer, so that velocity
     residuals do not show it.  This is what AHRS_TRIM is for, and a trim that is set says nothing
-    of what is missing: it is put back into the recorded attitude (:mod:`onboard.core.assembly`)
-    and the flight is judged in the board's axes.
+    of what is missing: it is put back into the recorded attitude
+    (:mod:`onboard.core.inputs.assembly`) and the flight is judged in the board's axes.
 recorded attitude against both sensors
     Unknowns ``tilt_roll``, ``tilt_pitch`` of every model.  An EKF that integrates the gyroscope is
     not off like that for long, but one that levels with an accelerometer (DCM; an EKF that
@@ -36,15 +36,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Unknown
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.parameters import ParametersInForce
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.gains import Gain
 
-Array = NDArray[np.float64]
 Advice = tuple[str, dict[str, float]]
 
 TRIM_RAD = float(np.deg2rad(0.5))

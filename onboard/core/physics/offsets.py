@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Unknown
-from onboard.core.nodes import Signals
+from onboard.core.maths.arrays import Array
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import AXES, EffectColumns, Origin, on_axes
-
-Array = NDArray[np.float64]
 
 
 class TemperatureDrift(EffectColumns):

@@ -5,14 +5,11 @@ from __future__ import annotations
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.columns import Direct, Unknown
-from onboard.core.earth import STANDARD_GRAVITY
-from onboard.core.nodes import Around, lever_velocity
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.quadrature import Around, lever_velocity
+from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import AXES, EffectColumns, Origin
-
-Array = NDArray[np.float64]
 
 
 class LeverArm(EffectColumns):

@@ -1,0 +1,187 @@
+"""What of an answer may be set, and why not the rest: the policy asked for files and words.
+
+The daemon asks the policy of a plan before it writes; whoever reads a recording and sets what it
+says does the same by hand.  So the same :func:`onboard.push.policy.objections` decide here, on a
+plan made with the parameters in force in the recording.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from onboard.answers.answer import Answer
+from onboard.answers.conditions import conditions
+from onboard.core.diagnosis.evidence import AMBIGUOUS
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.core.physics.finding import Effect
+from onboard.errors import PushError
+from onboard.push.physics import GEOMETRY
+from onboard.push.plan import PushPlan, propose
+from onboard.push.policy import Accelerometer, Objection, PolicySettings, Refusal, objections
+
+FORMER_NAMES = {"GPS1_DELAY_MS": "GPS_DELAY_MS"} | {
+    f"GPS1_POS_{axis}": f"GPS_POS1_{axis}" for axis in "XYZ"
+}
+"""Of parameters before ArduPilot 4.6."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What may be set of one accelerometer's answer.
+
+    Attributes:
+        plan: the six as they would be set; None where the numbers make none.
+        refusals: every objection to its values; it may be set if there is none.
+        conditions: where a number holds only under a condition, in words, by parameter.
+        against: why the parameters of an effect should not be set, by effect; those that are
+            not in it may be.
+        names: of the effects' parameters as this autopilot has them, where they differ.
+    """
+
+    plan: PushPlan | None
+    refusals: tuple[Refusal, ...]
+    conditions: Mapping[str, str]
+    against: Mapping[str, str]
+    names: Mapping[str, str]
+
+    @property
+    def settable(self) -> bool:
+        """Whether the six may be set."""
+        return self.plan is not None and not self.refusals
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Sentences against setting the six, one of each kind: the first says enough."""
+        first: dict[Objection, str] = {}
+        for refusal in self.refusals:
+            first.setdefault(refusal.objection, refusal.sentence)
+        return tuple(first.values())
+
+    def to_set(self, effects: Sequence[Effect] = ()) -> dict[str, float]:
+        """Every parameter that may be set: the six that are seen, and the cures of ``effects``."""
+        six = {}
+        if self.plan is not None and self.settable:
+            six = {c.name: c.wanted for c in self.plan.changes if not c.kept}
+        cures = {
+            self.names.get(name, name): value
+            for e in effects
+            if e.name not in self.against
+            for name, value in cure_parameters(e).items()
+            if math.isfinite(value)
+        }
+        return cures | six
+
+
+def cure_parameters(effect: Effect) -> dict[str, float]:
+    """Parameters that cure an effect; none where they hold it already."""
+    return {} if effect.cure.startswith("none") else effect.parameters
+
+
+def advise(
+    answers: Sequence[Answer],
+    parameters: Mapping[str, float],
+    settings: PolicySettings | None = None,
+) -> tuple[Advice, ...]:
+    """Advice for the accelerometers of one vehicle, in the order of their answers.
+
+    Args:
+        answers: one for each accelerometer.
+        parameters: the autopilot's, as the recording has them.
+        settings: the policy's limits, else those that a service has by default.
+    """
+    settings = settings or PolicySettings()
+    plans = {a.imu: _plan(a.calibration, parameters) for a in answers}
+    alone = {
+        a.imu: () if plan is None else _objections(a, plan, parameters, settings, ())
+        for a in answers
+        for plan in (plans[a.imu],)
+    }
+    out = []
+    for a in answers:
+        plan = plans[a.imu]
+        others = [
+            Accelerometer(
+                other.imu,
+                SixParameters(other.calibration.scale, other.calibration.offset),
+                # Those that nothing is against are set in the same sitting.
+                its.six_before() if alone[other.imu] else its.six_wanted(),
+            )
+            for other in answers
+            if other is not a and (its := plans[other.imu]) is not None
+            if other.calibration.status is Status.CALIBRATED
+        ]
+        refusals = (
+            (Refusal(Objection.NOT_CALIBRATED, "there is no usable estimate"),)
+            if plan is None
+            else _objections(a, plan, parameters, settings, others)
+        )
+        against = {
+            e.name: why
+            for e in a.diagnosis.effects
+            if cure_parameters(e) and (why := _against(e, a.diagnosis, parameters, settings))
+        }
+        names = {new: old for new, old in FORMER_NAMES.items() if _former(new, parameters)}
+        out.append(Advice(plan, refusals, conditions(a.diagnosis, parameters), against, names))
+    return tuple(out)
+
+
+def _plan(calibration: Calibration, parameters: Mapping[str, float]) -> PushPlan | None:
+    names = parameter_names(calibration.imu)
+    in_force = calibration.in_force_scale + calibration.in_force_offset
+    current = dict(zip(names.six, in_force, strict=True))
+    current[names.device_id] = parameters.get(names.device_id, 0.0)
+    try:
+        return propose(calibration, current, system_id=1)
+    except PushError:
+        return None
+
+
+def _objections(
+    given: Answer,
+    plan: PushPlan,
+    parameters: Mapping[str, float],
+    settings: PolicySettings,
+    others: Sequence[Accelerometer],
+) -> tuple[Refusal, ...]:
+    return objections(
+        plan,
+        given.calibration,
+        settings,
+        values=parameters,
+        others=others,
+        missing=given.missing,
+    )
+
+
+def _against(
+    effect: Effect, diagnosis: Diagnosis, parameters: Mapping[str, float], settings: PolicySettings
+) -> str:
+    """Why the parameters of a found effect should not be set; empty if they may be.
+
+    The standard is that of the six: what is not the whole truth, could as well be something else,
+    is read off from an accelerometer that is not known, or helps next to nothing, is not set.
+    """
+    if diagnosis.verdict is not Verdict.EXPLAINED:
+        return "what was found does not explain all of the residual"
+    rivals = {r.name for r in effect.rivals if r.delta_bic < AMBIGUOUS}
+    rivals |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
+    if rivals := rivals - {effect.name}:
+        return f"not told apart from {', '.join(sorted(rivals))}"
+    if effect.name in GEOMETRY and diagnosis.calibration.status is not Status.CALIBRATED:
+        return "it is read off from the accelerometer, which this flight does not calibrate"
+    before, after = effect.held_out_before, effect.held_out_after
+    if not after <= settings.improvement * before:
+        return f"the held-out residual falls from {before:.3g} to {after:.3g} only"
+    unknown = [n for n in effect.parameters if n not in parameters and not _former(n, parameters)]
+    if unknown:
+        return f"{', '.join(unknown)} in force is not in the recording"
+    return ""
+
+
+def _former(name: str, parameters: Mapping[str, float]) -> bool:
+    """Whether this autopilot has the parameter by its former name."""
+    return name not in parameters and FORMER_NAMES.get(name) in parameters

@@ -1,0 +1,184 @@
+"""One answer for one flight of one accelerometer: what replay, explain and the daemon all give.
+
+A fit of six numbers gives six numbers, whatever physics it lacks.  So the answer is the
+diagnosis' own: the numbers of the model with what was found in it, from one set of sums, with one
+status.  Found physics forbids what it spoils:
+
+* what is left is not noise: the numbers are wrong by nobody knows how much;
+* the six are not the same for all of the flight (a jump, a drift): no one number is right;
+* an effect of geometry is modelled beside the six, which keep their meaning: the numbers are
+  right, but only as far as the model of it is, and the autopilot still lacks it.  A person decides;
+* anything else that moves a number by more than is claimed for it: what the autopilot would do with
+  the number is not what the model means by it.
+
+How far an effect moves a number is asked of the same sums without its columns
+(:mod:`onboard.core.diagnosis.plain`).  Latency and averaging of the receiver, delay of the attitude
+and a wrong heading are in every model: they are worth knowing and forbid nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
+from onboard.core.physics.finding import Effect
+from onboard.push.physics import GEOMETRY, IN_EVERY_MODEL, NO_ONE_NUMBER, Diagnosed, words_of
+
+MOVED_SIGMAS = 2.0
+"""Of what is claimed for a number: how far missing physics may move it (5 % move it by chance)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is known of one accelerometer from one flight.
+
+    Attributes:
+        diagnosis: everything that was found; its calibration has the one status and note.
+        missing: why the numbers must not be written by themselves, in words; empty if nothing
+            that was found forbids it.
+        modelled: what is missing is modelled beside the six, so a person may accept them.
+    """
+
+    diagnosis: Diagnosis
+    missing: str = ""
+    modelled: bool = False
+
+    @property
+    def imu(self) -> int:
+        """Which accelerometer."""
+        return self.diagnosis.imu
+
+    @property
+    def calibration(self) -> Calibration:
+        """The numbers, their sigmas and their status."""
+        return self.diagnosis.calibration
+
+
+def answer(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Answer:
+    """Diagnose a flight and say what may be believed.
+
+    Args:
+        calibrator: has the flight; it stays as it is.
+        imu: which accelerometer.
+        latest: only what is kept since the boot clock last began.
+
+    Raises:
+        KeyError: that accelerometer has not been seen, or no flight of it was processed.
+        ArithmeticError, LookupError, ValueError: numbers that no model fits.
+    """
+    return judged(diagnose(calibrator, imu, latest=latest))
+
+
+def judged(diagnosis: Diagnosis) -> Answer:
+    """What a diagnosis means for its calibration: all the rules of status are here.
+
+    Args:
+        diagnosis: with the calibration as its engine gave it.
+    """
+    suspects = [e for e in diagnosis.effects if e.name not in IN_EVERY_MODEL]
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return Answer(_refused(diagnosis))
+    if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
+        found = ", ".join(words_of(e) for e in suspects)
+        missing = "the residual is not noise, and " + (
+            f"what was found ({found}) does not explain all of it"
+            if found
+            else "no known effect explains it"
+        )
+        return Answer(_withdrawn(diagnosis, missing), missing)
+    names = {e.name for e in suspects}
+    if names & NO_ONE_NUMBER:
+        missing = _cured(suspects)
+        return Answer(_withdrawn(diagnosis, missing), missing)
+    moved = moved_most(diagnosis) if suspects else None
+    if moved is None:
+        return Answer(diagnosis)
+    name, by, sigmas = moved
+    missing = f"{_cured(suspects)} (it moves the {name} by {by:+.2g}, {sigmas:.1f} sigma)"
+    if not names <= GEOMETRY:
+        return Answer(_withdrawn(diagnosis, missing), missing)
+    noted = _noted(diagnosis, f"taken into account beside the six: {missing}")
+    return Answer(noted, missing, diagnosis.calibration.status is Status.CALIBRATED)
+
+
+def moved_most(diagnosis: Diagnosis) -> tuple[str, float, float] | None:
+    """The number that what was found moves most: name, by how much, in claimed sigmas.
+
+    None if none that the flight shows moves by more than :data:`MOVED_SIGMAS`.
+    """
+    plain, fuller = diagnosis.plain, diagnosis.calibration
+    if plain is None:
+        return None
+    by = np.array(fuller.scale + fuller.offset) - np.array(plain.value)
+    # The smaller claim: without what was found the portions may contradict each other, which
+    # widens that sigma; with it the columns share what the flight tells.
+    claimed = np.minimum(plain.sigma, fuller.scale_sigma + fuller.offset_sigma)
+    sigmas = np.where(fuller.observable, np.abs(by) / claimed, 0.0)
+    worst = int(np.argmax(sigmas))
+    # What is no number is not within its claim.
+    if sigmas[worst] <= MOVED_SIGMAS:
+        return None
+    return SIX_NAMES[worst], float(by[worst]), float(sigmas[worst])
+
+
+def diagnosed(given: Answer, document: Mapping[str, Any], *, resumed: bool = False) -> Diagnosed:
+    """The answer as it is kept on disk and judged before a push.
+
+    Args:
+        given: the answer.
+        document: the diagnosis as other programs read it.
+        resumed: it was made before the service last started.
+    """
+    return Diagnosed(
+        imu=given.imu,
+        verdict=given.diagnosis.verdict.value,
+        effects=tuple(e.name for e in given.diagnosis.effects),
+        calibration=given.calibration,
+        missing=given.missing,
+        modelled=given.modelled,
+        document=dict(document),
+        resumed=resumed,
+    )
+
+
+def _refused(diagnosis: Diagnosis) -> Diagnosis:
+    """A diagnosis that says nothing of the flight: nor do its numbers, for the same reason."""
+    c = diagnosis.calibration
+    if c.status is not Status.CALIBRATED:
+        return diagnosis
+    c = replace(c, status=Status.INSUFFICIENT, note=diagnosis.note or c.note)
+    return replace(diagnosis, calibration=c)
+
+
+def _withdrawn(diagnosis: Diagnosis, why: str) -> Diagnosis:
+    """The diagnosis with a calibration that is not called one; ``why`` is noted with it."""
+    noted = _noted(diagnosis, f"{why}; see onboard explain")
+    if noted.calibration.status is not Status.CALIBRATED:
+        return noted
+    return replace(noted, calibration=replace(noted.calibration, status=Status.INSUFFICIENT))
+
+
+def _noted(diagnosis: Diagnosis, said: str) -> Diagnosis:
+    c = diagnosis.calibration
+    note = f"{said}. {c.note}".rstrip()
+    return replace(diagnosis, calibration=replace(c, note=note))
+
+
+def _cured(effects: Sequence[Effect]) -> str:
+    """What is missing and what to do about it."""
+    cures = [
+        f"set {', '.join(f'{n} {v:.4g}' for n, v in e.parameters.items())}"
+        if e.parameters
+        else e.cure
+        for e in effects
+    ]
+    todo = "; ".join(dict.fromkeys(c for c in cures if c))
+    found = ", ".join(words_of(e) for e in effects)
+    return f"{found}: {todo}; then fly again" if todo else found

@@ -1,0 +1,314 @@
+"""How a calibration came about: its course over the flight, kept while a recording is read.
+
+A :class:`Chronicle` stands before a calibrator and passes everything on; when GPS was trusted, how
+fast the vehicle was, and which parameters were in force it notes as they go by.  Estimates are
+those of the answer's own sums, cut off at each moment: what was known with what had been flown by
+then, so that a course ends at the answer.  Times are seconds since the first inertial sample,
+recordings of several flights one after the other.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.estimate.calibration_record import six_covariance, six_information
+from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator, Event, Restarted
+from onboard.core.estimate.dead_reckoning import free_errors, intervals
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.observability import Observability, assess
+from onboard.core.estimate.solution import solve
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+
+Array = NDArray[np.float64]
+Item = TypeVar("Item")
+
+MOST_POINTS = 60
+"""Of a course: each is a solution of its own."""
+SPEED_S = 0.4
+"""Between two points of the speed."""
+PAUSE_S = 10.0
+"""Drawn between two recordings, or before and after a reboot."""
+FREE_S = 10.0
+"""How long velocity is integrated freely before it begins anew from the filter's."""
+CLOCK_MARGIN_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time of one state of trust; ``reason`` is empty while GPS is trusted."""
+
+    start: float
+    end: float
+    reason: str
+
+    @property
+    def seconds(self) -> float:
+        """Its length, s."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What was known with the flight up to then: ``t`` (n,) s, the others (n, 6), as SIX_NAMES.
+
+    ``coverage`` in percent; ``in_force`` are the parameters that the autopilot used.  Timing and
+    noise are those of the whole flight: the last row is the answer.
+    """
+
+    t: Array
+    value: Array
+    sigma: Array
+    in_force: Array
+    coverage: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Values over time, s."""
+
+    t: Array
+    y: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What one accelerometer's report draws.
+
+    ``before`` and ``after``: velocity error (m/s) of free integration over :data:`FREE_S` with
+    the parameters in force and with the estimate; ``innovation``: length of the filter's velocity
+    residual (m/s), which the certificate bounds; both of the flight whose states are kept.
+    """
+
+    course: Course
+    before: Curve
+    after: Curve
+    innovation: Curve
+    seen: Observability | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """One run of the boot clock: its first and last inertial sample, and where it is drawn."""
+
+    first: float
+    last: float
+    drawn: float
+
+    def time(self, t: Array) -> Array:
+        shown: Array = t - self.first + self.drawn
+        return shown
+
+
+class Chronicle:
+    """A calibrator that is watched: samples go through it."""
+
+    def __init__(self, calibrator: Calibrator) -> None:
+        self.calibrator = calibrator
+        self._pieces: list[_Piece] = []
+        self._piece: _Piece | None = None
+        self._engines: dict[int, Engine] = {}
+        self._held: dict[int, list[tuple[float, Array]]] = {}
+        self._spans: list[Span] = []
+        self._speed: list[tuple[float, float]] = []
+
+    # What goes by
+
+    def feed(self, sample: Sample) -> tuple[Event, ...]:
+        """Pass a sample on, and note what came of it."""
+        events = self.calibrator.feed(sample)
+        if any(isinstance(event, Restarted) for event in events):
+            self._begin_anew()
+        if isinstance(sample, ImuSample):
+            self._tick(sample.t)
+        elif isinstance(sample, GpsFix):
+            self._fix(sample)
+        elif isinstance(sample, ParameterValue) and sample.name in OF_ACCELEROMETER:
+            self._hold(OF_ACCELEROMETER[sample.name])
+        return events
+
+    def restart(self) -> tuple[Event, ...]:
+        """Another recording of the same vehicle begins."""
+        events = self.calibrator.restart()
+        self._begin_anew()
+        return events
+
+    def finish(self) -> tuple[Event, ...]:
+        """There are no more recordings."""
+        events = self.calibrator.finish()
+        self._begin_anew()
+        return events
+
+    def take(self, imu: int, engine: Engine) -> None:
+        """The engine whose sums gave the answer for one accelerometer."""
+        self._engines[imu] = engine
+
+    # What a report asks
+
+    @property
+    def duration_s(self) -> float:
+        """Where the drawn time ends, s."""
+        return max((p.drawn + p.last - p.first for p in self._pieces), default=0.0)
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """Trust over time; neighbours differ in their reason."""
+        return tuple(self._spans)
+
+    @property
+    def speed(self) -> Curve:
+        """Speed over ground that GPS reported, m/s."""
+        return Curve(np.array([t for t, _ in self._speed]), np.array([v for _, v in self._speed]))
+
+    def figures(self, imu: int) -> Figures:
+        """The figures of one accelerometer; empty curves where nothing was learned."""
+        engine = self._engines.get(imu)
+        if engine is None or engine.solution() is None:
+            nothing = Curve(np.zeros(0), np.zeros(0))
+            course = Course(np.zeros(0), *(np.zeros((0, 6)) for _ in range(4)))
+            return Figures(course, nothing, nothing, nothing, None)
+        before, after = self._free(imu, engine)
+        return Figures(
+            self._course(imu, engine),
+            before,
+            after,
+            self._innovation(engine),
+            self._observability(engine),
+        )
+
+    # How
+
+    def _tick(self, t: float) -> None:
+        if self._piece is None:
+            drawn = self.duration_s + PAUSE_S if self._pieces else 0.0
+            self._piece = _Piece(t, t, drawn)
+        elif t > self._piece.last:
+            self._piece = _Piece(self._piece.first, t, self._piece.drawn)
+
+    def _begin_anew(self) -> None:
+        if self._piece is not None:
+            self._pieces.append(self._piece)
+        self._piece = None
+
+    def _hold(self, imu: int) -> None:
+        """One of the six was reported: what is in force from now on."""
+        now = 0.0 if self._piece is None else self._shown(self._piece.last)
+        six = self.calibrator.parameters.six(imu)
+        self._held.setdefault(imu, []).append((now, np.array([*six.scale, *six.offset])))
+
+    def _shown(self, t: float) -> float:
+        piece = self._piece
+        return 0.0 if piece is None else t - piece.first + piece.drawn
+
+    def _fix(self, fix: GpsFix) -> None:
+        """Trust goes in spans from fix to fix; a gap in the fixes shows as its reason."""
+        trust = self.calibrator.trust
+        if self._piece is None or fix.receiver != trust.receiver:
+            return
+        now = self._shown(min(fix.t, self._piece.last + 1.0))
+        if now < 0.0:
+            return
+        reason = "" if trust.is_open else (trust.reason.value if trust.reason else "waiting")
+        last = self._spans[-1] if self._spans else Span(0.0, 0.0, reason)
+        if now < last.end:
+            return
+        if last.reason == reason and self._spans:
+            self._spans[-1] = Span(last.start, now, reason)
+        else:
+            self._spans.append(Span(last.end, now, reason))
+        if not self._speed or now - self._speed[-1][0] >= SPEED_S:
+            self._speed.append((now, float(np.hypot(fix.v_n, fix.v_e))))
+
+    def _course(self, imu: int, engine: Engine) -> Course:
+        """Solutions of the sums up to some of the portions, the last of all of them."""
+        portions = engine.all_portions
+        times = [
+            math.nan if piece is None else float(piece.time(np.array(p.end)))
+            for p, piece in zip(portions, self._places([p.start for p in portions]), strict=True)
+        ]
+        last = len(portions) - 1
+        rows = []
+        for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
+            solution = engine.solution() if i == last else None
+            solution = solution or solve(portions[: i + 1], engine.model)
+            scale = solution.theta[:3]
+            seen = assess(six_information(solution), engine.settings.needs)
+            rows.append(
+                (
+                    np.array([times[i]]),
+                    np.concatenate([scale, -solution.theta[3:6] / scale]),
+                    np.sqrt(np.diag(six_covariance(solution))),
+                    self._in_force(imu, times[i]),
+                    np.array(seen.coverage.per_parameter),
+                )
+            )
+        t, *six = (np.array(column) for column in zip(*rows, strict=True))
+        return Course(t[:, 0], *six)
+
+    def _observability(self, engine: Engine) -> Observability | None:
+        solution = engine.solution()
+        if solution is None:
+            return None
+        return assess(six_information(solution), engine.settings.needs, self.calibrator.kind)
+
+    def _in_force(self, imu: int, t: float) -> Array:
+        """(6,) what the autopilot used then; what was first reported, before that."""
+        held = self._held.get(imu)
+        if not held:
+            return np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        return next((six for since, six in reversed(held) if since <= t), held[0][1])
+
+    def _free(self, imu: int, engine: Engine) -> tuple[Curve, Curve]:
+        solution = engine.solution()
+        if solution is None:
+            raise KeyError(imu)
+        held = self.calibrator.parameters.six(imu)
+        scale = np.array(held.scale)
+        sixes = (np.concatenate([scale, -scale * np.array(held.offset)]), solution.theta[:6])
+        chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
+        states = list(engine.states)
+        known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}
+        times, errors = [np.zeros(0)], [np.zeros((2, 0))]
+        for piece, run in self._runs(chain, [x.start for x in chain]):
+            if of_run := known.get(id(piece)):
+                got = free_errors(run, of_run, sixes, horizon_s=FREE_S)
+                times.append(piece.time(got.t))
+                errors.append(got.error)
+        t, both = np.concatenate(times), np.concatenate(errors, axis=1)
+        return Curve(t, both[0]), Curve(t, both[1])
+
+    def _innovation(self, engine: Engine) -> Curve:
+        states = list(engine.states)
+        times, lengths = [np.zeros(0)], [np.zeros(0)]
+        for piece, run in self._runs(states, [s.t for s in states]):
+            times.append(piece.time(np.array([s.t for s in run])))
+            residual = np.nan_to_num(np.array([s.innovation for s in run]))
+            lengths.append(np.linalg.norm(residual, axis=1))
+        return Curve(np.concatenate(times), np.concatenate(lengths))
+
+    def _runs(self, items: list[Item], times: list[float]) -> list[tuple[_Piece, list[Item]]]:
+        """What is of one run of the clock each, by its times in order."""
+        pairs = zip(self._places(times), items, strict=True)
+        grouped = itertools.groupby(pairs, key=lambda pair: pair[0])
+        return [(piece, [x for _, x in group]) for piece, group in grouped if piece is not None]
+
+    def _places(self, times: list[float]) -> list[_Piece | None]:
+        """The run of the clock that each of these times is of, the latest possible, in order."""
+        left = list(self._pieces)
+        placed: list[_Piece | None] = []
+        piece, later = left.pop() if left else None, math.inf
+        for t in reversed(times):
+            if t > later:
+                piece = left.pop() if left else None
+            while piece is not None and not piece.first - CLOCK_MARGIN_S <= t <= (
+                piece.last + CLOCK_MARGIN_S
+            ):
+                piece = left.pop() if left else None
+            placed.append(piece)
+            later = t
+        return placed[::-1]

@@ -1,0 +1,93 @@
+"""Recordings through the diagnosis: read as for a replay, then asked what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from onboard.answers.advice import Advice, advise
+from onboard.answers.answer import Answer
+from onboard.answers.explain_document import ExplainDocument, explain_document
+from onboard.answers.recorded import Recorded, unanswered
+from onboard.answers.replay import Reading, read
+from onboard.core.diagnosis.records import Diagnosis
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """An answer with its diagnosis, and what it was made from."""
+
+    answer: Answer
+    source: Reading
+    parameters: Mapping[str, float]
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What was found; its calibration is the answer's."""
+        return self.answer.diagnosis
+
+    @property
+    def imu(self) -> int:
+        """Which accelerometer."""
+        return self.answer.imu
+
+    @property
+    def advice(self) -> Advice | None:
+        """What to set; None for another autopilot than ArduPilot."""
+        if self.source.autopilot != "ardupilot":
+            return None
+        return advise((self.answer,), self.parameters)[0]
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the recordings."""
+        return [r.path.name for r in self.source.recordings]
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all recordings, s."""
+        return self.source.duration_s
+
+    def document(self) -> ExplainDocument:
+        """``onboard.explain/1``."""
+        return explain_document(
+            self.diagnosis,
+            files=self.files,
+            autopilot=self.source.autopilot,
+            duration_s=self.duration_s,
+            samples={
+                "imu": self.source.vehicle.counts.get(f"imu {self.imu}", 0),
+                "gps": self.source.vehicle.counts.get("gps", 0),
+            },
+            advice=self.advice,
+        )
+
+
+def explain(
+    paths: Sequence[str | Path],
+    *,
+    imu: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Explanation:
+    """Read recordings of one vehicle and diagnose one accelerometer.
+
+    Args:
+        paths: at least one recording.
+        imu: which accelerometer; the first that can be diagnosed if None.
+        progress: told the share of the reading that is done.
+
+    Raises:
+        RecordingError: a file that cannot be used.
+        UsageError: there is no such accelerometer.
+    """
+    recorded = Recorded((imu or 1,))
+    source = read(paths, recorded, imu=imu, progress=progress)
+    if imu is None and 1 not in recorded.imus:
+        recorded = Recorded()
+        source = read(paths, recorded, progress=progress)
+    if imu is None:
+        imu = min(recorded.imus or source.vehicle.imus, default=1)
+    known = imu in recorded.imus
+    given = recorded.answer(imu) if known else unanswered(source.vehicle.unanswered(imu))
+    return Explanation(given, source, recorded.parameters)

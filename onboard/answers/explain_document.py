@@ -1,0 +1,268 @@
+"""``onboard.explain/1``: the diagnosis as other programs read it.
+
+Every number is finite; what is not known is ``null``.  Times are seconds since the first inertial
+sample, names are the controlled vocabulary of effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from onboard.answers.advice import Advice
+from onboard.answers.document import (
+    AdviceDocument,
+    CalibrationDocument,
+    Number,
+    advice_document,
+    calibration_document,
+    finite,
+    timing_document,
+)
+from onboard.answers.verdict import unused_in_words
+from onboard.answers.words import DISTRUST
+from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.physics.finding import Effect, Where
+from onboard.push.physics import headline, severity_of_effect
+
+EXPLAIN_SCHEMA = "onboard.explain/1"
+
+
+class UnknownDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One unknown of an effect."""
+
+    value: float | None
+    sigma: float | None
+    unit: str
+
+
+class WhereDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a mismatch lives."""
+
+    start_s: float | None
+    end_s: float | None
+    axis: str
+    regime: str
+    share: float | None
+
+
+class RivalDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """An effect that could stand in, and by how much it does worse."""
+
+    name: str
+    delta_bic: float | None
+
+
+class EffectDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One accepted effect; ``severity`` ``info``: every calibration has it, else ``warning``."""
+
+    name: str
+    severity: str
+    unknowns: dict[str, UnknownDocument]
+    share_of_mismatch: float | None
+    delta_bic: float | None
+    held_out_whitened_rms_before: float | None
+    held_out_whitened_rms_after: float | None
+    parameters: dict[str, float]
+    cure: str
+    where: list[WhereDocument]
+    rivals: list[RivalDocument]
+    intervals: list[list[float]]
+    formula: str = ""
+    held_out_velocity_rms_before_m_s: float | None = None
+    held_out_velocity_rms_after_m_s: float | None = None
+
+
+class MismatchDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Residual before (six numbers only) and after (everything that was found)."""
+
+    detected: bool
+    whitened_rms_before: float | None
+    whitened_rms_after: float | None
+    p_value: float | None
+    velocity_rms_before_m_s: float | None
+    velocity_rms_after_m_s: float | None
+    held_out_whitened_rms_before: float | None
+    held_out_whitened_rms_after: float | None
+    held_out_velocity_rms_before_m_s: float | None
+    held_out_velocity_rms_after_m_s: float | None
+    where: list[WhereDocument]
+    fixes: int
+    fixes_believed: int
+
+
+class AmbiguityDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Effects that this flight cannot tell apart."""
+
+    names: list[str]
+    tell_apart: str
+
+
+class NotTestableDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """An effect that this recording cannot speak about."""
+
+    name: str
+    why: str
+
+
+class UnusedDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Flight whose fixes were not used."""
+
+    start_s: float | None
+    end_s: float | None
+    reason: str
+    why: str
+    contradicted: bool | None
+
+
+class RungDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One step of the ladder of models."""
+
+    name: str
+    whitened_rms: float | None
+    held_out_whitened_rms: float | None
+    velocity_rms_m_s: float | None
+    held_out_velocity_rms_m_s: float | None
+
+
+class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
+    """What was read."""
+
+    files: list[str]
+    autopilot: str
+    duration_s: float | None
+    imu: int
+    samples: dict[str, int]
+
+
+class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """``onboard explain --json``.
+
+    ``headline`` is the verdict as a sentence; ``severity`` is ``good``, ``info``, ``warning`` or
+    ``error``.
+    """
+
+    recording: ExplainedRecording
+    calibration: CalibrationDocument
+    timing: dict[str, Number]
+    verdict: str
+    headline: str
+    severity: str
+    note: str
+    mismatch: MismatchDocument
+    effects: list[EffectDocument]
+    ambiguous: list[AmbiguityDocument]
+    not_testable: list[NotTestableDocument]
+    ladder: list[RungDocument]
+    unused: list[UnusedDocument]
+    advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
+    schema: str = EXPLAIN_SCHEMA
+
+    def to_json(self) -> bytes:
+        """Indented, ends with a line feed."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=2) + b"\n"
+
+
+def explain_document(
+    diagnosis: Diagnosis,
+    *,
+    files: Sequence[str],
+    autopilot: str,
+    duration_s: float,
+    samples: dict[str, int],
+    advice: Advice | None = None,
+) -> ExplainDocument:
+    """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
+    m = diagnosis.mismatch
+    sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
+    return ExplainDocument(
+        recording=ExplainedRecording(
+            files=list(files),
+            autopilot=autopilot,
+            duration_s=finite(duration_s),
+            imu=diagnosis.imu,
+            samples=samples,
+        ),
+        calibration=calibration_document(diagnosis.calibration, autopilot),
+        timing=timing_document(diagnosis.timing),
+        verdict=diagnosis.verdict.value,
+        headline=sentence,
+        severity=severity,
+        note=" ".join(x for x in (diagnosis.note, *unused_in_words(diagnosis)) if x),
+        mismatch=MismatchDocument(
+            detected=m.detected,
+            whitened_rms_before=finite(m.whitened_rms_before),
+            whitened_rms_after=finite(m.whitened_rms_after),
+            p_value=finite(m.p_value),
+            velocity_rms_before_m_s=finite(m.velocity_rms_before),
+            velocity_rms_after_m_s=finite(m.velocity_rms_after),
+            held_out_whitened_rms_before=finite(m.held_out_before),
+            held_out_whitened_rms_after=finite(m.held_out_after),
+            held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
+            held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
+            where=[_where(w) for w in m.where],
+            fixes=m.fixes,
+            fixes_believed=m.believed,
+        ),
+        effects=[_effect(e, autopilot) for e in diagnosis.effects],
+        ambiguous=[
+            AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart)
+            for a in diagnosis.ambiguous
+        ],
+        not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in diagnosis.not_testable],
+        ladder=[
+            RungDocument(
+                name=r.name,
+                whitened_rms=finite(r.whitened_rms),
+                held_out_whitened_rms=finite(r.held_out),
+                velocity_rms_m_s=finite(r.velocity_rms),
+                held_out_velocity_rms_m_s=finite(r.held_out_velocity),
+            )
+            for r in diagnosis.ladder
+        ],
+        unused=[
+            UnusedDocument(
+                start_s=finite(u.start_s),
+                end_s=finite(u.end_s),
+                reason=u.reason,
+                why=DISTRUST.get(u.reason, u.reason),
+                contradicted=u.contradicted,
+            )
+            for u in diagnosis.unused
+        ],
+        advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
+    )
+
+
+def _effect(e: Effect, autopilot: str) -> EffectDocument:
+    return EffectDocument(
+        name=e.name,
+        severity=severity_of_effect(e.name),
+        unknowns={
+            name: UnknownDocument(value=finite(q.value), sigma=finite(q.sigma), unit=q.unit)
+            for name, q in e.unknowns.items()
+        },
+        share_of_mismatch=finite(e.share_of_mismatch),
+        delta_bic=finite(e.delta_bic),
+        held_out_whitened_rms_before=finite(e.held_out_before),
+        held_out_whitened_rms_after=finite(e.held_out_after),
+        parameters=dict(e.parameters) if autopilot == "ardupilot" else {},
+        cure=e.cure,
+        where=[_where(w) for w in e.where],
+        rivals=[RivalDocument(name=r.name, delta_bic=finite(r.delta_bic)) for r in e.rivals],
+        intervals=[[float(a), float(b)] for a, b in e.intervals],
+        formula=e.formula,
+        held_out_velocity_rms_before_m_s=finite(e.held_out_velocity_before),
+        held_out_velocity_rms_after_m_s=finite(e.held_out_velocity_after),
+    )
+
+
+def _where(w: Where) -> WhereDocument:
+    return WhereDocument(
+        start_s=finite(w.start_s),
+        end_s=finite(w.end_s),
+        axis=w.axis,
+        regime=w.regime,
+        share=finite(w.share),
+    )

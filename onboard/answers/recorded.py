@@ -1,0 +1,140 @@
+"""Recordings of one vehicle as one flight that is asked once: behind replay, explain and fleet.
+
+What is read is only kept and cut into segments; timing and noise are the diagnosis' own, and
+estimating them while reading would be done twice.  A recording follows on the one before: what
+happened at a time happened in one of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.answers.answer import Answer, judged
+from onboard.answers.chronicle import Chronicle
+from onboard.core.diagnosis.procedure import examine
+from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.inputs.samples import Sample
+
+PAUSE_S = 10.0
+"""Between two recordings."""
+NO_FLIGHT = "no stretch of flight with trusted GPS and inertial data"
+KEEPING_ALL = EstimatorSettings(refine=False, buffer_s=math.inf)
+
+
+class Recorded:
+    """An estimator for :func:`onboard.answers.replay.replay` whose calibrations are answers."""
+
+    def __init__(self, wanted: Collection[int] = (), *, watched: bool = False) -> None:
+        """Take what to read.
+
+        Args:
+            wanted: accelerometers to ask about (none named: all); each costs as much as another.
+            watched: keep what a report draws.
+        """
+        self.calibrator = Calibrator(KEEPING_ALL, only=wanted)
+        self.chronicle = Chronicle(self.calibrator) if watched else None
+        self._reader = self.chronicle or self.calibrator
+        self._answers: dict[int, Answer] = {}
+        self._shift, self._newest, self._begins = 0.0, -math.inf, False
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers that can be asked about."""
+        return self.calibrator.imus
+
+    @property
+    def standing_s(self) -> float:
+        """Time on the ground, which teaches nothing, s."""
+        return self.calibrator.standing_s
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The autopilot's parameters as they were reported last, by name."""
+        return self.calibrator.parameters.values
+
+    def restart(self) -> object:
+        """Another recording of the same vehicle begins."""
+        self._begins = math.isfinite(self._newest)
+        return self._reader.restart()
+
+    def feed(self, sample: Sample) -> object:
+        """Take a sample."""
+        t = sample.t
+        if t is not None and math.isfinite(t):
+            if self._begins:
+                self._shift, self._begins = self._newest + PAUSE_S - t, False
+            if self._shift:
+                sample = replace(sample, t=t + self._shift)
+            self._newest = max(self._newest, t + self._shift)
+        return self._reader.feed(sample)
+
+    def finish(self) -> object:
+        """There are no more recordings."""
+        return self._reader.finish()
+
+    def calibration(self, imu: int) -> Calibration:
+        """The answer's calibration."""
+        return self.answer(imu).calibration
+
+    def answer(self, imu: int) -> Answer:
+        """What the recordings say of one accelerometer; worked out once.
+
+        Raises:
+            KeyError: that accelerometer has not been seen.
+        """
+        if imu not in self._answers:
+            self._answers[imu] = self._asked(imu)
+        return self._answers[imu]
+
+    def _asked(self, imu: int) -> Answer:
+        plain = self.calibrator.calibration(imu)
+        try:
+            found = examine(self.calibrator, imu)
+            given = judged(found.diagnosis())
+        except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
+            why = f"the flight could not be diagnosed ({error})"
+            note = f"{why}. {plain.note}".rstrip()
+            return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+        if self.chronicle is not None:
+            self.chronicle.take(imu, found.engine)
+        return given
+
+
+def unanswered(calibration: Calibration, why: str = NO_FLIGHT) -> Answer:
+    """The answer where there is no diagnosis: of a recording without a usable stretch of flight."""
+    nan = float("nan")
+    empty = np.zeros((0, 3))
+    return Answer(
+        Diagnosis(
+            imu=calibration.imu,
+            verdict=Verdict.INSUFFICIENT,
+            calibration=calibration,
+            timing=calibration.timing,
+            mismatch=Mismatch(
+                detected=False,
+                whitened_rms_before=nan,
+                whitened_rms_after=nan,
+                p_value=1.0,
+                velocity_rms_before=nan,
+                velocity_rms_after=nan,
+                held_out_before=nan,
+                held_out_after=nan,
+            ),
+            effects=(),
+            ambiguous=(),
+            not_testable=(NotTestable("everything", why),),
+            ladder=(),
+            regimes=(),
+            series=Series(np.zeros(0), empty, empty, np.zeros(0, dtype=bool)),
+            note=calibration.note
+            if calibration.note.startswith(why)
+            else f"{why}. {calibration.note}",
+        )
+    )

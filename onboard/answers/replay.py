@@ -1,0 +1,329 @@
+"""Recordings of one vehicle through the core, and what they gave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from onboard.answers.advice import Advice, advise
+from onboard.answers.answer import Answer
+from onboard.answers.document import (
+    RecordingDocument,
+    ReplayDocument,
+    advice_document,
+    imu_document,
+)
+from onboard.answers.recorded import unanswered
+from onboard.core.estimate.result import Calibration, Coverage, Status
+from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.core.maths.arrays import Vector3
+from onboard.errors import RecordingError, UsageError
+from onboard.recordings.opening import open_recording
+from onboard.recordings.recording import Recording
+
+Progress = Callable[[float], None]
+"""Told the share of the work that is done, 0 ... 1, now and then."""
+
+PROGRESS_EVERY = 1024
+DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
+
+
+class Reader(Protocol):
+    """What is fed with recordings (:class:`onboard.core.estimate.calibrator.Calibrator` can be)."""
+
+    def feed(self, sample: Sample) -> object:
+        """Take a sample."""
+
+    def restart(self) -> object:
+        """Another recording of the same vehicle begins: states are forgotten, sums stay."""
+
+    def finish(self) -> object:
+        """Process what is pending: there are no more recordings."""
+
+    @property
+    def standing_s(self) -> float:
+        """Time on the ground, which teaches nothing, s."""
+
+
+class Estimator(Reader, Protocol):
+    """What replay needs of :class:`onboard.answers.recorded.Recorded`."""
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers seen."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The autopilot's parameters as they were reported last, by name."""
+
+    def answer(self, imu: int) -> Answer:
+        """The answer for one of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Recordings that were read; ``vehicle`` knows what was in them."""
+
+    recordings: tuple[Recording, ...]
+    vehicle: Vehicle
+
+    @property
+    def autopilot(self) -> str:
+        """The kind of autopilot that all of them come from."""
+        return self.recordings[0].autopilot
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all recordings together, s."""
+        return sum(recording.duration_s for recording in self.recordings)
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """Recordings and what they gave.
+
+    ``counts`` are samples fed, ``imu <n>`` and ``gps``; ``notes`` says what is left out;
+    ``parameters`` are the autopilot's as they were reported last.
+    """
+
+    recordings: tuple[Recording, ...]
+    answers: tuple[Answer, ...]
+    counts: dict[str, int]
+    notes: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        """The calibration of each answer."""
+        return tuple(answer.calibration for answer in self.answers)
+
+    @property
+    def advice(self) -> tuple[Advice | None, ...]:
+        """What to set of each answer; None for another autopilot than ArduPilot."""
+        if self.autopilot != "ardupilot":
+            return (None,) * len(self.answers)
+        return advise(self.answers, self.parameters)
+
+    @property
+    def autopilot(self) -> str:
+        """The kind of autopilot that all of them come from."""
+        return self.recordings[0].autopilot
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all recordings together, s."""
+        return sum(recording.duration_s for recording in self.recordings)
+
+    def document(self) -> ReplayDocument:
+        """The result as other programs read it."""
+        return ReplayDocument(
+            recording=RecordingDocument(
+                files=[str(recording.path) for recording in self.recordings],
+                autopilot=self.autopilot,
+                duration_s=self.duration_s,
+                samples=self.counts,
+                damage=[f"{r.path.name}: {note}" for r in self.recordings for note in r.damage],
+                notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes]
+                + list(self.notes),
+            ),
+            imus=[
+                imu_document(c, self.autopilot, advice=advice_document(advice))
+                for c, advice in zip(self.calibrations, self.advice, strict=True)
+            ],
+        )
+
+
+def replay(
+    paths: Sequence[str | Path],
+    estimator: Estimator,
+    *,
+    imu: int | None = None,
+    progress: Progress | None = None,
+) -> Replay:
+    """Feed files to one estimator and ask it.
+
+    Args:
+        paths: at least one recording, all of the same vehicle.
+        estimator: a fresh one; restarted between files, finished after the last.
+        imu: answer for this accelerometer only.
+        progress: called every few thousand samples.
+
+    Raises:
+        RecordingError: a file that cannot be used, or one of another vehicle.
+        UsageError: there is no such accelerometer in the recordings.
+    """
+    source = read(paths, estimator, imu=imu, progress=progress)
+    vehicle, answered = source.vehicle, estimator.imus
+    # A stream too slow to calibrate from is not worth a table, unless asked for or alone.
+    wanted = (imu,) if imu is not None else answered or vehicle.imus
+    answers = tuple(
+        estimator.answer(n) if n in answered else unanswered(vehicle.unanswered(n)) for n in wanted
+    )
+    quiet = () if imu is not None else sorted({*vehicle.imus} - {*wanted})
+    notes = tuple(map(vehicle.silence, quiet))
+    return Replay(source.recordings, answers, vehicle.counts, notes, estimator.parameters)
+
+
+def read(
+    paths: Sequence[str | Path],
+    reader: Reader,
+    *,
+    imu: int | None = None,
+    progress: Progress | None = None,
+) -> Reading:
+    """Feed files, one after the other, to one reader: its sums add up over the flights.
+
+    Args:
+        paths: at least one recording, all of the same vehicle.
+        reader: a fresh one; restarted between files, finished after the last.
+        imu: an accelerometer that must be there.
+        progress: called every few thousand samples.
+
+    Raises:
+        RecordingError: a file that cannot be used, or one of another vehicle.
+        UsageError: there is no such accelerometer in the recordings.
+    """
+    if not paths:
+        raise UsageError("no recording given")
+    recordings = tuple(open_recording(path) for path in paths)
+    _refuse_repetition(recordings)
+    _refuse_mixture(recordings)
+    total = sum(sum(recording.counts.values()) for recording in recordings)
+    vehicle = Vehicle()
+    fed = 0
+    for recording in recordings:
+        if recording is not recordings[0]:
+            reader.restart()
+        for sample in recording.samples():
+            vehicle.check(sample, recording)
+            reader.feed(sample)
+            fed += 1
+            if progress is not None and fed % PROGRESS_EVERY == 0:
+                progress(min(1.0, fed / total))
+    reader.finish()
+    vehicle.standing_s = reader.standing_s
+    if progress is not None:
+        progress(1.0)
+    if imu is not None and imu not in vehicle.imus:
+        there = ", ".join(map(str, vehicle.imus))
+        raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
+    return Reading(recordings, vehicle)
+
+
+def _refuse_repetition(recordings: Sequence[Recording]) -> None:
+    """A flight counted twice would be believed too much."""
+    seen: set[Path] = set()
+    for recording in recordings:
+        place = recording.path.resolve()
+        if place in seen:
+            raise UsageError(f"{recording.path}: given twice")
+        seen.add(place)
+
+
+def _refuse_mixture(recordings: Sequence[Recording]) -> None:
+    first = recordings[0]
+    for other in recordings[1:]:
+        if other.autopilot != first.autopilot:
+            raise RecordingError(
+                f"{other.path}: of another vehicle than {first.path} "
+                f"(autopilot {other.autopilot}, there {first.autopilot})"
+            )
+
+
+class Vehicle:
+    """Counts the samples and sees to it that the accelerometers stay the same ones."""
+
+    def __init__(self) -> None:
+        self.counts: dict[str, int] = {}
+        self.standing_s = 0.0
+        """Time on the ground, s."""
+        self._parameters: dict[str, float] = {}
+        self._device: dict[int, tuple[np.float32, Recording]] = {}
+
+    def check(self, sample: Sample, recording: Recording) -> None:
+        """Take a sample.
+
+        Raises:
+            RecordingError: it is of another vehicle.
+        """
+        if isinstance(sample, ImuSample):
+            self._count(f"imu {sample.imu}")
+        elif isinstance(sample, GpsFix):
+            self._count("gps")
+        elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
+            self._parameters[sample.name] = sample.value
+            if sample.name in DEVICE_IDS and sample.value:
+                self._check_device(sample, recording)
+
+    def _check_device(self, sample: ParameterValue, recording: Recording) -> None:
+        imu = DEVICE_IDS[sample.name]
+        # Logs and telemetry carry identifiers as single-precision numbers.
+        device = np.float32(sample.value)
+        known, where = self._device.setdefault(imu, (device, recording))
+        if known != device and where is not recording:
+            raise RecordingError(
+                f"{recording.path}: of another vehicle than {where.path} "
+                f"({sample.name} is {device:.0f}, there {known:.0f})"
+            )
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers that sent samples."""
+        return tuple(sorted(int(name[4:]) for name in self.counts if name.startswith("imu ")))
+
+    def silence(self, imu: int) -> str:
+        """Why an accelerometer has no answer."""
+        samples = f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples"
+        if self.standing_s > 0.0:
+            return (
+                f"{samples}, none of them in the air with trusted GPS: {self.standing_s:.0f} s of "
+                "standing teach nothing"
+            )
+        return f"{samples}, never at 10 a second or more together with attitude and trusted GPS"
+
+    def unanswered(self, imu: int) -> Calibration:
+        """What to say of an accelerometer of which the estimator could make nothing."""
+        names = parameter_names(imu)
+        scale, offset = self._three(names.scale, 1.0), self._three(names.offset, 0.0)
+        unknown = float("nan")
+        return Calibration(
+            imu=imu,
+            status=Status.INSUFFICIENT,
+            scale=scale,
+            offset=offset,
+            scale_sigma=(unknown,) * 3,
+            offset_sigma=(unknown,) * 3,
+            covariance=((unknown,) * 6,) * 6,
+            observable=(False,) * 6,
+            note=self.silence(imu),
+            in_force_scale=scale,
+            in_force_offset=offset,
+            parameters_known=all(name in self._parameters for name in names.six),
+            timing={},
+            trusted_s=0.0,
+            rejected={},
+            whitened_rms_before=unknown,
+            whitened_rms_after=unknown,
+            held_out_before=unknown,
+            held_out_after=unknown,
+            velocity_rms_before=unknown,
+            velocity_rms_after=unknown,
+            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do()),
+        )
+
+    def _to_do(self) -> str:
+        if self.standing_s > 0.0:
+            return "fly: fast, with hard braking and turns both ways"
+        return "record it at 25 Hz or more, with attitude and GPS"
+
+    def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
+        x, y, z = (self._parameters.get(name, default) for name in names)
+        return x, y, z
+
+    def _count(self, name: str) -> None:
+        self.counts[name] = self.counts.get(name, 0) + 1

@@ -1,0 +1,247 @@
+"""The verdict of a diagnosis in words: for the top of the page, and for terminals."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from onboard.answers.advice import Advice, cure_parameters
+from onboard.answers.sizes import size_in_words
+from onboard.answers.words import (
+    DISTRUST,
+    capital,
+    effect_title,
+    fixed,
+    number,
+    setting,
+    signed,
+)
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.physics.finding import Effect
+from onboard.push import physics
+
+COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
+"""For terminals, by severity."""
+EXCLUDED = ("gps_fault", "saturation")
+"""Effects that are seen in the data themselves, which are then left out of the fit."""
+MOST_NAMED = 2
+NOISE = 1.3
+"""Held-out residual, in units of the noise, up to which it may be called noise."""
+MOST_SPANS = 3
+WHERE_BELIEVED = " where GPS was believed"
+SAID_ABOVE = (
+    "Only",
+    "Too little excitation",
+    "What was found does not explain",
+    "The residual is not noise",
+    "A formula of measured signals",
+)
+"""Sentences of the note that repeat the verdict."""
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The verdict as one short sentence."""
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return "This flight cannot tell"
+    if diagnosis.verdict is Verdict.CLEAN:
+        return "Nothing is missing" + (WHERE_BELIEVED if diagnosis.unused else "")
+    named = [e for e in diagnosis.effects if e.name != "empirical"]
+    if not named:
+        return "Something is missing, and nothing known explains it"
+    titles = [effect_title(e.name) for e in named[:MOST_NAMED]]
+    # A name that begins with capitals keeps them in the middle of a sentence.
+    found = [t if t[:2].isupper() or not k else t[:1].lower() + t[1:] for k, t in enumerate(titles)]
+    more = len(named) - len(titles)
+    if diagnosis.verdict is not Verdict.EXPLAINED:
+        found.append("something else is missing" if not more else "more is missing")
+    elif more:
+        found.append("one more effect" if more == 1 else f"{more} more effects")
+    return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
+
+
+def severity(diagnosis: Diagnosis) -> str:
+    """``good``, ``info``, ``warning`` or ``error``."""
+    return physics.headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])[1]
+
+
+def missing(diagnosis: Diagnosis) -> list[str]:
+    """What is missing, with sizes: one sentence for each effect."""
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        m = diagnosis.mismatch
+        if not m.supported:
+            fit = f"Only {m.fixes} of {m.believed} GPS fixes fit one model of this flight"
+            return [f"{fit}: of more than half that do not, nothing tells which are false."]
+        return ["There is too little motion with trusted GPS to say what is missing."]
+    said = [sized(e) + "." for e in diagnosis.effects]
+    if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
+        more = "what is left is more than noise"
+        if diagnosis.mismatch.held_out_after <= NOISE:
+            more = "parts of this flight still contradict each other"
+        said.append(f"That is not all: {more}.")
+    if said:
+        return said
+    if diagnosis.verdict is Verdict.CLEAN:
+        where = WHERE_BELIEVED if diagnosis.unused else ""
+        return [f"Scale, offset and timing explain this flight down to the noise{where}."]
+    return ["The residual is not noise, but no effect of the catalogue fits it."]
+
+
+def sized(effect: Effect) -> str:
+    """An effect with its size: ``GPS is late by 259 ± 8 ms``."""
+    if effect.name == "empirical":
+        return f"{effect_title(effect.name)}: {effect.formula}"
+    size = size_in_words(effect)
+    if not size:
+        return effect_title(effect.name)
+    joint = " " if size.startswith(("by ", "at ", "over ", "of ")) else ": "
+    return f"{effect_title(effect.name)}{joint}{size}"
+
+
+def proof(diagnosis: Diagnosis) -> str:
+    """How sure: the residual on data that were not fitted, before and after."""
+    m = diagnosis.mismatch
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return "Not at all: no effect was accepted or ruled out."
+    before, after = m.held_out_velocity_before, m.held_out_velocity_after
+    noise = m.held_out_after
+    if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
+        return "The residual could not be judged on data not used in the fit."
+    rests = f" ({m.fixes} of {m.believed} fixes)" if m.believed else ""
+    said = f"On flight not used in the fit{rests}, velocity is off by {number(after, 2)} m/s"
+    if noise > NOISE:
+        said += f", {noise:.1f} times what noise would leave"
+    elif diagnosis.verdict in (Verdict.CLEAN, Verdict.EXPLAINED):
+        said += ", which is noise"
+    if diagnosis.verdict is not Verdict.CLEAN:
+        said += f"; it was {number(before, 2)} m/s with scale and offset only"
+        said += f" ({fall(before, after)})"
+    said += "."
+    if diagnosis.ambiguous:
+        said += " Some effects could not be told apart, see below."
+    return said
+
+
+def fall(before: float, after: float) -> str:
+    """By how much something has become less: ``−47 %``."""
+    if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
+        return "not known"
+    change = 100.0 * (after / before - 1.0)
+    return f"{signed(change, 0) if abs(change) >= 0.5 else '0'}\u00a0%"
+
+
+def cures(diagnosis: Diagnosis, advice: Advice | None = None) -> list[str]:
+    """What to do, one sentence for each effect, then what the calibration is good for.
+
+    ``advice`` says which parameters may be set; without it none is named.
+    """
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        return to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
+    out = []
+    for e in diagnosis.effects:
+        settings = "" if advice is None else _named(e, advice)
+        why = "" if advice is None or not settings else advice.against.get(e.name, "")
+        if why:
+            out.append(_sentence(e.cure, ""))
+            out.append(f"Do not set {settings} yet: {why}.")
+        elif e.cure or settings:
+            out.append(_sentence(e.cure, settings))
+    if not out:
+        out = _without_cure(diagnosis)
+    if advice is not None:
+        out.append(about_six(advice))
+    return list(dict.fromkeys(s for s in out if s))
+
+
+def about_six(advice: Advice) -> str:
+    """Whether to set the six, in a sentence."""
+    if advice.settable:
+        return "Set the calibration parameters."
+    reasons = "; ".join(advice.reasons)
+    return f"Leave the calibration parameters as they are: {reasons}."
+
+
+def _without_cure(diagnosis: Diagnosis) -> list[str]:
+    if diagnosis.effects:
+        return ["No parameter cures what was found."]
+    if diagnosis.verdict is Verdict.CLEAN:
+        return ["Nothing beyond the calibration itself."]
+    return ["Look at where the residual lives for a cause."]
+
+
+def _named(effect: Effect, advice: Advice) -> str:
+    return ", ".join(
+        f"{advice.names.get(n, n)} = {setting(v)}"
+        for n, v in cure_parameters(effect).items()
+        if math.isfinite(v)
+    )
+
+
+def _sentence(cure: str, settings: str) -> str:
+    text = capital(cure.rstrip(".")).replace("None:", "Nothing:")
+    if not settings:
+        return f"{text}." if text else ""
+    return f"{text}: {settings}." if text else f"Set {settings}."
+
+
+def to_fly(diagnosis: Diagnosis) -> list[str]:
+    """What this flight did not show, each with what to fly: sentences."""
+    return [s for s in _sentences(diagnosis.note) if ":" in s]
+
+
+def remarks(diagnosis: Diagnosis) -> list[str]:
+    """What else there is to say: the other sentences of the note, and what was not used."""
+    out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(SAID_ABOVE)]
+    return out + unused_in_words(diagnosis)
+
+
+def unused_in_words(diagnosis: Diagnosis) -> list[str]:
+    """Flight that was not used, one sentence for each reason: how long, when, why, what it was."""
+    out = []
+    for reason in dict.fromkeys(u.reason for u in diagnosis.unused):
+        mine = [u for u in diagnosis.unused if u.reason == reason]
+        whole = sum(u.end_s - u.start_s for u in mine)
+        when = [f"{u.start_s:.0f} to {u.end_s:.0f} s" for u in mine[:MOST_SPANS]]
+        more = f" and {len(mine) - len(when)} more times" if len(mine) > len(when) else ""
+        why = DISTRUST.get(reason, reason.replace("_", " "))
+        said = f"{whole:.0f} s of flight were not used ({', '.join(when)}{more}; {why})"
+        if any(u.contradicted for u in mine):
+            said += ": inertia contradicts GPS there"
+        elif any(u.contradicted is False for u in mine):
+            said += ": nothing there contradicts GPS"
+        out.append(f"{said}.")
+    return out
+
+
+def _sentences(note: str) -> list[str]:
+    parts = (p.strip() for p in re.split(r"(?<=\.)\s+", note))
+    # A calibration that points here is no news here.
+    return [capital(p) for p in parts if p and "see onboard explain" not in p]
+
+
+def strength(delta_bic: float) -> str:
+    """Words for a difference of BIC, after Kass and Raftery (1995)."""
+    if not math.isfinite(delta_bic):
+        return "evidence not known"
+    gain = -delta_bic
+    if gain > 10.0:
+        return "very strong evidence"
+    if gain > 6.0:
+        return "strong evidence"
+    if gain > 2.0:
+        return "some evidence"
+    return "weak evidence"
+
+
+def surely(effect: Effect, *, ambiguous: bool) -> str:
+    """How sure one effect is, as a sentence."""
+    if effect.name in EXCLUDED:
+        return "Seen in the measurements themselves; they were left out of the fit."
+    text = strength(effect.delta_bic).capitalize()
+    before, after = effect.held_out_velocity_before, effect.held_out_velocity_after
+    if math.isfinite(before) and math.isfinite(after) and before > 0.0:
+        change = "lowers" if after <= before else "raises"
+        text += f"; it {change} the velocity error on flight not used in the fit by "
+        text += f"{fixed(abs(100.0 * (1.0 - after / before)), 0)} %"
+    if ambiguous:
+        text += "; but this flight cannot tell it from another effect"
+    return text + "."

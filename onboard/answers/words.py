@@ -1,0 +1,146 @@
+"""Plain words and readable numbers for the controlled vocabulary of effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from onboard.core.physics.finding import Quantity
+
+UNKNOWN = "not known"
+DEGREE = math.pi / 180.0
+
+EFFECTS = {
+    "gps_latency": "GPS is late",
+    "gps_smoothing": "GPS averages its velocity",
+    "gps_lever_arm": "The GPS antenna is away from the IMU",
+    "imu_delay": "Attitude and accelerometer are not simultaneous",
+    "cross_axis": "The accelerometer's axes are not square",
+    "mount_tilt": "The accelerometer is tilted against the attitude",
+    "heading_error": "The heading is off",
+    "heading_by_throttle": "The motors pull the compass",
+    "temperature_drift": "The offset follows the temperature",
+    "bias_ramp": "The offset grows with time",
+    "bias_step": "The offset jumped",
+    "scale_nonlinearity": "The scale changes with the load",
+    "vibration_rectification": "Vibration shifts the offset",
+    "throttle_coupling": "The throttle shifts the offset",
+    "saturation": "The accelerometer hit its limit",
+    "gps_fault": "GPS velocity was false for a while",
+    "clock_skew": "The GPS and IMU clocks run at different rates",
+    "gravity": "Gravity differs from the expected value",
+    "load_flex": "The mount bends under load",
+    "rotor_drag": "The rotors drag in the wind",
+    "empirical": "An unnamed dependence on a measured signal",
+}
+
+
+TIMING = {
+    "gps_delay_s": "GPS is late by",
+    "gps_smoothing_window_s": "GPS averages over",
+    "imu_delay_s": "attitude is late by",
+}
+DISTRUST = {
+    "waiting": "nothing heard yet",
+    "spoofed": "the receiver reports spoofing",
+    "jammed": "the receiver reports jamming",
+    "no_fix": "no 3D fix",
+    "few_satellites": "too few satellites",
+    "hdop": "satellites badly spread (HDOP)",
+    "speed_accuracy": "speed too inaccurate",
+    "gps_glitch": "velocity jumped (glitch)",
+    "ekf_gps_glitch": "the autopilot reports a GPS glitch",
+    "ekf_unhealthy": "the autopilot's state estimate is not ready",
+    "stale": "no fresh GPS",
+    "gps_gap": "a gap in GPS",
+    "restarted": "the recording or the autopilot began anew",
+    "configured_end": "the configured time is over",
+    "end_of_data": "no more data",
+}
+"""Why GPS is not trusted."""
+
+
+def effect_title(name: str) -> str:
+    """The effect as a short sentence; unknown names read as words."""
+    return EFFECTS.get(name, name.replace("_", " "))
+
+
+def number(value: float, digits: int = 3) -> str:
+    """``value`` with ``digits`` significant digits; words where it is not finite."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if places < 0 and abs(value) < 1e6:
+        return f"{float(f'{value:.{digits}g}'):.0f}".replace("-", "−")
+    if places < 0 or abs(value) < 1e-4:
+        return f"{value:.{digits}g}".replace("-", "−")
+    return f"{value:.{min(places, 7)}f}".replace("-", "−")
+
+
+def fixed(value: float, places: int) -> str:
+    """``value`` with ``places`` decimals; words where it is not finite."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    rounded = round(value, places) + 0.0  # no minus before a zero
+    return f"{rounded:.{places}f}".replace("-", "−")
+
+
+def signed(value: float, places: int) -> str:
+    """``value`` with its sign and ``places`` decimals; words where it is not finite."""
+    return f"{value:+.{places}f}".replace("-", "−") if math.isfinite(value) else UNKNOWN
+
+
+def seconds(value: float, sigma: float) -> str:
+    """A time in ms with its sigma."""
+    return quantity(Quantity(value, sigma, "s")) if math.isfinite(value) else UNKNOWN
+
+
+def setting(value: float) -> str:
+    """A parameter's value as one types it; words where it is not finite."""
+    return f"{round(value, 4) + 0.0:.4g}" if math.isfinite(value) else UNKNOWN
+
+
+def percent(share: float) -> str:
+    """A share as per cent; words where it is not finite."""
+    return f"{100.0 * share:.0f} %".replace("-", "−") if math.isfinite(share) else UNKNOWN
+
+
+def with_sigma(value: float, sigma: float) -> str:
+    """``value ± sigma``, the value to the second digit of sigma."""
+    if not (math.isfinite(value) and math.isfinite(sigma)) or sigma <= 0.0:
+        return number(value)
+    places = 1 - math.floor(math.log10(sigma))
+    if not 0 <= places <= 7:
+        return f"{number(value)} ± {number(sigma, 2)}"
+    return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", "−")
+
+
+def quantity(q: Quantity) -> str:
+    """Value, sigma and unit; seconds below one in ms, angles in degrees."""
+    scale, unit = 1.0, q.unit
+    if q.unit == "s" and abs(q.value) < 1.0:
+        scale, unit = 1e3, "ms"
+    elif q.unit.startswith("rad"):
+        scale, unit = 1.0 / DEGREE, "°" + q.unit[3:]
+    text = with_sigma(q.value * scale, q.sigma * scale)
+    return f"{text} {unit_in_words(unit)}".rstrip(" -")
+
+
+def unit_in_words(unit: str) -> str:
+    """A unit with raised digits; nothing for a plain number."""
+    return "" if unit in ("1", "-") else unit.replace("^2", "²").replace("^3", "³")
+
+
+def listed(parts: Sequence[str]) -> str:
+    """``a``; ``a and b``; ``a, b and c``."""
+    *most, last = parts
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def capital(sentence: str) -> str:
+    """The sentence with a large first letter, unless that is the name of an axis."""
+    if sentence[1:2] == " ":
+        return sentence
+    return sentence[:1].upper() + sentence[1:]

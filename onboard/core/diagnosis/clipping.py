@@ -1,0 +1,115 @@
+"""Accelerometers at the rail of their range: stuck samples, or clipping that was counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.diagnosis.regimes import spans
+from onboard.core.inputs.segments import Chunk
+from onboard.core.physics.finding import Effect, Quantity
+
+RAIL_SAMPLES, RAIL_RUN = 12, 4
+FEWEST_CLIPPED = 5
+"""Clipped samples between two reports that are more than a knock."""
+LEAST_RAIL = 10.3
+"""More than any accelerometer that is at rest reads, m/s^2."""
+
+
+def saturation_effect(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+    """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
+
+    Args:
+        chunks: the flight.
+        t0: first sample, s.
+        imu: which accelerometer, from 1.
+    """
+    if not chunks:
+        return None
+    return _stuck(chunks, t0) or _counted(chunks, t0, imu)
+
+
+def _counted(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+    """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
+    names = [c.stretch.slow["clipping"] for c in chunks if "clipping" in c.stretch.slow]
+    if not names:
+        return None
+    t = np.concatenate([x[0] for x in names])
+    counts = np.concatenate([np.atleast_2d(x[1].T).T for x in names])
+    if imu > counts.shape[1]:
+        return None
+    t, first = np.unique(t, return_index=True)
+    rise = np.diff(counts[first, imu - 1])
+    hit = np.flatnonzero(rise >= FEWEST_CLIPPED)
+    if len(hit) < 2:
+        return None
+    spans_of = [(float(t[i]), float(t[i + 1])) for i in hit]
+    joined: list[tuple[float, float]] = []
+    for begin, end in spans_of:
+        if joined and begin - joined[-1][1] < 1e-3:
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((begin, end))
+    raw = np.concatenate([c.stretch.raw_s for c in chunks])
+    times = np.concatenate([c.stretch.t for c in chunks])
+    inside = np.zeros(len(times), dtype=bool)
+    for begin, end in joined:
+        inside |= (times >= begin) & (times <= end)
+    if not inside.any():
+        return None
+    tops = np.percentile(np.abs(raw[inside]), 99.9, axis=0)
+    worst = int(np.argmax(tops))
+    top = float(tops[worst])
+    return _saturation(chunks, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
+
+
+def _stuck(chunks: Sequence[Chunk], t0: float) -> Effect | None:
+    """Accelerometer samples that stay at one extreme value: the rail of its range."""
+    raw = np.concatenate([c.stretch.raw_s for c in chunks])
+    t = np.concatenate([c.stretch.t for c in chunks])
+    best: tuple[int, float, NDArray[np.bool_], int] | None = None
+    for j in range(3):
+        for sign in (1.0, -1.0):
+            x = sign * raw[:, j]
+            top = float(x.max())
+            at = x >= top - 1e-9
+            runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
+            stuck = at.sum() >= RAIL_SAMPLES and runs.max() >= RAIL_RUN and at.mean() < 0.5
+            if stuck and top > LEAST_RAIL and (best is None or at.sum() > best[0]):
+                best = (int(at.sum()), sign * top, at, j)
+    if best is None:
+        return None
+    where = t[best[2]]
+    cuts = np.flatnonzero(np.diff(where) > 2.0)
+    starts = np.concatenate([[where[0]], where[cuts + 1]])
+    ends = np.concatenate([where[cuts], [where[-1]]])
+    found = [(float(a), float(b)) for a, b in zip(starts, ends, strict=True)]
+    return _saturation(chunks, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
+
+
+def _saturation(
+    chunks: Sequence[Chunk],
+    t0: float,
+    limit: float,
+    sigma: float,
+    sensor_axis: int,
+    clipped: Sequence[tuple[float, float]],
+    share: float,
+) -> Effect:
+    """The record of a clipping accelerometer; ``clipped`` s on the boot clock."""
+    intervals = tuple((a - t0, b - t0) for a, b in clipped)
+    axis = "body_" + "xyz"[int(np.argmax(np.abs(chunks[0].stretch.R_bs[:, sensor_axis])))]
+    return Effect(
+        name="saturation",
+        unknowns={"limit": Quantity(limit, sigma, "m/s^2")},
+        share_of_mismatch=share,
+        delta_bic=0.0,
+        held_out_before=float("nan"),
+        held_out_after=float("nan"),
+        parameters={},
+        cure="damp the mount; use a sensor with a wider range",
+        where=spans(chunks, t0, intervals, axis),
+        intervals=intervals,
+    )

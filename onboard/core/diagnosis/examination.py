@@ -1,0 +1,225 @@
+"""A flight gone through once more with other physics in the model: the engine of a diagnosis.
+
+Every pass over a flight costs; a diagnosis makes few.  Noise levels are found on a sample of the
+flight, one pass gives sums and rows with everything that is suspected, another those of the model
+that was chosen, linearised about what the first one has found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.diagnosis.timing_effects import ATTITUDE_ERRORS, STANDING
+from onboard.core.estimate.engine import Engine, moved
+from onboard.core.estimate.solution import Solution, solve
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.passes import Pass, PassResult
+from onboard.core.filter.traces import EpochTrace
+from onboard.core.inputs.segments import Chunk
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.blocks import Portion
+from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.regressors import Family
+from onboard.core.physics.effect import EffectColumns
+
+SAMPLE_S = 200.0
+"""Flight on which noise levels are tried; more does not make them better known."""
+BLOCK = 4
+"""Neighbouring chunks of the sample: the filter needs ten seconds to settle in each."""
+NOISE_ROUNDS = 4
+WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
+"""Moves of delay, squared window, attitude delay and heading that are worth another pass."""
+
+
+CONSISTENT = 1.25
+"""Inflation of the variance up to which portions of a flight agree."""
+LESS_BELIEVED = 3.0
+STILL_INCONSISTENT = 0.7
+HARDLY_BELIEVED = 0.1
+AGREE = 1.5
+"""Sigmas within which two answers are the same."""
+
+
+class Examination(Engine):
+    """An engine over a flight that another one has kept, with more physics."""
+
+    def __init__(
+        self,
+        like: Engine,
+        families: Sequence[Family],
+        *,
+        t0: float,
+        chunks: Sequence[Chunk] | None = None,
+        start: Engine | None = None,
+        point: Linearisation | None = None,
+    ) -> None:
+        """Take the flight of ``like``, more families, and where to start.
+
+        Args:
+            like: has the flight and the prior.
+            families: physics to add to the calibration's own.
+            chunks: another flight than that of ``like``.
+            t0: when a clock that runs off was right, s.
+            start: an examination whose linearisation and noise are taken over.
+            point: another linearisation than that.
+        """
+        origin = start or like
+        point = replace(point or origin.point, skew_from=t0)
+        if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
+            point = replace(point, skew=0.0)
+        self.traces: list[EpochTrace] = []
+        self.doubted = any(getattr(f, "tilts_ekf", False) for f in families) and start is not None
+        if isinstance(start, Examination):
+            self.doubted = self.doubted or start.doubted
+        super().__init__(
+            replace(like.settings, refine=True),
+            like.prior,
+            point,
+            origin.noise,
+            more=tuple(families),
+        )
+        self.chunks = list(like.chunks if chunks is None else chunks)
+        self.trusted_s = sum(c.trusted_s for c in self.chunks)
+        self.left_brisk_s = like.left_brisk_s
+        self._blocks = _blocks(self.chunks)
+
+    def with_noise(self) -> Examination:
+        """Find noise and timing, then go through the whole flight."""
+        self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        return self
+
+    def tuned(self) -> Examination:
+        """Find noise and timing; no sums."""
+        self.tune(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        return self
+
+    def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
+        made = super()._new_pass(members)
+        made.keep_traces = members is None
+        self.traces = []
+        return made
+
+    def with_rows(self, theta: Array | None = None, covariance: Array | None = None) -> Examination:
+        """Go through the whole flight, keep every row; again if timing was off or gates were blind.
+
+        Args:
+            theta: (m,) estimate for the gates, of the same linearisation.
+            covariance: (m, m) of it.
+        """
+        held = None if theta is None or covariance is None else (theta, covariance)
+        blind = held is None
+        for left in (2, 1, 0):
+            self.once(held)
+            self._seed = found = solve(self.portions, self.model)
+            point = moved(self.point, self.model, found.theta)
+            settled = point.near(self.point, WORTH_A_PASS)
+            if not left or (settled and not blind):
+                break
+            self._move(point, self.noise)
+            held, blind = None, False
+        return self
+
+    def doubting_attitude(self) -> Examination:
+        """Believe the recorded attitude less while portions of the flight contradict each other.
+
+        An EKF levels with the accelerometer that is examined: what changes the accelerometer's
+        offset in flight (temperature, a jump) tilts the recorded attitude too, for as long as the
+        EKF needs to learn it, and by more than the quiet rest of the flight lets expect.  What
+        follows from an attitude that is believed too much moves when it is believed less
+        (Hausman, Econometrica 46, 1978), which ends when it moves no longer.
+        """
+        while self.found().inflation > CONSISTENT or self.doubted:
+            kept = self.noise, self.portions, self.traces, self._seed, self._solution
+            before = self.found()
+            self.noise = self.noise.scaled("attitude", LESS_BELIEVED)
+            if self.noise == kept[0]:
+                break
+            self._seed = before
+            self.once((before.theta, before.covariance))
+            after = self.found()
+            worse = after.inflation > max(CONSISTENT, STILL_INCONSISTENT * before.inflation)
+            if worse or (before.inflation <= CONSISTENT and not self._moved(before, after)):
+                self.noise, self.portions, self.traces, self._seed, self._solution = kept
+                break
+            self.doubted = True
+        return self
+
+    def doubting(self) -> Examination:
+        """The same flight and columns with an attitude that is hardly believed."""
+        made = Examination(self, self._more, t0=self.point.skew_from, start=self)
+        made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
+        made._seed = self._seed
+        made.once()
+        return made
+
+    def _moved(self, before: Solution, after: Solution) -> bool:
+        """Whether the accelerometer's unknowns are others than before, beyond their sigmas."""
+        attitude = {c for name in ATTITUDE_ERRORS for c in STANDING[name]}
+        mine = [i for i, u in enumerate(self.model.unknowns) if u.name not in attitude]
+        sigma = np.sqrt(np.diag(after.covariance))[mine]
+        return bool(np.max(np.abs(after.theta - before.theta)[mine] / sigma) > AGREE)
+
+    def once(self, held: tuple[Array, Array] | None = None) -> None:
+        """Go through the whole flight as it is linearised; ``held`` are what gates know."""
+        self._pass = self._new_pass()
+        if held is not None:
+            self._pass.hold(*held)
+        self.refused.clear()
+        self.states.clear()
+        self.portions = []
+        for chunk in self.chunks:
+            self._run(chunk)
+
+    def through(self, made: Pass, chunk: Chunk) -> PassResult:
+        """One chunk through a pass, its rows kept."""
+        result = super().through(made, chunk)
+        self.traces.extend(result.traces)
+        return result
+
+    def _over_buffer(self, made: Pass) -> list[Portion]:
+        """The sample only: noise and timing are what is asked of these passes."""
+        out = []
+        for block in self._blocks:
+            made.restart()
+            out += [self.through(made, chunk).portion for chunk in block]
+        return out
+
+    @property
+    def absent(self) -> Array:
+        """Values of the unknowns that mean that an effect is not in the model, (m,)."""
+        at = np.zeros(self.model.size)
+        if "clock_rate" in self.model.index:
+            at[self.model.index["clock_rate"]] = -self.point.skew
+        return at
+
+    def found(self) -> Solution:
+        """The solution.
+
+        Raises:
+            KeyError: no flight was processed.
+        """
+        solution = self.solution()
+        if solution is None:
+            raise KeyError("no flight was processed")
+        return solution
+
+    def indices(self, family: Family) -> list[int]:
+        """Columns of one family."""
+        return list(range(*self.model.slices[family.name].indices(self.model.size)))
+
+    def indices_of(self, families: Sequence[EffectColumns]) -> list[int]:
+        """Columns of some families."""
+        return [i for f in families for i in self.indices(f)]
+
+
+def _blocks(chunks: Sequence[Chunk]) -> list[list[Chunk]]:
+    """The whole flight, or blocks of it spread evenly."""
+    whole = sum(c.duration for c in chunks)
+    blocks = [list(chunks[i : i + BLOCK]) for i in range(0, len(chunks), BLOCK)]
+    if whole <= 1.5 * SAMPLE_S:
+        return [list(chunks)]
+    count = max(1, round(len(blocks) * SAMPLE_S / whole))
+    return [blocks[i] for i in np.linspace(0, len(blocks) - 1, count).round().astype(int)]

@@ -1,0 +1,240 @@
+"""False GPS velocities: spells that the innovation gate refused, and whose failure they were."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from onboard.core.diagnosis.coasting import FEWEST_FIXES, MOST_SCATTER, Contradiction
+from onboard.core.diagnosis.regimes import spans
+from onboard.core.filter.traces import EpochTrace
+from onboard.core.inputs.segments import Chunk
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import Effect, Quantity
+
+FAULT_S = 1.0
+ONSET_FIXES = 3
+LONGEST_FAULT_S = 120.0
+BESIDE_S = 2.0
+"""Spells of one fault are parted by fewer good fixes: those before the EKF complained."""
+NEIGHBOURS_S = 1.1
+"""Fixes that follow on each other: between them inertia changes by next to nothing."""
+
+
+def fault_effect(
+    traces: Sequence[EpochTrace],
+    theta: Array,
+    chunks: Sequence[Chunk],
+    t0: float,
+    least: float,
+    coast_s: float,
+    distrusted: Sequence[tuple[float, float]] = (),
+    contradicted: Sequence[Contradiction] = (),
+) -> Effect | None:
+    """GPS velocities that cannot be true: refused by the innovation gate for a while.
+
+    Args:
+        traces: of every epoch.
+        theta: (m,) what their columns are multiplied with.
+        chunks: the flight.
+        t0: s on the boot clock.
+        least: m/s by which no honest receiver is off.
+        coast_s: how long the filter goes on without a velocity, s.
+        distrusted: s since ``t0`` in which the receiver contradicted itself; they stand for a
+            fault where the inertia, lost itself, cannot tell.
+        contradicted: fixes refused in flight that the inertia has contradicted; not in ``traces``.
+    """
+    refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
+    heard = {x.t: (x.innovation - x.columns @ theta)[:2] for x in traces if x.velocities}
+    seen = {**heard, **refused}
+    every = [_spell(run, seen, t0, least, coast_s) for run in _runs(traces, refused)]
+    spells = [s for s in _paired(every, _jumps(seen, refused, t0)) if not s.lost]
+    spells = _with_contradicted(spells, contradicted, t0)
+    spells = spells or [_Spell(a, b, None, 0.0) for a, b in distrusted]
+    intervals = [(s.start, s.end) for s in spells]
+    worst = max(spells, key=lambda s: s.size, default=None)
+    if worst is None:
+        return None
+    sizes = {"duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s")}
+    if worst.size > 0.0:
+        # A receiver that contradicts itself while the inertia is lost does not show its error.
+        spread = float(np.hypot(least / 8.0, worst.spread))
+        sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
+    t = np.unique(np.concatenate([c.fixes.t for c in chunks])) - t0
+    inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
+    return Effect(
+        name="gps_fault",
+        unknowns=sizes,
+        share_of_mismatch=float(np.mean(inside)),
+        delta_bic=0.0,
+        held_out_before=float("nan"),
+        held_out_after=float("nan"),
+        parameters={},
+        cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
+        where=spans(chunks, t0, intervals, _earth_axis(spells)),
+        intervals=tuple(intervals),
+    )
+
+
+def _with_contradicted(
+    spells: Sequence[_Spell], contradicted: Sequence[Contradiction], t0: float
+) -> list[_Spell]:
+    """Both kinds in order of time; what the gate refused right beside one is of the same fault."""
+    out = list(spells)
+    for c in contradicted:
+        start, end = c.start - t0, c.end - t0
+        near = [s.start <= end + BESIDE_S and s.end >= start - BESIDE_S for s in out]
+        beside = [s for s, is_near in zip(out, near, strict=True) if is_near]
+        start = min([start, *(s.start for s in beside)])
+        end = max([end, *(s.end for s in beside)])
+        out = [s for s, is_near in zip(out, near, strict=True) if not is_near]
+        out.append(_Spell(start, end, c.off, c.size, c.off, c.sigma))
+    return sorted(out, key=lambda s: s.start)
+
+
+@dataclass(frozen=True, slots=True)
+class _Spell:
+    """Refused velocities in a row.
+
+    ``off`` (2,) is their median innovation, None where untrusted, ``size`` its median length,
+    ``onset`` (2,) the first of it and ``spread`` its scatter, m/s; ``failure`` if it looks like a
+    receiver's, ``outlasted`` if the velocities were as far off right after it, ``lost`` if the
+    filter began anew before they were right.
+    """
+
+    start: float
+    end: float
+    off: Array | None
+    size: float
+    onset: Array | None = None
+    spread: float = 0.0
+    failure: bool = True
+    outlasted: bool = False
+    lost: bool = False
+
+
+def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
+    """Times of refused velocities, those together that no two seconds of good ones part.
+
+    Nor does a run go on when the filter has taken the error for a velocity and is off by another.
+    """
+    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
+    run: list[float] = []
+    taken = False
+    for t, bad in [*((x.t, "velocity" in x.refused) for x in judged), (np.inf, False)]:
+        if bad:
+            if taken and _another(refused.get(t), refused.get(run[-1])):
+                yield run
+                run = []
+            run.append(t)
+            taken = False
+        elif run and t - run[-1] > 2.0:
+            yield run
+            run = []
+            taken = False
+        else:
+            taken = bool(run)
+
+
+def _another(now: Array | None, before: Array | None) -> bool:
+    """Whether an error is far from what it was."""
+    if now is None or before is None or len(now) != len(before):
+        return False
+    return float(np.linalg.norm(now - before)) > 0.5 * float(np.linalg.norm(before))
+
+
+def _spell(
+    run: Sequence[float], seen: Mapping[float, Array], t0: float, least: float, coast_s: float
+) -> _Spell:
+    """What one run of refused velocities looks like, and what came next."""
+    off = [seen[u] for u in run if u in seen]
+    mean = np.median(np.array(off), axis=0) if off else None
+    after = min((u for u in seen if u > run[-1]), default=None)
+    still = after is not None and mean is not None and _along(seen[after], mean) > 0.5
+    # A noisy receiver errs to all sides: the mean of its errors says nothing.
+    sizes = np.linalg.norm(off, axis=1) if off else np.zeros(1)
+    size = float(np.median(sizes))
+    long = len(run) >= FEWEST_FIXES and run[-1] - run[0] >= FAULT_S
+    # A receiver fails at once; what grows from the gate on is a filter that drifts.
+    at_once = float(np.median(sizes[:ONSET_FIXES])) > max(least, 0.5 * size)
+    return _Spell(
+        run[0] - t0,
+        run[-1] - t0,
+        mean,
+        size,
+        np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None,
+        float(np.std(sizes)),
+        failure=long and size > least and at_once and _steady(off, size),
+        outlasted=still,
+        # A filter that had to begin anew does not tell its own failure from the receiver's.
+        lost=run[-1] - run[0] >= 0.95 * coast_s and mean is not None,
+    )
+
+
+def _earth_axis(spells: Sequence[_Spell]) -> str:
+    """The horizontal axis on which the velocity was off most."""
+    known = [s for s in spells if s.off is not None and len(s.off) > 1]
+    if not known:
+        return "earth_north"
+    worst = max((s.off for s in known if s.off is not None), key=lambda x: float(np.linalg.norm(x)))
+    return "earth_north" if abs(worst[0]) >= abs(worst[1]) else "earth_east"
+
+
+def _steady(off: Sequence[Array], size: float) -> bool:
+    """Whether errors are about one error: what turns with the vehicle is the inertia's own."""
+    if not off:
+        return True
+    scatter = np.sqrt(np.mean(np.sum((np.array(off) - np.mean(off, axis=0)) ** 2, axis=1)))
+    return bool(scatter < MOST_SCATTER * size)
+
+
+def _jumps(
+    seen: Mapping[float, Array], refused: Mapping[float, Array], t0: float
+) -> list[tuple[float, Array]]:
+    """Changes (2,) of the innovation from one refused velocity to the next, and when, s.
+
+    After one that was taken the innovation has jumped because the filter has.
+    """
+    return [
+        (b - t0, refused[b] - refused[a])
+        for a, b in pairwise(sorted(seen))
+        if a in refused and b in refused
+        if b - a < NEIGHBOURS_S and len(refused[a]) == len(refused[b]) == 2
+    ]
+
+
+def _paired(spells: Sequence[_Spell], jumps: Sequence[tuple[float, Array]]) -> list[_Spell]:
+    """Failures; one that outlasted the filter's patience is joined with the jump back at its end.
+
+    A constant error that was taken for a new velocity in the middle shows again, with the other
+    sign, when the receiver recovers: the fault ends where the second spell starts, or where the
+    innovation jumps inside it, and whose failure it was is no question any more.
+    """
+    out: list[_Spell] = []
+    for spell in spells:
+        if not spell.failure or (out and spell.start <= out[-1].end):
+            continue
+        back = [t for t, jump in jumps if t > spell.end and _undoes(jump, spell.off)]
+        back += [s.start for s in spells if s.start > spell.end and _undoes(s.onset, spell.off)]
+        end = min(back, default=np.inf)
+        if spell.outlasted and end - spell.end < LONGEST_FAULT_S:
+            out.append(replace(spell, end=end, lost=False))
+        else:
+            out.append(spell)
+    return out
+
+
+def _along(a: Array, b: Array) -> float:
+    """The share of ``b`` that is in ``a``."""
+    return float(a @ b) / max(float(b @ b), 1e-12) if len(a) == len(b) else 0.0
+
+
+def _undoes(jump: Array | None, off: Array | None) -> bool:
+    """Whether a jump is about an error taken back."""
+    if jump is None or off is None or len(jump) != len(off):
+        return False
+    size, along = float(off @ off), -float(jump @ off)
+    return 0.5 * size < along < 2.0 * size and along > 0.5 * float(np.linalg.norm(jump)) * size**0.5

@@ -1,0 +1,126 @@
+"""When the offsets jumped: to the half second, from one pass with a jump at every moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.hypotheses import Candidate
+from onboard.core.diagnosis.selection import OFFSETS, SETTLED_S, Fitter
+from onboard.core.estimate.engine import Engine
+from onboard.core.maths.blocks import Portion
+from onboard.core.maths.sums import NormalSums
+from onboard.core.model.regressors import Family, Model
+from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.offsets import BiasStep
+
+REACH_S = 16.0
+"""How far from the boundary of a portion a jump may have been that shows there."""
+SETTLING_S = 40.0
+"""What a jump does to the filter's state is forgotten after that long."""
+FURTHEST = 3
+SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
+
+
+def jump_near(full: Examination, chosen: Sequence[EffectColumns], centre: float) -> BiasStep:
+    """The jump near ``centre`` (s) that explains most beside ``chosen``.
+
+    One that is found at the edge of where it was looked for is looked for further there.
+    """
+    for _ in range(FURTHEST):
+        best = _best(full, chosen, centre, *SPACINGS[0])
+        at_edge = abs(best.at - centre) > REACH_S - 2.0 * SPACINGS[0][0]
+        centre = best.at
+        if not at_edge:
+            break
+    return _best(full, chosen, centre, *SPACINGS[1])
+
+
+def _best(
+    full: Examination,
+    chosen: Sequence[EffectColumns],
+    centre: float,
+    spacing: float,
+    width: float,
+) -> BiasStep:
+    times = np.arange(centre - width, centre + width + 1e-6, spacing)
+    times = np.maximum(times, float(full.portions[0].start) + SETTLED_S)
+    times = np.unique(times)
+    scored = _scored(full, chosen, [BiasStep(float(t)) for t in times])
+    return max(scored, key=lambda x: x[0])[1]
+
+
+def _scored(
+    full: Examination, chosen: Sequence[EffectColumns], steps: Sequence[BiasStep]
+) -> list[tuple[float, BiasStep]]:
+    """Gain of each jump alone beside the chosen effects, from one pass with all of them.
+
+    Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
+    the offsets' own columns after it, of which ``full`` has the sums.
+    """
+    families: tuple[Family, ...] = (*chosen, *steps)
+    made = Engine(
+        replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
+    )
+    first, last = steps[0].at - SETTLING_S, steps[-1].at + SETTLING_S
+    far: list[Portion] = []
+    for chunk, portion in zip(full.chunks, full.portions, strict=True):
+        if chunk.fixes.t[-1] < first or chunk.fixes.t[0] > last:
+            after = bool(chunk.fixes.t[0] > last)
+            far.append(_with_jumps(portion, full, made.model, steps, after=after))
+        else:
+            made.add(chunk)
+    absent = np.zeros(made.model.size)
+    if "clock_rate" in made.model.index:
+        absent[made.model.index["clock_rate"]] = -made.point.skew
+    fitter = Fitter([*far, *made.portions], made.model, 1.0, absent)
+    slices = made.model.slices
+    stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
+    free = [i for i in range(made.model.size) if i not in stepped]
+    before = fitter.fit(free, held_out=False)
+    out = []
+    for s in steps:
+        index = [*free, *range(slices[s.name].start, slices[s.name].stop)]
+        out.append((fitter.gain(before, fitter.fit(index, held_out=False)), s))
+    return out
+
+
+def _with_jumps(
+    portion: Portion, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
+) -> Portion:
+    """Sums of ``model`` over a portion that lies before or after every jump."""
+    source, sign = np.full(model.size, -1), np.ones(model.size)
+    for i, unknown in enumerate(model.unknowns):
+        source[i] = full.model.index.get(unknown.name, -1)
+    for family in full.model.families:
+        if family.instead_of in model.slices:
+            theirs = full.model.slices[family.name]
+            source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
+    if after:
+        for step in steps:
+            # What the sensor reads too much; the offsets' columns are what is added to it.
+            source[model.slices[step.name]], sign[model.slices[step.name]] = OFFSETS, -1.0
+    mine = np.flatnonzero(source >= 0)
+    to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
+    signs = np.outer(sign[mine], sign[mine])
+    sums = NormalSums.zeros(model.size)
+    sums.N[to], sums.G[to] = signs * portion.sums.N[of], signs * portion.sums.G[of]
+    sums.b[mine] = sign[mine] * portion.sums.b[source[mine]]
+    sums.s, sums.rows, sums.log_det = portion.sums.s, portion.sums.rows, portion.sums.log_det
+    return Portion(portion.start, portion.end, sums)
+
+
+def boundary_of(fitter: Fitter, portion: int) -> float:
+    """When a portion starts, s on the boot clock."""
+    return float(fitter.portions[portion].start)
+
+
+def candidate_of(made: Examination, family: EffectColumns) -> Candidate:
+    """A family of an examination as a candidate."""
+    spent = 1 if isinstance(family, BiasStep) else 0
+    return Candidate(
+        family.effect, tuple(made.indices(family)), family.plausible, family, spent=spent
+    )

@@ -1,0 +1,54 @@
+"""The six without the effects that were found, from the sums in which they are columns.
+
+Whether missing physics matters is asked of one set of sums: the same flight, linearisation and
+noise, with the columns of what was found, and without them.  Two engines that each found their own
+noise differ by more than the physics between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.records import Plain
+from onboard.core.estimate.calibration_record import six_covariance
+from onboard.core.estimate.engine import calibration_model
+from onboard.core.estimate.solution import solve
+from onboard.core.maths.blocks import Portion
+from onboard.core.physics.effect import EffectColumns
+
+
+def plain_six(final: Examination, families: Sequence[EffectColumns]) -> Plain:
+    """What the six would be, and be claimed to be, had ``families`` not been found.
+
+    A nuisance that one of them displaced (the antenna some centimetres off, for the antenna
+    elsewhere) is there again: its columns are the same, its prior is its own.
+
+    Args:
+        final: the model with them.
+        families: effects whose columns are in it.
+    """
+    model = calibration_model(final.point, final.prior, final.settings)
+    stands_for = {f.instead_of: f.name for f in families if f.instead_of}
+    index = [
+        i
+        for f in model.families
+        for i in range(
+            *final.model.slices[stands_for.get(f.name, f.name)].indices(final.model.size)
+        )
+    ]
+    at = final.absent
+    at[index] = 0.0
+    solution = solve(
+        [Portion(p.start, p.end, p.sums.shifted(at).subset(index)) for p in final.all_portions],
+        model,
+    )
+    scale, beta = solution.theta[:3], solution.theta[3:6]
+    value = np.concatenate([scale, -beta / scale])
+    sigma = np.sqrt(np.diag(six_covariance(solution)))
+    return Plain(
+        tuple(float(x) for x in value),  # type: ignore[arg-type] # six by construction
+        tuple(float(x) for x in sigma),  # type: ignore[arg-type] # six by construction
+    )

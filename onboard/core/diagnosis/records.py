@@ -1,0 +1,163 @@
+"""What a diagnosis says: frozen records behind ``onboard explain`` (effects.md's document).
+
+The words are the controlled vocabulary of effects; numbers are SI; times are seconds since the
+first inertial sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.estimate.result import Calibration, Estimate, Six
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import NAN, Effect, Where
+
+
+class Verdict(Enum):
+    """The answer in one word."""
+
+    CLEAN = "clean"
+    EXPLAINED = "explained"
+    PARTLY_EXPLAINED = "partly_explained"
+    UNEXPLAINED = "unexplained"
+    INSUFFICIENT = "insufficient"
+
+
+@dataclass(frozen=True, slots=True)
+class Ambiguity:
+    """Effects that this flight cannot tell apart, and the manoeuvre that would."""
+
+    names: tuple[str, ...]
+    tell_apart: str
+
+
+@dataclass(frozen=True, slots=True)
+class NotTestable:
+    """An effect that this recording cannot speak about, and why."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One step of the ladder of models: what was added, and its residuals.
+
+    ``whitened_rms`` and ``held_out`` are in units of the noise, the velocities in m/s.
+    """
+
+    name: str
+    whitened_rms: float
+    held_out: float
+    velocity_rms: float = NAN
+    held_out_velocity: float = NAN
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """The residual of the six numbers and timing thresholds alone, and after all effects.
+
+    Both are of the same ``fixes``, out of ``believed``: those that were to be used.
+    """
+
+    detected: bool
+    whitened_rms_before: float
+    whitened_rms_after: float
+    p_value: float
+    velocity_rms_before: float
+    velocity_rms_after: float
+    held_out_before: float
+    held_out_after: float
+    where: tuple[Where, ...] = ()
+    held_out_velocity_before: float = NAN
+    held_out_velocity_after: float = NAN
+    fixes: int = 0
+    believed: int = 0
+
+    @property
+    def supported(self) -> bool:
+        """Whether most fixes that were to be used could be.
+
+        Of a flight of which more than half is refused nobody can say which half is false: no
+        estimate withstands more (the breakdown point; Donoho and Huber 1983).
+        """
+        return not self.believed or self.fixes >= 0.5 * self.believed
+
+
+@dataclass(frozen=True, slots=True)
+class Unused:
+    """Flight whose fixes were not used: why, and whether inertia contradicts them.
+
+    ``reason`` is the trust window's; ``contradicted`` is None where there was nothing to compare.
+    """
+
+    start_s: float
+    end_s: float
+    reason: str
+    contradicted: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Time series for plots, epochs in order: velocity residual NED (m/s) before and after.
+
+    ``t`` (n,) s since the first inertial sample; ``before`` and ``after`` (n, 3), NaN where a
+    component was not measured; ``refused`` (n,) True where the fix was not used.
+    """
+
+    t: Array
+    before: Array
+    after: Array
+    refused: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class RegimeResidual:
+    """Residual in one flight regime, before and after: whitened, and of the velocity in m/s."""
+
+    regime: str
+    seconds: float
+    rms_before: float
+    rms_after: float
+    velocity_before: float = NAN
+    velocity_after: float = NAN
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """What the same sums say of the six without the effects that were found.
+
+    ``value`` and ``sigma`` are scale and offset in the order of SIX_NAMES.  Timing and constant
+    attitude errors are in it: they are in every model.
+    """
+
+    value: Six
+    sigma: Six
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Everything about one accelerometer's recording.
+
+    ``calibration`` is that of the model with what was found in it; ``plain`` is the one without,
+    None where nothing was found that is not in every model.
+    """
+
+    imu: int
+    verdict: Verdict
+    calibration: Calibration
+    timing: dict[str, Estimate]
+    mismatch: Mismatch
+    effects: tuple[Effect, ...]
+    ambiguous: tuple[Ambiguity, ...]
+    not_testable: tuple[NotTestable, ...]
+    ladder: tuple[Rung, ...]
+    regimes: tuple[RegimeResidual, ...]
+    series: Series
+    note: str
+    plain: Plain | None = None
+    unused: tuple[Unused, ...] = ()

@@ -1,0 +1,102 @@
+"""What the trust window refused in flight, and why: a part of the flight that is not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from onboard.core.diagnosis.records import Unused
+from onboard.core.gps.trust import Reason, Refusal
+from onboard.core.inputs.segments import Chunk
+from onboard.core.physics.finding import Effect
+
+OPINIONS: Final = frozenset(
+    {
+        Reason.SPOOFED,
+        Reason.JAMMED,
+        Reason.FEW_SATELLITES,
+        Reason.HDOP,
+        Reason.SPEED_ACCURACY,
+        Reason.GPS_GLITCH,
+        Reason.EKF_GPS_GLITCH,
+        Reason.EKF_UNHEALTHY,
+    }
+)
+"""Reasons to refuse a receiver that has a fix and goes on reporting: the inertia can be asked."""
+SAME_FIX_S = 0.1
+"""Times in a chunk are even, those of the trust window are as stamped: jitter is between them."""
+LONGEST_FIX_GAP_S = 2.5
+"""Receivers report at 1 Hz or faster: longer without a fix is an outage."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Flight without a fix that was used: from and to, s on the boot clock, and why."""
+
+    start: float
+    end: float
+    reason: Reason
+
+
+def refused(chunks: Sequence[Chunk], refusals: Sequence[Refusal]) -> list[Refused]:
+    """Flight that was not used, in order of time, each stretch with one reason.
+
+    A stretch goes from the first fix that was refused to the next one that was believed.
+
+    Args:
+        chunks: the flight.
+        refusals: of the trust window; where they do not reach (an earlier run), nothing is said.
+    """
+    out: list[Refused] = []
+    opened, last = False, float("-inf")
+    for chunk in chunks:
+        for t, believed in zip(chunk.fixes.t.tolist(), chunk.trusted.tolist(), strict=True):
+            if t == last:
+                continue  # chunks share a fix
+            again = t > last and not chunk.fresh
+            if opened and again:
+                out[-1] = replace(out[-1], end=t)
+            elif again and t - last > LONGEST_FIX_GAP_S:
+                out.append(Refused(last, t, Reason.GPS_GAP))
+            reason = None if believed else _reason(t, refusals)
+            if reason is not None and not (opened and again and out[-1].reason is reason):
+                out.append(Refused(t, t, reason))
+            opened, last = reason is not None, t
+    return out
+
+
+def believed(chunks: Sequence[Chunk]) -> int:
+    """How many fixes of a flight were to be used; chunks share their ends."""
+    count, last = 0, float("-inf")
+    for chunk in chunks:
+        fresh = chunk.fixes.t != last
+        count += int((chunk.trusted & fresh).sum())
+        last = float(chunk.fixes.t[-1])
+    return count
+
+
+def unused_flight(
+    chunks: Sequence[Chunk],
+    refusals: Sequence[Refusal],
+    fault: Effect | None,
+    t0: float,
+    *,
+    asked: bool,
+) -> tuple[Unused, ...]:
+    """What was not used, s since ``t0``, and what the inertia says of it, if it was ``asked``."""
+    out = []
+    for r in refused(chunks, refusals):
+        start, end = r.start - t0, r.end - t0
+        intervals = fault.intervals if fault is not None else ()
+        said = any(a < end and b > start for a, b in intervals)
+        contradicted = said if asked and r.reason in OPINIONS else None
+        out.append(Unused(start, end, r.reason.value, contradicted))
+    return tuple(out)
+
+
+def _reason(t: float, refusals: Sequence[Refusal]) -> Reason | None:
+    """Why the fix at ``t`` was refused: by the refusal that is nearest; None if none is near."""
+    off = [(max(r.start - t, t - r.end, 0.0), k) for k, r in enumerate(refusals)]
+    nearest, k = min(off, default=(float("inf"), 0))
+    return refusals[k].reason if nearest <= SAME_FIX_S else None

@@ -1,0 +1,167 @@
+"""Where in a flight a residual lives: intervals, body axes, regimes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.diagnosis.records import RegimeResidual
+from onboard.core.filter.traces import EpochTrace
+from onboard.core.inputs.segments import Chunk
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.blocks import Portion
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.physics.finding import Where
+
+MOST_PLACES = 5
+REGIMES = ("turning", "accelerating", "high load factor", "climbing", "high throttle", "steady")
+
+
+def regime_of(chunk: Chunk) -> str:
+    """The word for what a chunk of flight mostly was."""
+    s = chunk.stretch
+    turn = float(np.sqrt(np.mean(s.w_b[:, 2] ** 2)))
+    load = float(np.percentile(-s.raw_s[:, 2], 90)) / STANDARD_GRAVITY
+    speed = np.linalg.norm(np.nan_to_num(chunk.fixes.v_n[:, :2]), axis=1)
+    surge = float(np.std(speed))
+    climb = float(np.ptp(chunk.fixes.height)) / max(chunk.duration, 1e-3)
+    if load > 1.3:
+        return "high load factor"
+    if turn > 0.15:
+        return "turning"
+    if surge > 1.5:
+        return "accelerating"
+    if climb > 1.5:
+        return "climbing"
+    return "steady"
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """Velocity residuals of a flight by epoch: ``t`` (n,) s, the rest (n, 3) NED, m/s."""
+
+    t: Array
+    before: Array
+    after: Array
+
+
+def located(
+    portions: Sequence[Portion],
+    chunks: Sequence[Chunk],
+    before: Array,
+    after: Array,
+    t0: float,
+    axes: Mapping[int, str],
+    residuals: Residuals,
+) -> tuple[Where, ...]:
+    """Portions in which the misfit falls most from ``before`` to ``after``, neighbours joined.
+
+    Args:
+        portions: sums of the flight.
+        chunks: the flight, one for each portion.
+        before: (m,) unknowns without what was found.
+        after: (m,) with it.
+        t0: first sample, s.
+        axes: body axis on which each of the columns in question acts; others act on none.
+        residuals: what these two leave of the velocity.
+    """
+    if len(portions) != len(chunks):
+        return ()
+    gain = np.array([p.sums.residual(before) - p.sums.residual(after) for p in portions])
+    positive = np.clip(gain, 0.0, None)
+    whole = float(positive.sum())
+    if whole <= 0.0:
+        return ()
+    order = np.argsort(-positive)
+    keep = sorted(int(i) for i in order[: 2 * MOST_PLACES] if positive[i] > 0.05 * whole)
+    groups: list[list[int]] = []
+    for i in keep:
+        if groups and i == groups[-1][-1] + 1:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    out = []
+    for g in groups:
+        inside = g[int(np.argmax(positive[g]))]
+        out.append(
+            Where(
+                portions[g[0]].start - t0,
+                portions[g[-1]].end - t0,
+                _axis(portions[inside], after - before, axes)
+                or _earth_axis(portions[inside], residuals),
+                regime_of(chunks[inside]),
+                float(positive[g].sum() / whole),
+            )
+        )
+    out.sort(key=lambda w: -w.share)
+    return tuple(out[:MOST_PLACES])
+
+
+def spans(
+    chunks: Sequence[Chunk], t0: float, intervals: Sequence[tuple[float, float]], axis: str
+) -> tuple[Where, ...]:
+    """Places of something whose times are known (s since the first sample), longest first."""
+    whole = sum(b - a for a, b in intervals)
+    out = []
+    for a, b in intervals:
+        middle = t0 + 0.5 * (a + b)
+        chunk = min(chunks, key=lambda c: abs(0.5 * (c.fixes.t[0] + c.fixes.t[-1]) - middle))
+        out.append(Where(a, b, axis, regime_of(chunk), (b - a) / whole if whole else 1.0))
+    out.sort(key=lambda w: -w.share)
+    return tuple(out[:MOST_PLACES])
+
+
+def main_axis(sizes: Array) -> str:
+    """Body axis of the largest of three."""
+    return "body_" + "xyz"[int(np.argmax(np.abs(sizes)))]
+
+
+def _axis(portion: Portion, change: Array, axes: Mapping[int, str]) -> str:
+    """Body axis along which the columns in question moved most; empty if they have none."""
+    moved = dict.fromkeys(axes.values(), 0.0)
+    for i, axis in axes.items():
+        moved[axis] += float(change[i] ** 2 * portion.sums.N[i, i])
+    return max(moved, key=lambda a: moved[a]) if any(moved.values()) else ""
+
+
+def _earth_axis(portion: Portion, residuals: Residuals) -> str:
+    """Earth axis on which the velocity residual fell most."""
+    here = (residuals.t >= portion.start - 1e-6) & (residuals.t <= portion.end + 1e-6)
+    if not here.any():
+        return "earth_north"
+    fall = np.nansum(residuals.before[here] ** 2 - residuals.after[here] ** 2, axis=0)
+    return "earth_" + ("north", "east", "down")[int(np.argmax(fall))]
+
+
+def axis_of(key: str) -> str | None:
+    """Body axis on which an unknown of an effect acts; None if on none in particular."""
+    if key in ("roll", "pitch"):
+        # A tilt about x turns gravity towards y, and one about y towards x.
+        return "body_y" if key == "roll" else "body_x"
+    return f"body_{key[0]}" if key and set(key) <= set("xyz") else None
+
+
+def regime_residuals(
+    traces: Sequence[EpochTrace], chunks: Sequence[Chunk], before: Array, after: Array
+) -> tuple[RegimeResidual, ...]:
+    """Whitened residual by regime, before and after."""
+    edges = [(float(c.fixes.t[0]) - 0.5, float(c.fixes.t[-1]) + 0.5, regime_of(c)) for c in chunks]
+    squares: dict[str, Array] = {}
+    for x in traces:
+        regime = next((r for a, b, r in edges if a <= x.t <= b), None)
+        if regime is None or len(x.y) == 0:
+            continue
+        one, two = x.y - x.h @ before, x.y - x.h @ after
+        v_one, v_two = x.innovation - x.columns @ before, x.innovation - x.columns @ after
+        s = squares.setdefault(regime, np.zeros(6))
+        sums = (one @ one, two @ two, len(one), v_one @ v_one, v_two @ v_two, len(v_one))
+        s += np.array(sums)
+    seconds = {r: sum(c.duration for c in chunks if regime_of(c) == r) for r in squares}
+    out = []
+    for r, s in sorted(squares.items()):
+        whitened = np.sqrt(s[:2] / s[2])
+        velocity = np.sqrt(s[3:5] / s[5]) if s[5] else np.full(2, np.nan)
+        out.append(RegimeResidual(r, seconds[r], *map(float, (*whitened, *velocity))))
+    return tuple(out)

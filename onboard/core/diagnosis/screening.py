@@ -1,0 +1,191 @@
+"""Flight that must not be fitted: clipped accelerometers, false GPS velocities.
+
+Both are found before anything else is judged, for what they leave in the sums would be taken for
+physics or for noise.  Clipped flight is cut out, the filter begins anew after it; false fixes are
+marked as not to be believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.diagnosis.coasting import FAULT_M_S, Contradiction, contradictions
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.faults import fault_effect
+from onboard.core.diagnosis.refusals import OPINIONS, refused
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.engine import Engine
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.passes import Pass
+from onboard.core.filter.traces import EpochTrace
+from onboard.core.gps.trust import Reason
+from onboard.core.inputs.segments import Chunk
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import Effect
+
+MARGIN_S = 0.4
+"""Around clipped samples: the accelerometer's low-pass and the receiver's delay."""
+SHORTEST_S = 4.0
+"""Pieces of flight between two clipped ones that are worth an alignment."""
+FEWEST_REFUSED = 3
+OFF = 8.0
+"""Times the receiver's noise, or the usual innovation: no fix of a receiver that is well."""
+FAR_OFF = 12.0
+"""Times the usual innovation: worth a closer look, even if no gate has refused it."""
+
+
+def unclipped(
+    chunks: Sequence[Chunk], intervals: Sequence[tuple[float, float]], t0: float
+) -> list[Chunk]:
+    """The flight without the clipped parts; the filter begins anew after each.
+
+    Args:
+        chunks: the flight.
+        intervals: clipped, s since ``t0``.
+        t0: s on the boot clock.
+    """
+    out: list[Chunk] = []
+    torn = False
+    for chunk in chunks:
+        t = chunk.fixes.t - t0
+        bad = np.zeros(len(t), dtype=bool)
+        for a, b in intervals:
+            bad |= (t >= a - MARGIN_S) & (t <= b + MARGIN_S)
+            # An interval between two fixes spoils what is integrated from one to the other.
+            inside = np.flatnonzero((t[:-1] < b) & (t[1:] > a))
+            bad[inside + 1] = True
+        cuts = np.flatnonzero(np.diff(bad.astype(int))) + 1
+        for piece in np.split(np.arange(len(t)), cuts):
+            if bad[piece[0]]:
+                torn = True
+                continue
+            first, last = int(piece[0]), int(piece[-1]) + 1
+            if last - first < 2 or t[last - 1] - t[first] < min(SHORTEST_S, t[-1] - t[0]):
+                torn = True
+                continue
+            out.append(
+                Chunk(
+                    chunk.stretch,
+                    chunk.fixes.between(first, last),
+                    chunk.trusted[first:last],
+                    chunk.fresh or torn or first > 0,
+                )
+            )
+            torn = last < len(t)
+    return out
+
+
+def false_fixes(
+    calibrator: Calibrator, like: Engine, full: Examination, t0: float
+) -> tuple[Effect | None, list[Chunk]]:
+    """GPS velocities that cannot be true, and the flight with those not to be believed.
+
+    Noise levels that were found with the false ones among the rest would let them pass: the
+    filter that judges uses what most fixes say of the noise.
+    """
+    doubted = [r for r in refused(full.chunks, calibrator.trust.refusals) if r.reason in OPINIONS]
+    levels, least, jumped = _robust(full, full.found().theta)
+    rejected = max(full.refused["velocity"], like.refused["velocity"])
+    if rejected < FEWEST_REFUSED and not jumped and not doubted:
+        return None, list(full.chunks)
+    contradicted = contradictions(full, levels, doubted)
+    fault = fault_effect(
+        _asked_again(full, levels, contradicted, again=bool(doubted)),
+        full.found().theta,
+        full.chunks,
+        t0,
+        least,
+        full.settings.coast_s,
+        _distrusted(calibrator, full, t0),
+        contradicted,
+    )
+    if fault is None:
+        return None, list(full.chunks)
+    out = []
+    for chunk in full.chunks:
+        t = full.point.true_time(chunk.fixes.t) - t0
+        bad = _inside(t, fault.intervals)
+        out.append(replace(chunk, trusted=chunk.trusted & ~bad))
+    return fault, out
+
+
+def _asked_again(
+    full: Examination, levels: NoiseLevels, known: Sequence[Contradiction], *, again: bool
+) -> list[EpochTrace]:
+    """Epochs of a pass whose gates judge every fix; ``again`` also those refused in flight.
+
+    Not those that are ``known`` to be false: a filter would take them for true in the end.
+    """
+    solution = full.found()
+    made = Pass(
+        full.model,
+        full.point,
+        (levels,),
+        uses=full.uses,
+        traces=True,
+        theta=solution.theta,
+        covariance=solution.covariance,
+    )
+    traces: list[EpochTrace] = []
+    for chunk in full.chunks:
+        asked = chunk
+        if again:
+            heard = np.all(np.isfinite(chunk.fixes.v_n[:, :2]), axis=1)
+            t = full.point.true_time(chunk.fixes.t)
+            asked = replace(chunk, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
+        traces.extend(Engine.through(full, made, asked).traces)
+    return traces
+
+
+def _inside(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """(n,) whether times are in one of the intervals."""
+    inside = np.zeros(len(t), dtype=bool)
+    for a, b in intervals:
+        inside |= (t >= a - 1e-3) & (t <= b + 1e-3)
+    return inside
+
+
+def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:
+    """When the receiver contradicted itself, if it did so for long; s since ``t0``.
+
+    One contradiction closes the window for the recovery time: a hard landing makes one.
+    """
+    t = np.concatenate([c.fixes.t for c in full.chunks])
+    bad = np.concatenate([~c.trusted for c in full.chunks])
+    step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    closed = step * calibrator.trust.rejected.get("gps_glitch", 0)
+    if closed <= 2.0 * calibrator.settings.trust.recovery[Reason.GPS_GLITCH]:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(int)))
+    spans = zip(t[edges[::2]], t[edges[1::2] - 1], strict=True)
+    return [(float(a) - t0, float(b) - t0) for a, b in spans if b - a > 1.0]
+
+
+def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
+    """What most fixes say of the receiver, for false ones are few.
+
+    Returns:
+        Noise levels; the error (m/s) that no honest fix has; whether any is far off.
+    """
+    steps = [
+        (x.innovation - x.columns @ theta)[:2]
+        for x in full.traces
+        if x.velocities and len(x.innovation)
+    ]
+    if not steps:
+        return full.noise, FAULT_M_S, False
+    off = np.abs(np.concatenate(steps))
+    usual = 1.4826 * float(np.median(off))
+    noise, floor = full.noise, NoiseLevels()
+    levels = replace(
+        noise,
+        velocity=min(noise.velocity, max(floor.velocity, 2.0 * usual)),
+        velocity_colour=min(noise.velocity_colour, max(floor.velocity_colour, 2.0 * usual)),
+    )
+    spread = max(float(np.hypot(levels.velocity, levels.velocity_colour)), usual)
+    least = max(FAULT_M_S, OFF * spread)
+    return levels, least, float(off.max()) > max(FAULT_M_S, FAR_OFF * usual)

@@ -1,0 +1,82 @@
+"""Physics without a name: products of measured signals, where the catalogue does not suffice.
+
+A product is taken when it explains a residual that is not noise, or when it explains *instead* of
+an effect of the catalogue far more than that one does: an effect that merely resembles what acts
+must not lend it its name.  The number of products that are tried is charged for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.hypotheses import MARGIN, Candidate, accepted
+from onboard.core.diagnosis.jumps import candidate_of
+from onboard.core.diagnosis.selection import Fitter
+from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.empirical import products
+from onboard.core.physics.offsets import BiasStep
+
+SUSPICIOUS = 3.0
+"""Inflation of the variance from which a residual is searched."""
+FAR_BETTER = 1.3
+"""Share of an effect's own evidence that a product needs to take its place."""
+
+
+def searched(
+    final: Examination, families: Sequence[EffectColumns], weaken: float
+) -> list[EffectColumns]:
+    """The families, with a product added or put in the place of an impostor.
+
+    Args:
+        final: the model that was chosen.
+        families: its physics.
+        weaken: factor by which evidence is weakened.
+    """
+    named = [f for f in families if not isinstance(f, BiasStep)]
+    if not named and final.found().inflation < SUSPICIOUS:
+        return list(families)
+    terms = products(final.chunks)
+    made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
+    made.once()
+    fitter = Fitter(made.all_portions, made.model, weaken, made.absent)
+    ours = set(made.indices_of([*families, *terms]))
+    base = [i for i in range(made.model.size) if i not in ours]
+    spent = int(np.ceil(2.0 * np.log(len(terms)) / fitter.log_rows))
+    offered = [
+        Candidate(t.effect, tuple(made.indices(t)), t.plausible, t, spent=spent) for t in terms
+    ]
+    kept = list(families)
+    for family in named:
+        rest = base + made.indices_of([f for f in kept if f is not family])
+        own = candidate_of(made, family)
+        before = fitter.fit(rest)
+        mine = own.bic(fitter, before, fitter.fit([*rest, *own.index], held_out=False))
+        best = _best(fitter, rest, offered)
+        if best is not None and best[0] > max(mine + 2.0 * MARGIN, FAR_BETTER * mine):
+            kept = [f for f in kept if f is not family]
+            if best[1] not in kept:
+                kept.append(best[1])
+    if final.found().inflation >= SUSPICIOUS and kept == list(families):
+        best = _best(fitter, base + made.indices_of(kept), offered)
+        if best is not None:
+            kept.append(best[1])
+    return kept
+
+
+def _best(
+    fitter: Fitter, rest: Sequence[int], offered: Sequence[Candidate]
+) -> tuple[float, EffectColumns] | None:
+    """The acceptable product with the most evidence: that, and its columns."""
+    before = fitter.fit(rest)
+    best: tuple[float, EffectColumns] | None = None
+    for c in offered:
+        if c.columns is None or set(c.index) & set(rest):
+            continue
+        after = fitter.fit([*rest, *c.index])
+        bic = c.bic(fitter, before, after)
+        if accepted(fitter, before, after, c, bic) and (best is None or bic > best[0]):
+            best = bic, c.columns
+    return best

@@ -1,0 +1,66 @@
+"""What a recording lets ask for: the signals that an effect needs, and how often they come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.diagnosis.records import NotTestable
+from onboard.core.inputs.segments import Chunk
+from onboard.core.physics.effect import EffectColumns
+
+LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
+"""Changes of slow signals below which what follows them is not to be seen."""
+MOST_UNSEEN = 0.02
+"""What changes faster than its samples come averages out in an integral, but for so much."""
+BY_NATURE = (
+    NotTestable("rotor_drag", "needs a model of the vehicle; sensors alone do not show it"),
+)
+
+
+def testable_of(
+    everything: Sequence[EffectColumns], chunks: Sequence[Chunk]
+) -> tuple[list[EffectColumns], list[NotTestable]]:
+    """Effects whose signals are there and change, and why the others cannot be asked for."""
+    present: list[EffectColumns] = []
+    absent = list(BY_NATURE)
+    names = set.intersection(*(set(c.stretch.slow) for c in chunks)) if chunks else set()
+    for effect in everything:
+        missing = [n for n in effect.needs if n not in names]
+        if missing:
+            absent.append(
+                NotTestable(effect.effect, f"no {' and '.join(missing)} in the recording")
+            )
+            continue
+        still = [n for n in effect.needs if _spread(chunks, n) < LEAST_SPREAD.get(n, 0.0)]
+        if still:
+            absent.append(NotTestable(effect.effect, f"{' and '.join(still)} did not change"))
+            continue
+        present.append(effect)
+    return present, absent
+
+
+def _spread(chunks: Sequence[Chunk], name: str) -> float:
+    values = [np.atleast_2d(c.stretch.slow[name][1].T) for c in chunks]
+    joined = np.concatenate(values, axis=1)
+    return float(np.max(np.percentile(joined, 98, axis=1) - np.percentile(joined, 2, axis=1)))
+
+
+def unseen_share(chunks: Sequence[Chunk], name: str) -> float:
+    """Share of a slow signal's variance that straight lines between its samples may miss.
+
+    Of a signal that wanders they miss a third of what lines between every other sample miss at
+    those left out; never more than :data:`MOST_UNSEEN`.
+    """
+    missed, values = [], []
+    for chunk in chunks:
+        x = chunk.stretch.slow[name][1].T
+        values.append(np.atleast_2d(x))
+        missed.append(np.atleast_2d(x[..., 1:-1] - (x[..., 2:] + x[..., :-2]) / 2.0))
+    whole = np.var(np.concatenate(values, axis=1), axis=1).sum()
+    between = np.concatenate(missed, axis=1)
+    if not between.size or not whole > 0.0:
+        return MOST_UNSEEN
+    share = float((between**2).mean(axis=1).sum() / (3.0 * whole))
+    return min(MOST_UNSEEN, share)

@@ -1,0 +1,101 @@
+"""What the core gives: frozen records, one per accelerometer, and how they look as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from onboard.core.maths.arrays import Vector3
+
+Six = tuple[float, float, float, float, float, float]
+SixFlags = tuple[bool, bool, bool, bool, bool, bool]
+SIX_NAMES = ("x scale", "y scale", "z scale", "x offset", "y offset", "z offset")
+
+
+class Status(Enum):
+    """How far a calibration has come.  Only ``CALIBRATED`` may ever be pushed."""
+
+    COLLECTING = "collecting"
+    CALIBRATED = "calibrated"
+    INSUFFICIENT = "insufficient"
+    INVALID = "invalid"
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number with its standard deviation, both in the same SI unit."""
+
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """Uniform bound on the velocity residual from its L2 norm (corrected theorem)."""
+
+    window_s: float
+    residual_l2: float
+    acceleration_bound: float
+    uniform_bound: float
+    observed_max: float
+
+
+@dataclass(frozen=True, slots=True)
+class DeadReckoning:
+    """Velocity drift of free integration over ``horizon_s``, before and after calibration."""
+
+    horizon_s: float
+    drift_before: float
+    drift_after: float
+    windows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How well the flight excites the six; ``per_parameter`` in percent, order of SIX_NAMES."""
+
+    percent: float
+    per_parameter: Six
+    weakest: str
+    advice: str
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The answer for one accelerometer.
+
+    ``scale``/``offset`` are absolute, ArduPilot's; the covariance (6x6, row-major tuple of
+    tuples) is that of (scale, offset).  ``observable[i]`` is False where the flight does not
+    support the number: its value then leans on the prior and its sigma says so.
+    ``in_force`` are the parameters that the autopilot used last.  The held-out RMS are of
+    whitened residuals on segments that the fit did not see: with the parameters in force and
+    with the estimate; their ratio decides whether a push is an improvement.
+    """
+
+    imu: int
+    status: Status
+    scale: Vector3
+    offset: Vector3
+    scale_sigma: Vector3
+    offset_sigma: Vector3
+    covariance: tuple[tuple[float, ...], ...]
+    observable: SixFlags
+    note: str
+    in_force_scale: Vector3
+    in_force_offset: Vector3
+    parameters_known: bool
+    timing: dict[str, Estimate]
+    trusted_s: float
+    rejected: dict[str, int]
+    whitened_rms_before: float
+    whitened_rms_after: float
+    held_out_before: float
+    held_out_after: float
+    velocity_rms_before: float
+    velocity_rms_after: float
+    coverage: Coverage
+    certificate: Certificate | None = None
+    dead_reckoning: DeadReckoning | None = None
+    temperature: Estimate | None = None
+    extra: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,136 @@
+"""Estimator state across restarts of the daemon: the sums and the point they are about.
+
+One JSON document (the sums as base64 of their bytes): a few tens of kilobytes, readable enough to
+be looked at, and refused as a whole if anything in it does not fit.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.maths.arrays import Vector3
+from onboard.core.maths.blocks import Portion, Seconds
+from onboard.core.maths.sums import NormalSums
+from onboard.core.model.linearisation import Linearisation
+from onboard.errors import StateError
+
+VERSION = 3
+"""1: sums without the antenna's place among the unknowns.  2: with time on the ground in them."""
+
+
+@dataclass(frozen=True, slots=True)
+class SavedEngine:
+    """What one accelerometer's engine needs to go on where it stopped.
+
+    ``device_id`` is the autopilot's INS_ACCn_ID, None where it was not known: sums of one sensor
+    must never be used for another.
+    """
+
+    imu: int
+    device_id: float | None
+    prior: tuple[float, ...]
+    point: Linearisation
+    noise: NoiseLevels
+    seconds: Seconds
+    portions: tuple[Portion, ...]
+
+
+def dump(engines: list[SavedEngine]) -> bytes:
+    """The document."""
+    body = [
+        {
+            "imu": e.imu,
+            "device_id": e.device_id,
+            "prior": list(e.prior),
+            "point": asdict(e.point),
+            "noise": asdict(e.noise),
+            "seconds": asdict(e.seconds),
+            "portions": [
+                {
+                    "start": p.start,
+                    "end": p.end,
+                    "sums": base64.b64encode(p.sums.to_bytes()).decode("ascii"),
+                }
+                for p in e.portions
+            ],
+        }
+        for e in engines
+    ]
+    return json.dumps({"version": VERSION, "engines": body}).encode()
+
+
+def load(data: bytes) -> list[SavedEngine]:
+    """Inverse of :func:`dump`.
+
+    Raises:
+        StateError: damaged, or of another version.
+    """
+    try:
+        document: dict[str, Any] = json.loads(data)
+        if document["version"] != VERSION:
+            raise StateError(f"saved state is of version {document['version']}, not {VERSION}")
+        return [_engine(e) for e in document["engines"]]
+    except (
+        KeyError,
+        TypeError,
+        AttributeError,
+        ValueError,
+        OverflowError,
+        RecursionError,
+        binascii.Error,
+    ) as error:
+        raise StateError(f"saved state is damaged: {error}") from error
+
+
+def _engine(e: dict[str, Any]) -> SavedEngine:
+    point = e["point"]
+    prior = tuple(_finite(x) for x in e["prior"])
+    if len(prior) != 6:
+        raise StateError("saved state is damaged: the prior is not six numbers")
+    portions = tuple(
+        Portion(
+            _finite(p["start"]),
+            _finite(p["end"]),
+            NormalSums.from_bytes(base64.b64decode(p["sums"], validate=True)),
+        )
+        for p in e["portions"]
+    )
+    if not portions:
+        raise StateError("saved state is damaged: an accelerometer without sums")
+    noise = NoiseLevels(**{k: _finite(v) for k, v in e["noise"].items()})
+    if min(asdict(noise).values()) <= 0.0:
+        raise StateError("saved state is damaged: noise levels that are not positive")
+    return SavedEngine(
+        int(e["imu"]),
+        None if e["device_id"] is None else _finite(e["device_id"]),
+        prior,
+        Linearisation(
+            scale=_three(point["scale"]),
+            beta=_three(point["beta"]),
+            delay=_finite(point["delay"]),
+            window=_finite(point["window"]),
+            attitude_delay=_finite(point["attitude_delay"]),
+            heading=_finite(point.get("heading", 0.0)),
+        ),
+        noise,
+        Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
+        portions,
+    )
+
+
+def _finite(value: float | str) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("a number that is not finite")
+    return number
+
+
+def _three(values: tuple[float, ...]) -> Vector3:
+    x, y, z = values
+    return (_finite(x), _finite(y), _finite(z))

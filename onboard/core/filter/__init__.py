@@ -1,0 +1,1 @@
+"""Innovations: velocities predicted and compared, whitened, gated and added to block sums."""

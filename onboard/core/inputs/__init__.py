@@ -1,0 +1,1 @@
+"""Samples to batches: what was measured, whose it is, whether the vehicle flew."""

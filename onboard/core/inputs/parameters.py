@@ -1,0 +1,119 @@
+"""The autopilot's parameters as far as they change what its messages mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import board_rotation, is_axis_aligned
+
+DEFAULT_FILTER_HZ = 20.0
+
+
+def filter_delay(cutoff_hz: float) -> float:
+    """Delay (s) of ArduPilot's two-pole Butterworth low-pass well below its cut-off.
+
+    ``sqrt(2) / (2 pi f)``: the group delay at zero of ``1 / (s^2 + sqrt(2) s + 1)``.  A cut-off of
+    zero or less switches the filter off.
+    """
+    return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
+
+
+@dataclass(slots=True)
+class ParametersInForce:
+    """What was last reported for each parameter, and what follows from it."""
+
+    values: dict[str, float] = field(default_factory=dict)
+
+    def set(self, name: str, value: float) -> None:
+        """Take a report."""
+        self.values[name] = value
+
+    def get(self, *names: str, default: float) -> float:
+        """First of ``names`` that is known."""
+        for name in names:
+            if name in self.values:
+                return self.values[name]
+        return default
+
+    def known(self, imu: int) -> bool:
+        """True if all six of this accelerometer were reported."""
+        return all(name in self.values for name in parameter_names(imu).six)
+
+    def device_id(self, imu: int) -> float | None:
+        """INS_ACCn_ID as reported; None if it was not."""
+        return self.values.get(parameter_names(imu).device_id)
+
+    def one_chip(self, imu: int) -> bool:
+        """True if this IMU's accelerometer and gyroscope are known to be one chip.
+
+        The low 16 bits of a device id are bus type, bus and address on it (AP_HAL::Device).
+        """
+        names = parameter_names(imu)
+        ids = [
+            int(self.values.get(name, 0.0)) & 0xFFFF for name in (names.device_id, names.gyro_id)
+        ]
+        return ids[0] == ids[1] != 0
+
+    def six(self, imu: int) -> SixParameters:
+        """Scale and offset in force; one and zero where they were never reported."""
+        names = parameter_names(imu)
+        s = [self.values.get(n, 1.0) for n in names.scale]
+        o = [self.values.get(n, 0.0) for n in names.offset]
+        return SixParameters(
+            tuple(x if x != 0.0 else 1.0 for x in s),  # type: ignore[arg-type] # three by construction
+            tuple(o),  # type: ignore[arg-type] # three by construction
+        )
+
+    @property
+    def R_bs(self) -> Array:
+        """Board orientation; the identity where it is unknown (then see :attr:`representable`)."""
+        R = board_rotation(self.get("AHRS_ORIENTATION", default=0.0))
+        return np.eye(3) if R is None else R
+
+    @property
+    def representable(self) -> bool:
+        """False if the sensor's axes are not known or not along the body's."""
+        R = board_rotation(self.get("AHRS_ORIENTATION", default=0.0))
+        return R is not None and is_axis_aligned(R)
+
+    @property
+    def trim(self) -> tuple[float, float, float]:
+        """AHRS_TRIM, rad."""
+        return (
+            self.get("AHRS_TRIM_X", default=0.0),
+            self.get("AHRS_TRIM_Y", default=0.0),
+            self.get("AHRS_TRIM_Z", default=0.0),
+        )
+
+    @property
+    def antenna(self) -> Array:
+        """(3,) place of the GPS antenna as it was told, body axes, m."""
+        return np.array(
+            [self.get(f"GPS1_POS_{a}", f"GPS_POS1_{a}", default=0.0) for a in "XYZ"], dtype=float
+        )
+
+    def lever_arm(self, imu: int) -> Array:
+        """(3,) from the accelerometer to the antenna as both were told, body axes, m."""
+        own = np.array([self.get(f"INS_POS{imu}_{a}", default=0.0) for a in "XYZ"])
+        out: Array = self.antenna - own
+        return out
+
+    @property
+    def imu_delay(self) -> float:
+        """Delay of the accelerometer by its declared low-pass, s."""
+        return filter_delay(self.get("INS_ACCEL_FILTER", default=DEFAULT_FILTER_HZ))
+
+    @property
+    def gyro_lag(self) -> float:
+        """How much later the gyroscope is than the accelerometer, s."""
+        gyro = self.get("INS_GYRO_FILTER", default=DEFAULT_FILTER_HZ)
+        return filter_delay(gyro) - self.imu_delay
+
+    @property
+    def gps_delay_told(self) -> float:
+        """What the autopilot is told of the receiver's latency, s (0: not told)."""
+        return 1e-3 * self.get("GPS1_DELAY_MS", "GPS_DELAY_MS", default=0.0)

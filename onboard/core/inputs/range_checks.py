@@ -1,0 +1,67 @@
+"""What no sensor can have measured: a damaged record, refused at the door and counted by name.
+
+DataFlash and ULog records carry no checksum, so that a flipped bit arrives here as a number.
+Only what is physically impossible is refused; what is merely unlikely is judged later.
+"""
+
+from __future__ import annotations
+
+import math
+
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
+
+LONGEST_UPTIME_S = 1e9
+MOST_FORCE = 1000.0
+"""m/s^2; the widest ranges of the accelerometers that autopilots carry end near 320."""
+MOST_RATE = 100.0
+"""rad/s; gyroscopes end near 70."""
+MOST_ANGLE = 10.0
+MOST_SPEED = 1000.0
+"""m/s; receivers stop at 515 by regulation."""
+MOST_HEIGHT = 1e5
+"""m"""
+MOST_PARAMETER = 1e30
+PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
+"""Part of a name that begins with INS or AHRS, and what its magnitude stays below by far."""
+ACCELEROMETERS = range(1, 6)
+
+
+def impossible(sample: Sample) -> str | None:
+    """Name under which a sample is refused; None if it can be true.  Never raises."""
+    # Comparisons are written so that NaN fails them; squares by * do not raise on overflow.
+    if isinstance(sample, ImuSample):
+        x, y, z = sample.f_b
+        if not x * x + y * y + z * z < MOST_FORCE * MOST_FORCE:
+            return "imu_impossible"
+        if sample.w_b is not None:
+            x, y, z = sample.w_b
+            if not x * x + y * y + z * z < MOST_RATE * MOST_RATE:
+                return "imu_impossible"
+        if sample.imu not in ACCELEROMETERS or not _is_time(sample.t):
+            return "imu_impossible"
+    elif isinstance(sample, AttitudeSample):
+        x, y, z = sample.roll, sample.pitch, sample.yaw
+        if not x * x + y * y + z * z < MOST_ANGLE * MOST_ANGLE or not _is_time(sample.t):
+            return "attitude_impossible"
+    elif isinstance(sample, GpsFix):
+        x, y, z = sample.v_n, sample.v_e, sample.v_d or 0.0
+        if not (
+            x * x + y * y + z * z < MOST_SPEED * MOST_SPEED
+            and abs(sample.altitude) < MOST_HEIGHT
+            and math.isfinite(sample.latitude + sample.longitude)
+            and _is_time(sample.t)
+        ):
+            return "gps_impossible"
+    elif isinstance(sample, ParameterValue):
+        limit = MOST_PARAMETER
+        if sample.name.startswith(("INS", "AHRS")):
+            limit = next((most for part, most in PARAMETER_LIMITS if part in sample.name), limit)
+        if not abs(sample.value) < limit:
+            return "parameter_impossible"
+    elif not _is_time(sample.t):
+        return "impossible"
+    return None
+
+
+def _is_time(t: float) -> bool:
+    return -LONGEST_UPTIME_S < t < LONGEST_UPTIME_S

@@ -1,0 +1,127 @@
+"""A stretch of flight: the samples of one accelerometer between two moments, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import interpolate_rotation
+from onboard.core.maths.interpolation import Hermite
+
+LONGEST_FIX_GAP_S = 2.5
+"""Receivers report at 1 Hz or faster: longer without a fix is an outage, not trusted flight."""
+DENSE_S = 0.15
+"""Attitude samples this close together can be interpolated: between sparser ones a vehicle turns
+in ways that they do not show."""
+NEAR_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Fixes:
+    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed.
+
+    ``late`` (n,): how much later they are stamped than the time from which the autopilot counts the
+    receiver's latency, s; empty where that is not known to differ.
+    """
+
+    t: Array
+    v_n: Array
+    height: Array
+    latitude: Array
+    late: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start: int, stop: int) -> Fixes:
+        """Epochs ``start:stop``."""
+        cut = slice(start, stop)
+        return Fixes(
+            self.t[cut], self.v_n[cut], self.height[cut], self.latitude[cut], self.late[cut]
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Inertial samples, attitude and slow signals, all on the boot clock, delays removed.
+
+    Attributes:
+        t: (n,) sample times of the accelerometer, corrected for its declared low-pass, s.
+        w_b: (n, 3) rad/s.
+        raw_s: (n, 3) raw specific force, sensor axes, m/s^2.
+        t_attitude: (k,) s.
+        R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
+        R_bs: (3, 3) board orientation.
+        slow: other signals by name: times (j,) and values (j,) or (j, 3).
+        lever_arm_b: (3,) from the accelerometer to the GPS antenna as it was told, m.
+    """
+
+    t: Array
+    w_b: Array
+    raw_s: Array
+    t_attitude: Array
+    R_attitude: Array
+    R_bs: Array
+    slow: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
+
+    def interpolant(self) -> Hermite:
+        """Interpolant of (rate, raw) stacked to (n, 6)."""
+        return Hermite(self.t, np.hstack([self.w_b, self.raw_s]))
+
+    def slow_at(self, name: str, at: Array) -> Array | None:
+        """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""
+        if name not in self.slow:
+            return None
+        t, x = self.slow[name]
+        if x.ndim == 1:
+            return np.interp(at, t, x)
+        return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
+
+    def attitude_at(self, at: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it."""
+        R = interpolate_rotation(at, self.t_attitude, self.R_attitude)
+        i = np.clip(np.searchsorted(self.t_attitude, at) - 1, 0, max(len(self.t_attitude) - 2, 0))
+        if len(self.t_attitude) < 2:
+            return R, np.zeros(len(at), dtype=bool)
+        t0, t1 = self.t_attitude[i], self.t_attitude[i + 1]
+        near = (t1 - t0 < DENSE_S) | (np.minimum(at - t0, t1 - at) < NEAR_S)
+        return R, near & (at >= t0) & (at <= t1)
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some seconds of flight.  ``fresh`` if the filter must not continue from the one before."""
+
+    stretch: Stretch
+    fixes: Fixes
+    trusted: NDArray[np.bool_]
+    fresh: bool
+
+    @property
+    def duration(self) -> float:
+        """Length between first and last epoch, s."""
+        return float(self.fixes.t[-1] - self.fixes.t[0])
+
+    @property
+    def trusted_s(self) -> float:
+        """Time between neighbouring fixes that are both to be believed, s."""
+        step = np.diff(self.fixes.t)
+        return float(step[self._between(step)].sum())
+
+    def __deepcopy__(self, memo: object) -> Chunk:
+        return self  # it never changes, and is most of what an engine keeps
+
+    def seconds_above(self, speed: float) -> float:
+        """Of :attr:`trusted_s`, the time that begins with a speed over ground above ``speed``."""
+        step = np.diff(self.fixes.t)
+        over = np.hypot(self.fixes.v_n[:-1, 0], self.fixes.v_n[:-1, 1]) > speed
+        return float(step[self._between(step) & over].sum())
+
+    def _between(self, step: Array) -> NDArray[np.bool_]:
+        """(n - 1,) steps between fixes that are both to be believed and no outage apart."""
+        out: NDArray[np.bool_] = self.trusted[1:] & self.trusted[:-1] & (step < LONGEST_FIX_GAP_S)
+        return out

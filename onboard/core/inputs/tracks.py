@@ -1,0 +1,260 @@
+"""Where samples wait until a chunk of flight is complete: one track per stream.
+
+Tracks refuse what is late, repeated or not finite, count it by name, and hand out arrays.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.arrays import Array, Vector3
+
+
+def untruncated(value: float, step: float) -> float:
+    """Middle of the interval that integer truncation toward zero maps to ``value``.
+
+    ``|x|`` in [k, k + 1) steps is sent as k; zero stands for -1 ... 1 and stays zero.
+    """
+    if step == 0.0 or value == 0.0:
+        return value
+    return value + (0.5 * step if value > 0 else -0.5 * step)
+
+
+class ImuTrack:
+    """Raw inertial samples of one IMU."""
+
+    __slots__ = ("_rows", "_t", "highres_t", "mismatched", "refused")
+
+    def __init__(self) -> None:
+        self._t: list[float] = []
+        self._rows: list[tuple[float, ...]] = []
+        self.highres_t = -np.inf
+        self.mismatched = 0
+        self.refused: Counter[str] = Counter()
+
+    @property
+    def last(self) -> float:
+        """Time of the newest sample; -inf if there is none."""
+        return self._t[-1] if self._t else -np.inf
+
+    def __len__(self) -> int:
+        return len(self._t)
+
+    def add(self, sample: ImuSample, six: SixParameters, R_bs: Array | None) -> bool:
+        """Undo truncation and parameters, keep the sample; False if it was refused.
+
+        Args:
+            sample: as reported.
+            six: parameters in force when it was measured.
+            R_bs: board orientation, None for the identity.
+        """
+        t = sample.t
+        if sample.source is ImuSource.HIGHRES_IMU:
+            self.highres_t = t
+        elif sample.source is ImuSource.RAW_IMU and t - self.highres_t < 0.5:
+            return False
+        if not t > self.last:
+            self.refused["imu_late" if t < self.last else "imu_repeated"] += 1
+            return False
+        f: Vector3 = sample.f_b
+        w: Vector3 | None = sample.w_b
+        if sample.f_step:
+            f = (
+                untruncated(f[0], sample.f_step),
+                untruncated(f[1], sample.f_step),
+                untruncated(f[2], sample.f_step),
+            )
+        if w is None:
+            self.refused["imu_without_gyro"] += 1
+            return False
+        if sample.w_step:
+            w = (
+                untruncated(w[0], sample.w_step),
+                untruncated(w[1], sample.w_step),
+                untruncated(w[2], sample.w_step),
+            )
+        if R_bs is not None:
+            f = tuple(R_bs.T @ np.array(f))
+        s, o = six.scale, six.offset
+        row = (
+            *w,
+            f[0] / s[0] + o[0],
+            f[1] / s[1] + o[1],
+            f[2] / s[2] + o[2],
+            np.nan if sample.temperature is None else sample.temperature,
+        )
+        if not np.isfinite(sum(row[:6])):
+            self.refused["imu_not_finite"] += 1
+            return False
+        self._t.append(t)
+        self._rows.append(row)
+        return True
+
+    def arrays(self) -> tuple[Array, Array]:
+        """``t`` (n,) and rows (n, 7): rate, raw, temperature."""
+        return np.array(self._t), np.array(self._rows).reshape(len(self._t), 7)
+
+    def drop_before(self, t: float) -> None:
+        """Forget what is older than ``t``."""
+        i = int(np.searchsorted(self._t, t))
+        del self._t[:i], self._rows[:i]
+
+
+class SlowTrack:
+    """A slow signal, scalar or vector: times and values."""
+
+    __slots__ = ("_t", "_x")
+
+    def __init__(self) -> None:
+        self._t: list[float] = []
+        self._x: list[tuple[float, ...]] = []
+
+    def __len__(self) -> int:
+        return len(self._t)
+
+    @property
+    def first(self) -> float:
+        """Time of the oldest value; inf if there is none."""
+        return self._t[0] if self._t else np.inf
+
+    @property
+    def last(self) -> float:
+        """Time of the newest value; -inf if there is none."""
+        return self._t[-1] if self._t else -np.inf
+
+    def add(self, t: float, x: tuple[float, ...]) -> bool:
+        """Keep a value unless it is late or not finite."""
+        if not t > self.last or not np.isfinite(sum(x)):
+            return False
+        self._t.append(t)
+        self._x.append(x)
+        return True
+
+    def arrays(self) -> tuple[Array, Array]:
+        """Times (n,) and values (n, d)."""
+        return np.array(self._t), np.array(self._x)
+
+    def drop_before(self, t: float) -> None:
+        """Forget what is older than ``t``, but keep the last two values."""
+        i = min(int(np.searchsorted(self._t, t)), max(len(self._t) - 2, 0))
+        del self._t[:i], self._x[:i]
+
+
+class FixTrack:
+    """GPS fixes: repeats dropped, times put on the receiver's own even grid."""
+
+    __slots__ = ("_fixes", "_last_even", "_offsets", "refused")
+
+    def __init__(self) -> None:
+        self._fixes: list[tuple[GpsFix, bool]] = []
+        self._offsets: list[tuple[float, float]] = []
+        self._last_even = -np.inf
+        self.refused: Counter[str] = Counter()
+
+    def __len__(self) -> int:
+        return len(self._fixes)
+
+    @property
+    def first(self) -> float:
+        """Stamp of the oldest fix that waits; inf if there is none."""
+        return self._fixes[0][0].t if self._fixes else np.inf
+
+    @property
+    def last(self) -> float:
+        """Stamp of the newest fix; -inf if there is none."""
+        return self._fixes[-1][0].t if self._fixes else -np.inf
+
+    def add(self, fix: GpsFix, *, trusted: bool) -> bool:
+        """Keep a new fix; False for the repeats that a faster stream sends between fixes."""
+        if self._fixes:
+            before = self._fixes[-1][0]
+            same = fix.t_receiver is not None and fix.t_receiver == before.t_receiver
+            if same or not fix.t > before.t:
+                self.refused["gps_repeated" if same or fix.t == before.t else "gps_late"] += 1
+                return False
+        self._fixes.append((fix, trusted))
+        return True
+
+    def take(self, until: float) -> tuple[list[GpsFix], NDArray[np.bool_], Array]:
+        """Fixes up to ``until``, their trust and even times; the last stays as the next first."""
+        n = int(np.searchsorted([f.t for f, _ in self._fixes], until, side="right"))
+        taken = self._fixes[:n]
+        fixes = [f for f, _ in taken]
+        t = even_times(
+            np.array([f.t for f in fixes]),
+            None
+            if any(f.t_receiver is None for f in fixes)
+            else np.array([f.t_receiver for f in fixes], dtype=np.float64),
+        )
+        if np.isfinite(self._last_even) and len(t) > 1:
+            # The first was the last of before: its time must not move under the filter's feet.
+            t[0] = min(self._last_even, t[1] - 1e-3)
+        if len(t):
+            self._last_even = float(t[-1])
+        self._fixes = self._fixes[max(n - 1, 0) :]
+        return fixes, np.array([trusted for _, trusted in taken], dtype=bool), t
+
+    def clear(self) -> None:
+        """Forget all fixes (reboot)."""
+        self._fixes.clear()
+        self._last_even = -np.inf
+
+
+def even_times(t: Array, t_receiver: Array | None) -> Array:
+    """De-jittered epoch times on the boot clock.
+
+    Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
+    own time the stamps are its clock plus a straight line (offset and drift); without it the
+    epoch numbers are recovered from the commonest interval.  A line is fitted robustly over the
+    chunk; stamps that are even already stay as they are.
+
+    Args:
+        t: (n,) stamps, s, increasing.
+        t_receiver: (n,) receiver times, s, or None.
+
+    Returns:
+        (n,) strictly increasing times.
+    """
+    n = len(t)
+    if n < 5:
+        return t.copy()
+    if t_receiver is not None and np.all(np.diff(t_receiver) > 0):
+        clock = t_receiver - t_receiver[0]
+    else:
+        period = float(np.median(np.diff(t)))
+        if period <= 0.0:
+            return t.copy()
+        count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
+        # The median of jittered intervals is off by a millisecond, which adds up over a chunk:
+        # good enough to number the epochs, not to say when they were.
+        period = float(np.polyfit(count, t - t[0], 1)[0])
+        # Whole milliseconds: receivers run at 1, 2, 4, 5, 8, 10 ... Hz.
+        period = (
+            round(period * 1e3) * 1e-3 if abs(period * 1e3 - round(period * 1e3)) < 0.3 else period
+        )
+        clock = count * period
+    offset = t - t[0] - clock
+    if float(np.ptp(offset)) < 2e-3:
+        return t.copy()
+    if float(np.ptp(offset)) > 0.3:
+        # Not one grid: gaps that are no whole periods, or a clock that was set.
+        return t.copy()
+    x = clock - clock.mean()
+    weight = np.ones(n)
+    line = np.zeros(n)
+    for _ in range(4):
+        mean = float(np.average(offset, weights=weight))
+        spread = float(weight @ (x * x))
+        # A crystal is good to 1e-4: over one chunk the slope is noise, unless it is long.
+        slope = float(np.clip(weight @ (x * (offset - mean)) / spread, -2e-4, 2e-4))
+        line = mean + slope * x
+        residual = np.abs(offset - line)
+        scale = max(float(np.median(residual)), 1e-4)
+        weight = 1.0 / np.maximum(1.0, residual / (2.0 * scale))
+    even: Array = t[0] + clock + line
+    return even

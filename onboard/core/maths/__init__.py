@@ -1,0 +1,1 @@
+"""Pure algebra: frames, the earth, interpolation, block sums, one conversion of scales."""

@@ -1,0 +1,15 @@
+"""Arrays as the core writes them: float64, SI units, frames in their names."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""Float64 array; its shape stands in the docstring of whoever takes or gives it."""
+Mask: TypeAlias = NDArray[np.bool_]
+"""Boolean array."""
+Vector3: TypeAlias = tuple[float, float, float]
+"""Three numbers of one place or direction, in a record that never changes."""

@@ -1,0 +1,299 @@
+"""Rotations: Euler angles, rotation vectors, ArduPilot's board orientation and level trim.
+
+Conventions as in :mod:`onboard`: ``R_nb = Rz(yaw) Ry(pitch) Rx(roll)`` takes body (FRD)
+components to NED.  Every function takes leading dimensions ``(...)`` and keeps them; a
+rotation matrix is ``(..., 3, 3)``, a vector ``(..., 3)``, angles are radians.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from onboard.core.maths.arrays import Array, Vector3
+
+
+def rotation_from_euler(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """``Rz(yaw) Ry(pitch) Rx(roll)``, aerospace 3-2-1 order, as MAVLink's ATTITUDE means it.
+
+    Args:
+        roll: (...) rad; broadcast against the other two.
+        pitch: (...) rad.
+        yaw: (...) rad.
+
+    Returns:
+        (..., 3, 3) ``R_nb``.
+    """
+    r, p, y = np.broadcast_arrays(
+        np.asarray(roll, dtype=np.float64),
+        np.asarray(pitch, dtype=np.float64),
+        np.asarray(yaw, dtype=np.float64),
+    )
+    sr, cr, sp, cp, sy, cy = np.sin(r), np.cos(r), np.sin(p), np.cos(p), np.sin(y), np.cos(y)
+    R = np.empty((*r.shape, 3, 3))
+    R[..., 0, 0] = cy * cp
+    R[..., 0, 1] = cy * sp * sr - sy * cr
+    R[..., 0, 2] = cy * sp * cr + sy * sr
+    R[..., 1, 0] = sy * cp
+    R[..., 1, 1] = sy * sp * sr + cy * cr
+    R[..., 1, 2] = sy * sp * cr - cy * sr
+    R[..., 2, 0] = -sp
+    R[..., 2, 1] = cp * sr
+    R[..., 2, 2] = cp * cr
+    return R
+
+
+def euler_from_rotation(R_nb: ArrayLike) -> tuple[Array, Array, Array]:
+    """Inverse of :func:`rotation_from_euler`: (roll, pitch, yaw), each (...), rad.
+
+    At pitch +-90 deg roll and yaw are one angle; the split that comes out still gives the
+    same matrix.
+    """
+    R = np.asarray(R_nb, dtype=np.float64)
+    cos_pitch = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    pitch = np.arctan2(-R[..., 2, 0], cos_pitch)
+    yaw = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    # Roll from the y and z columns turned back by yaw: stays right where cos(pitch) vanishes.
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(
+        s * R[..., 0, 2] - c * R[..., 1, 2],
+        c * R[..., 1, 1] - s * R[..., 0, 1],
+    )
+    return roll, pitch, yaw
+
+
+def skew(v: ArrayLike) -> Array:
+    """(..., 3, 3) matrix of the cross product: ``skew(a) @ b = a x b``."""
+    a = np.asarray(v, dtype=np.float64)
+    S = np.zeros((*a.shape, 3))
+    S[..., 0, 1], S[..., 0, 2] = -a[..., 2], a[..., 1]
+    S[..., 1, 0], S[..., 1, 2] = a[..., 2], -a[..., 0]
+    S[..., 2, 0], S[..., 2, 1] = -a[..., 1], a[..., 0]
+    return S
+
+
+def rotation_from_vector(phi: ArrayLike) -> Array:
+    """Exponential of so(3): rotation by ``|phi|`` rad about ``phi`` (Rodrigues).
+
+    Args:
+        phi: (..., 3) rad.
+
+    Returns:
+        (..., 3, 3), to rounding also for ``phi`` of 0.
+    """
+    v = np.asarray(phi, dtype=np.float64)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    K = skew(v)
+    # np.sinc(x) = sin(pi x) / (pi x): both factors are smooth at zero.
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    result: Array = np.eye(3) + first * K + second * (K @ K)
+    return result
+
+
+def quaternion_from_rotation(R: ArrayLike) -> Array:
+    """(..., 4) unit quaternion w, x, y, z with w >= 0 (Shepperd 1978: largest of four pivots)."""
+    M = np.asarray(R, dtype=np.float64)
+    m00, m11, m22 = M[..., 0, 0], M[..., 1, 1], M[..., 2, 2]
+    a, b, c = (
+        M[..., 2, 1] - M[..., 1, 2],
+        M[..., 0, 2] - M[..., 2, 0],
+        M[..., 1, 0] - M[..., 0, 1],
+    )
+    p, q, r = (
+        M[..., 0, 1] + M[..., 1, 0],
+        M[..., 0, 2] + M[..., 2, 0],
+        M[..., 1, 2] + M[..., 2, 1],
+    )
+    # Rows of 4 q q^T; each row is the quaternion times one of its own components.
+    outer = np.stack(
+        [
+            np.stack([1 + m00 + m11 + m22, a, b, c], axis=-1),
+            np.stack([a, 1 + m00 - m11 - m22, p, q], axis=-1),
+            np.stack([b, p, 1 - m00 + m11 - m22, r], axis=-1),
+            np.stack([c, q, r, 1 - m00 - m11 + m22], axis=-1),
+        ],
+        axis=-2,
+    )
+    pivot = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(outer, pivot[..., None, None], axis=-2)[..., 0, :]
+    row = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    result: Array = np.where(row[..., :1] < 0, -row, row)
+    return result
+
+
+def rotation_from_quaternion(q: ArrayLike) -> Array:
+    """(..., 3, 3) from a quaternion w, x, y, z (..., 4); it need not be normalised, only not 0."""
+    a = np.asarray(q, dtype=np.float64)
+    a = a / np.linalg.norm(a, axis=-1, keepdims=True)
+    S = skew(a[..., 1:])
+    result: Array = np.eye(3) + 2 * a[..., :1, None] * S + 2 * (S @ S)
+    return result
+
+
+def vector_from_rotation(R: ArrayLike) -> Array:
+    """Logarithm of SO(3): the ``phi`` (..., 3), ``|phi| <= pi``, of :func:`rotation_from_vector`.
+
+    Through the quaternion, so that it keeps full accuracy near 0 and near pi, where the trace
+    of ``R`` says nothing about the angle.  At pi exactly the sign of ``phi`` is arbitrary.
+    """
+    q = quaternion_from_rotation(R)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, q[..., :1])
+    small = sine < 1e-12
+    result: Array = q[..., 1:] * np.where(small, 2.0, angle / np.where(small, 1.0, sine))
+    return result
+
+
+def interpolate_rotation(t: ArrayLike, t_k: ArrayLike, R_k: ArrayLike) -> Array:
+    """Rotation at times ``t`` from samples, at constant angular rate between neighbours.
+
+    Args:
+        t: (n,) times wanted; before the first and after the last sample those are held.
+        t_k: (m,) strictly increasing times of the samples, m >= 1.
+        R_k: (m, 3, 3) rotations there.
+
+    Returns:
+        (n, 3, 3).
+    """
+    at, times = np.asarray(t, dtype=np.float64), np.asarray(t_k, dtype=np.float64)
+    R = np.asarray(R_k, dtype=np.float64)
+    if len(times) == 1:
+        return np.broadcast_to(R[0], (*at.shape, 3, 3)).copy()
+    rates = vector_from_rotation(np.swapaxes(R[:-1], -1, -2) @ R[1:])
+    k = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    share = np.clip((at - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0)
+    result: Array = R[k] @ rotation_from_vector(share[..., None] * rates[k])
+    return result
+
+
+# AHRS_ORIENTATION: value -> roll, pitch, yaw in degrees, applied in the order of
+# rotation_from_euler (ArduPilot AP_Math/rotations.h; its own test checks the same list).
+_BOARD_EULER_DEG: Final[dict[int, Vector3]] = {
+    0: (0, 0, 0),
+    1: (0, 0, 45),
+    2: (0, 0, 90),
+    3: (0, 0, 135),
+    4: (0, 0, 180),
+    5: (0, 0, 225),
+    6: (0, 0, 270),
+    7: (0, 0, 315),
+    8: (180, 0, 0),
+    9: (180, 0, 45),
+    10: (180, 0, 90),
+    11: (180, 0, 135),
+    12: (0, 180, 0),
+    13: (180, 0, 225),
+    14: (180, 0, 270),
+    15: (180, 0, 315),
+    16: (90, 0, 0),
+    17: (90, 0, 45),
+    18: (90, 0, 90),
+    19: (90, 0, 135),
+    20: (270, 0, 0),
+    21: (270, 0, 45),
+    22: (270, 0, 90),
+    23: (270, 0, 135),
+    24: (0, 90, 0),
+    25: (0, 270, 0),
+    26: (0, 180, 90),
+    27: (0, 180, 270),
+    28: (90, 90, 0),
+    29: (180, 90, 0),
+    30: (270, 90, 0),
+    31: (90, 180, 0),
+    32: (270, 180, 0),
+    33: (90, 270, 0),
+    34: (180, 270, 0),
+    35: (270, 270, 0),
+    36: (90, 180, 90),
+    37: (90, 0, 270),
+    38: (90, 68.8, 293.3),  # its name says 68 and 293
+    39: (0, 315, 0),
+    40: (90, 315, 0),
+    41: (0, 7, 0),
+    42: (45, 0, 0),
+    43: (315, 0, 0),
+}
+# 100 is the custom rotation of firmware up to 4.1, 101 and 102 are CUST_ROT1_* and CUST_ROT2_*.
+CUSTOM_ORIENTATIONS: Final = frozenset({100, 101, 102})
+
+
+def board_rotation(value: float, custom: Vector3 | None = None) -> Array | None:
+    """``R_bs`` for a value of AHRS_ORIENTATION.
+
+    Args:
+        value: the parameter, an integer that PARAM_VALUE carries as a float.
+        custom: roll, pitch, yaw (rad) for the custom values 100 ... 102: CUST_ROT1_ROLL and
+            so on (degrees there).
+
+    Returns:
+        (3, 3), exact zeros and ones for multiples of 90 deg; None for a value that no known
+        firmware defines, and for a custom one without its angles.
+    """
+    if not np.isfinite(value) or value != int(value):
+        return None
+    orientation = int(value)
+    if orientation in CUSTOM_ORIENTATIONS:
+        return None if custom is None else rotation_from_euler(*custom)
+    euler = _BOARD_EULER_DEG.get(orientation)
+    if euler is None:
+        return None
+    R = rotation_from_euler(*np.deg2rad(euler))
+    nearest = np.round(R)
+    # sin(pi) is not zero in floats; + 0.0 turns -0 into 0.
+    return nearest + 0.0 if np.allclose(R, nearest, rtol=0, atol=1e-12) else R
+
+
+def is_axis_aligned(R: ArrayLike) -> bool:
+    """True if ``R`` (3, 3) only swaps and flips axes, to 1e-9: a diagonal stays diagonal in it."""
+    M = np.abs(np.asarray(R, dtype=np.float64))
+    return bool(
+        np.all((M < 1e-9) | (np.abs(M - 1) < 1e-9))
+        and np.all(M.round().sum(axis=0) == 1)
+        and np.all(M.round().sum(axis=1) == 1)
+    )
+
+
+def untrimmed_rotation(
+    roll: ArrayLike,
+    pitch: ArrayLike,
+    yaw: ArrayLike,
+    trim: Vector3 = (0.0, 0.0, 0.0),
+    pitch_trim: float = 0.0,
+) -> Array:
+    """``R_nb`` of the accelerometer's body axes from a reported attitude, EKF2 and EKF3.
+
+    The EKFs report ``euler(R_nb) - AHRS_TRIM`` *angle by angle* (getEulerAngles in
+    AP_NavEKF3_Outputs.cpp), while the accelerometer is not trimmed.  That is not a rotation of
+    the body: in a bank of 60 deg the two differ by the whole size of the trim.
+
+    Args:
+        roll: (...) as reported, rad.
+        pitch: (...) as reported, rad.
+        yaw: (...) as reported, rad.
+        trim: AHRS_TRIM_X, _Y, _Z, rad.
+        pitch_trim: PTCH_TRIM_DEG in rad.  Plane subtracts it from the pitch of the MAVLink
+            message ATTITUDE (not from the log's ATT) unless FLIGHT_OPTIONS has bit 8.
+
+    Returns:
+        (..., 3, 3).
+    """
+    return rotation_from_euler(
+        np.asarray(roll) + trim[0],
+        np.asarray(pitch) + (trim[1] + pitch_trim),
+        np.asarray(yaw) + trim[2],
+    )
+
+
+def untrimmed_rotation_dcm(
+    roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike, trim: Vector3 = (0.0, 0.0, 0.0)
+) -> Array:
+    """The same where DCM reports the attitude (AHRS_EKF_TYPE 0, firmware before the EKFs).
+
+    DCM does rotate: ``R_reported = R_nb R(trim)^T`` (AP_AHRS_DCM.cpp), undone exactly here.
+    """
+    result: Array = rotation_from_euler(roll, pitch, yaw) @ rotation_from_euler(*trim)
+    return result

@@ -1,0 +1,1 @@
+"""What is predicted: how each unknown moves the velocity between two fixes."""

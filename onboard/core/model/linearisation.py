@@ -1,0 +1,65 @@
+"""Where the problem is taken to be linear: timing, and the six that turn forces into rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.inputs.segments import Stretch
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import rotation_from_euler
+
+MOVING = ("gps_delay", "window_squared", "attitude_delay", "heading")
+"""Unknowns that are estimated about the linearisation, which follows them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Linearisation:
+    """The point about which the non-linear unknowns are expanded.
+
+    Attributes:
+        scale: (3,) of the accelerometer.
+        beta: (3,) ``-scale * offset``, m/s^2.
+        delay: GPS latency, s.
+        window: averaging span of the receiver, s.
+        attitude_delay: lateness of the recorded attitude, s.
+        heading: how much too large the recorded yaw is, rad.
+        skew: growth of the latency, s/s, from ``skew_from`` (s on the boot clock) on.
+        skew_from: see ``skew``.
+    """
+
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    beta: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    delay: float = 0.1
+    window: float = 0.0
+    attitude_delay: float = 0.0
+    heading: float = 0.0
+    skew: float = 0.0
+    skew_from: float = 0.0
+
+    def true_time(self, stamp: Array) -> Array:
+        """When what a fix with these stamps says was true, s."""
+        out: Array = stamp - self.delay - self.skew * (stamp - self.skew_from)
+        return out
+
+    @property
+    def moving(self) -> tuple[float, float, float, float]:
+        """What has been taken in of the unknowns :data:`MOVING`."""
+        return self.delay, self.window**2, self.attitude_delay, self.heading
+
+    def near(self, other: Linearisation, within: tuple[float, float, float, float]) -> bool:
+        """Whether no unknown has moved by as much as ``within``."""
+        moves = np.abs(np.subtract(self.moving, other.moving))
+        return bool(np.all(moves < np.array(within)))
+
+    def attitude(self, stretch: Stretch, t: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
+        R, near = stretch.attitude_at(t + self.attitude_delay)
+        return rotation_from_euler(0.0, 0.0, -self.heading) @ R, near
+
+    @property
+    def six(self) -> Array:
+        """(6,) scale, beta."""
+        return np.array(self.scale + self.beta)

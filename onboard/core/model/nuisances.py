@@ -1,0 +1,206 @@
+"""The columns that are always there: the six numbers, timing, and what would hide in them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.quadrature import Around, Signals, lever_velocity
+from onboard.core.model.regressors import Direct, Family, Unknown
+from onboard.core.model.smoothing import mean_slope, second_difference
+
+AXIS = "xyz"
+THIRD_MOMENT = 1e-3
+"""Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
+ANTENNA_SIGMA = 0.05
+"""Prior sigma of the antenna's place, m.  A person with a ruler knows neither where in its housing
+an antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where nothing was
+told, the two are a hand's breadth apart even on a small vehicle.  What is more is an effect.  On
+flights with turns 2 cm and 15 cm give the six the same sigmas within a few per cent."""
+
+
+class Six(Family):
+    """Scale and ``beta = -scale * offset`` of the accelerometer: ``f_s = scale raw + beta``."""
+
+    name = "six"
+
+    def __init__(
+        self,
+        scale: Array | None = None,
+        beta: Array | None = None,
+        scale_sigma: float = 0.03,
+        beta_sigma: float = 0.5,
+    ) -> None:
+        """Take the prior: a factory-calibrated MEMS has 2-3 % and 0.5 m/s^2 (method.md, 4)."""
+        centre = np.ones(3) if scale is None else scale
+        shift = np.zeros(3) if beta is None else beta
+        self.unknowns = tuple(
+            Unknown(f"scale_{a}", "1", float(centre[i]), scale_sigma) for i, a in enumerate(AXIS)
+        ) + tuple(
+            Unknown(f"beta_{a}", "m/s^2", float(shift[i]), beta_sigma) for i, a in enumerate(AXIS)
+        )
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``R_bs e_j raw_j`` and ``R_bs e_j``."""
+        out = np.empty((*nodes.t.shape, 3, 6))
+        out[..., :3] = nodes.R_bs * nodes.raw_s[..., None, :]
+        out[..., 3:] = nodes.R_bs
+        return out
+
+
+class GpsLatency(Family):
+    """How late the receiver's velocity is: ``V(t - delay)``, first order about the delay taken."""
+
+    name = "gps_latency"
+
+    def __init__(self, taken: float, sigma: float = 0.5) -> None:
+        """Take the delay (s) of the linearisation, which is also the prior's centre."""
+        self.unknowns = (Unknown("gps_delay", "s", 0.0, sigma),)
+        self.taken = taken
+
+    def velocity(self, around: Around) -> Direct:
+        """``-a = -(R f + g)``."""
+        body = -around.now.f_b[..., None]
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = -STANDARD_GRAVITY
+        return Direct(body=body, ned=ned)
+
+    def position(self, around: Around) -> Direct:
+        """``-v``."""
+        return Direct(along_velocity=-np.ones((len(around.now.t), 1)))
+
+
+class HeightLatency(Family):
+    """Additional lateness of the reported height: receivers smooth positions by themselves."""
+
+    name = "height_latency"
+
+    def __init__(self, sigma: float = 0.1) -> None:
+        """Take the prior sigma, s."""
+        self.unknowns = (Unknown("height_delay", "s", 0.0, sigma),)
+
+    def position(self, around: Around) -> Direct:
+        """``-v``, for the height only."""
+        return Direct(along_velocity=-np.ones((len(around.now.t), 1)))
+
+
+class GpsSmoothing(Family):
+    """Averaging span of the receiver; the unknown is ``window^2`` less that taken."""
+
+    name = "gps_smoothing"
+
+    def __init__(self, taken: float, sigma: float = 0.2) -> None:
+        """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
+        self.unknowns = (
+            Unknown("window_squared", "s^2", 0.0, sigma),
+            Unknown("third_moment", "s^3", 0.0, THIRD_MOMENT),
+        )
+        self.taken = taken
+
+    def velocity(self, around: Around) -> Direct:
+        """Mean over the span less the value, per s^2 of ``window^2``; third derivative over 6.
+
+        A filter that looks back (every real one) is not symmetric about its delay; its third
+        central moment would otherwise be taken for delay where the manoeuvre is quick.
+        """
+        slope = mean_slope(around.offset, self.taken)
+        third = second_difference(around.offset) / 6.0
+        return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_epoch))
+
+    def position(self, around: Around) -> Direct:
+        """``a / 24``: the mean of a parabola over the span."""
+        body = np.zeros((len(around.now.t), 3, 2))
+        body[..., 0] = around.now.f_b / 24.0
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
+        return Direct(body=body, ned=ned)
+
+
+class AntennaPlace(Family):
+    """Antenna some centimetres away from where it was told to be: a nuisance.
+
+    Held at nothing, a centimetre ``r`` is taken for something else.  Forwards or sideways, in turns
+    at a rate ``w``, its acceleration is that of an offset ``w^2 r``.  Upwards, with the force of a
+    hover, its velocity is what the receiver's average makes of ``window^2 = 24 r / g``; scale and
+    offset of z then make up for what such a window does where the force is another one.
+    """
+
+    name = "antenna_place"
+
+    def __init__(self, sigma: float = ANTENNA_SIGMA) -> None:
+        """Take the prior sigma, m."""
+        self.unknowns = tuple(Unknown(f"antenna_{a}", "m", 0.0, sigma) for a in AXIS)
+
+    def velocity(self, around: Around) -> Direct:
+        """``R (w x e_i)``, the velocity of a point of a rigid body."""
+        return Direct(body=lever_velocity(around.now.w_b))
+
+    def position(self, around: Around) -> Direct:
+        """``R e_i``."""
+        return Direct(body=np.broadcast_to(np.eye(3), (len(around.now.t), 3, 3)))
+
+
+class ImuDelay(Family):
+    """How late the recorded attitude is stamped against the inertial samples."""
+
+    name = "imu_delay"
+
+    def __init__(self, taken: float = 0.0, sigma: float = 0.2) -> None:
+        """Take the delay of the linearisation, s."""
+        self.unknowns = (Unknown("attitude_delay", "s", 0.0, sigma),)
+        self.taken = taken
+
+    def attitude(self, around: Around) -> Direct:
+        """``R(t - d) R(t)^T = exp(-R w d)``."""
+        return Direct(body=-around.now.w_b[..., None])
+
+
+class GyroTiming(Family):
+    """Remaining delay between gyroscope and accelerometer: their filters need not be alike."""
+
+    name = "gyro_timing"
+
+    def __init__(self, sigma: float = 0.005) -> None:
+        """Take the prior sigma, s: streams send both in one message."""
+        self.unknowns = (Unknown("gyro_delay", "s", 0.0, sigma),)
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``R(t + d) f = R f + R (w x f) d``: a late gyroscope gives an attitude of the past."""
+        return np.cross(nodes.w_b, nodes.f_b)[..., None]
+
+
+class GyroScale(Family):
+    """Scale of the gyroscope, which nobody calibrates: a nuisance, 1 % by its data sheet."""
+
+    name = "gyro_scale"
+
+    def __init__(self, sigma: float = 0.01) -> None:
+        """Take the prior sigma."""
+        self.unknowns = tuple(Unknown(f"gyro_scale_{a}", "1", 0.0, sigma) for a in AXIS)
+
+    def rate(self, nodes: Signals) -> Array:
+        """``-e_j w_j``: the unknown is what the gyroscope reads too much."""
+        return -np.eye(3) * nodes.w_b[..., None, :]
+
+
+class AttitudeOffset(Family):
+    """Constant errors of the recorded attitude: tilt fixed in the body, heading fixed to north."""
+
+    name = "attitude_offset"
+
+    def __init__(self, tilt_sigma: float = 0.03, heading_sigma: float = 0.1) -> None:
+        """Take the prior sigmas, rad."""
+        self.unknowns = (
+            Unknown("tilt_roll", "rad", 0.0, tilt_sigma),
+            Unknown("tilt_pitch", "rad", 0.0, tilt_sigma),
+            Unknown("heading", "rad", 0.0, heading_sigma),
+        )
+
+    def attitude(self, around: Around) -> Direct:
+        """``R e_x``, ``R e_y`` and ``e_down``: how much too large the recorded angles are."""
+        K = len(around.now.t)
+        body, ned = np.zeros((K, 3, 3)), np.zeros((K, 3, 3))
+        body[:, 0, 0] = body[:, 1, 1] = 1.0
+        ned[:, 2, 2] = 1.0
+        return Direct(body=body, ned=ned)

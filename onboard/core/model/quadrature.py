@@ -1,0 +1,255 @@
+"""Quadrature nodes: signals and relative attitude inside and around GPS epochs.
+
+Everything that is integrated between two GPS epochs is needed at a few equidistant nodes, in the
+body axes *of the interval's start*: ``P(tau) = R_nb(start)^T R_nb(tau)`` follows from the
+gyroscope alone, so the integrals are done for a whole stretch of flight at once and turned into
+NED when the filter, going through the epochs, knows ``R_nb(start)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.inputs.segments import Stretch
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
+
+AROUND_SPAN_S = 0.25
+"""Reach of the nodes to either side of an epoch: receivers average over less than 0.5 s."""
+AROUND_COUNT = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """Measured signals at times ``t`` of any shape S.
+
+    Attributes:
+        t: S, s.
+        w_b: (*S, 3) angular rate less the bias estimate, rad/s.
+        raw_s: (*S, 3) raw specific force, sensor axes, m/s^2.
+        f_b: (*S, 3) specific force by the six of the linearisation, body axes, m/s^2.
+        stretch: where slow signals are looked up.
+    """
+
+    t: Array
+    w_b: Array
+    raw_s: Array
+    f_b: Array
+    stretch: Stretch
+
+    def slow(self, name: str) -> Array | None:
+        """Slow signal at these times, S or (*S, 3); None if the recording lacks it."""
+        return self.stretch.slow_at(name, self.t)
+
+    @property
+    def R_bs(self) -> Array:
+        """(3, 3) board orientation."""
+        return self.stretch.R_bs
+
+
+@dataclass(frozen=True, slots=True)
+class Intervals:
+    """Nodes inside K intervals, M + 1 in each, Simpson weights.
+
+    Attributes:
+        signals: at the nodes, S = (K, M + 1).
+        P: (K, M + 1, 3, 3) body axes at the node to body axes at the interval's start.
+        duration: (K,) s.
+        weight: (K, M + 1) of ``integral x dtau``.
+        weight_to_end: (K, M + 1) of ``integral (T - tau) x dtau``.
+    """
+
+    signals: Signals
+    P: Array
+    duration: Array
+    weight: Array
+    weight_to_end: Array
+
+    def integrals(self, x_b: Array) -> tuple[Array, Array]:
+        """``integral P x dtau`` and ``integral (T - tau) P x dtau``.
+
+        Args:
+            x_b: (K, M + 1, 3, m) columns in body axes at each node.
+
+        Returns:
+            Two arrays (K, 3, m) in the body axes of each interval's start.
+        """
+        turned = self.P @ x_b
+        return (
+            np.einsum("ki,kiam->kam", self.weight, turned),
+            np.einsum("ki,kiam->kam", self.weight_to_end, turned),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """Nodes around K epochs, for what a receiver averages.
+
+    Attributes:
+        offset: (2 J + 1,) s.
+        signals: at the nodes, S = (K, 2 J + 1).
+        f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
+        now: signals at the epochs, S = (K,).
+        swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
+            span that it averages, body axes of the epoch, 1/s.
+    """
+
+    offset: Array
+    signals: Signals
+    f_epoch: Array
+    now: Signals
+    swing: Array
+
+
+def lever_velocity(w_b: Array) -> Array:
+    """(K, 3, 3) columns ``w x e_i``, 1/s: a rigid body's velocity per m of lever arm.
+
+    Args:
+        w_b: (K, 3) rate, rad/s.
+    """
+    out: Array = np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
+    return out
+
+
+def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
+    """Mean of ``d P / dt`` over the span: ``(P(window/2) - P(-window/2)) / window``.
+
+    Args:
+        offset: (n,) of the nodes, s.
+        P: (K, n, 3, 3) attitude there against that of the epoch.
+        w_b: (K, 3) rate at the epoch.
+        window: s; below two nodes the rate at the epoch does.
+    """
+    step = float(offset[1] - offset[0])
+    if window < 2.0 * step:
+        return lever_velocity(w_b)
+    at = (min(window / 2.0, float(offset[-1])) - offset[0]) / step
+    low = min(int(at), len(offset) - 2)
+    share = at - low
+    after = (1.0 - share) * P[:, low] + share * P[:, low + 1]
+    before = (1.0 - share) * P[:, -1 - low] + share * P[:, -2 - low]
+    out: Array = (after - before) / (2.0 * (offset[0] + at * step))
+    return out
+
+
+def simpson_weights(count: int) -> Array:
+    """(count + 1,) weights of composite Simpson on [0, 1]; ``count`` is even."""
+    w = np.ones(count + 1)
+    w[1:-1:2] = 4.0
+    w[2:-1:2] = 2.0
+    return w / (3.0 * count)
+
+
+def rotation_increments(w: Array, h: Array) -> Array:
+    """Rotation vectors over steps, fourth order.
+
+    Magnus expansion of ``R' = R [w x]``: ``h/6 (w0 + 4 wm + w1) + h^2/12 w0 x w1`` (Iserles et
+    al., Acta Numerica 9, 2000; in strapdown terms Simpson plus coning).
+
+    Args:
+        w: (..., 2 M + 1, 3) rates at the ends and the middles of M steps, rad/s.
+        h: (...,) length of one step, s.
+
+    Returns:
+        (..., M, 3) rad.
+    """
+    w0, wm, w1 = w[..., 0:-2:2, :], w[..., 1:-1:2, :], w[..., 2::2, :]
+    step = h[..., None, None]
+    out: Array = step / 6.0 * (w0 + 4.0 * wm + w1) + step**2 / 12.0 * np.cross(w0, w1)
+    return out
+
+
+def _chain(turns: Array) -> Array:
+    """Running products (K, M + 1, 3, 3) of ``turns`` (K, M, 3, 3), the identity first."""
+    K, M = turns.shape[:2]
+    P = np.empty((K, M + 1, 3, 3))
+    P[:, 0] = np.eye(3)
+    for i in range(M):
+        P[:, i + 1] = P[:, i] @ turns[:, i]
+    return P
+
+
+class NodeMaker:
+    """Makes nodes from one stretch, for one gyroscope bias and one set of six."""
+
+    def __init__(
+        self, stretch: Stretch, bias_b: Array, six: Array, *, recorded_attitude: bool = False
+    ) -> None:
+        """Take the stretch and the linearisation.
+
+        Args:
+            stretch: the samples.
+            bias_b: (3,) gyroscope bias to subtract, rad/s.
+            six: (6,) scale and ``beta = -scale * offset`` of the linearisation.
+            recorded_attitude: relative attitude from the recorded one instead of the gyroscope.
+        """
+        self._stretch = stretch
+        self._bias = bias_b
+        self._six = six
+        self._recorded = recorded_attitude
+        self._at = stretch.interpolant()
+        self._rate = (len(stretch.t) - 1) / (stretch.t[-1] - stretch.t[0])
+
+    def signals(self, t: Array) -> Signals:
+        """Signals at times ``t`` of any shape."""
+        x = self._at(t)
+        raw = x[..., 3:]
+        f_b = (raw * self._six[:3] + self._six[3:]) @ self._stretch.R_bs.T
+        return Signals(t, x[..., :3] - self._bias, raw, f_b, self._stretch)
+
+    def intervals(self, start: Array, end: Array) -> Intervals:
+        """Nodes in the intervals ``start`` ... ``end`` (K,), as dense as the samples or denser."""
+        T = end - start
+        # Below 80 Hz the samples are the bottleneck: half the step costs nothing by comparison.
+        density = self._rate * (1.0 if self._rate > 80.0 else 1.5)
+        M = max(4, 2 * int(np.ceil(density * float(T.max()) / 2.0)))
+        share = np.arange(2 * M + 1) / (2.0 * M)
+        fine = self.signals(start[:, None] + T[:, None] * share)
+        coarse = Signals(
+            fine.t[:, ::2],
+            fine.w_b[:, ::2],
+            fine.raw_s[:, ::2],
+            fine.f_b[:, ::2],
+            self._stretch,
+        )
+        if self._recorded:
+            R = self._attitude(coarse.t)
+            P = np.swapaxes(R[:, :1], -1, -2) @ R
+        else:
+            P = _chain(rotation_from_vector(rotation_increments(fine.w_b, T / M)))
+        weight = simpson_weights(M) * T[:, None]
+        to_end = weight * (1.0 - share[::2]) * T[:, None]
+        return Intervals(coarse, P, T, weight, to_end)
+
+    def around(self, epoch: Array, window: float = 0.0) -> Around:
+        """Nodes around ``epoch`` (K,) of a receiver that averages over ``window``, s."""
+        J = AROUND_COUNT
+        offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
+        fine = self.signals(epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1))
+        nodes = Signals(
+            fine.t[:, ::2],
+            fine.w_b[:, ::2],
+            fine.raw_s[:, ::2],
+            fine.f_b[:, ::2],
+            self._stretch,
+        )
+        if self._recorded:
+            R = self._attitude(nodes.t)
+            P = np.swapaxes(R[:, J : J + 1], -1, -2) @ R
+        else:
+            h = np.full(len(epoch), offset[1] - offset[0])
+            turns = rotation_from_vector(rotation_increments(fine.w_b, h))
+            after = _chain(turns[:, J:])
+            back = _chain(np.swapaxes(turns[:, :J], -1, -2)[:, ::-1])
+            P = np.concatenate([back[:, :0:-1], after], axis=1)
+        f_epoch = (P @ nodes.f_b[..., None])[..., 0]
+        now = Signals(
+            nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._stretch
+        )
+        return Around(offset, nodes, f_epoch, now, _swing(offset, P, now.w_b, window))
+
+    def _attitude(self, t: Array) -> Array:
+        flat = interpolate_rotation(t.ravel(), self._stretch.t_attitude, self._stretch.R_attitude)
+        return flat.reshape(*t.shape, 3, 3)

@@ -1,0 +1,173 @@
+"""Columns of the whitened criterion: how each unknown enters what is measured.
+
+A *family* is a few unknowns of one piece of physics.  It says, for one unit of each unknown, what
+it adds to the predicted measurement, by any of these ways (all linear):
+
+``acceleration``  a specific force in body axes at every node: integrated once into velocity and
+                  twice into height;
+``rate``          an angular rate in body axes at every node: turns the attitude, and through it
+                  the specific force;
+``velocity``      directly to the GPS velocity: part in body axes of the epoch, part in NED;
+``position``      directly to the GPS position (only height is used), body part, NED part, and a
+                  multiple of the velocity itself (delays);
+``attitude``      directly to the recorded attitude (rotation vector, NED): body part, NED part.
+
+The prediction is that of what the autopilot *recorded*; unknowns are errors of the recording
+(effects: ``measured = true + ...``), so an acceleration error enters with a minus sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.model.quadrature import Around, Intervals, Signals
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One unknown: its name, unit, prior mean and prior standard deviation (all SI)."""
+
+    name: str
+    unit: str
+    prior: float
+    prior_sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Direct:
+    """Direct contributions at K epochs, m unknowns; None means no contribution.
+
+    ``body`` and ``ned`` are (K, 3, m); ``along_velocity`` is (K, m), a factor of the velocity.
+    """
+
+    body: Array | None = None
+    ned: Array | None = None
+    along_velocity: Array | None = None
+
+
+NOTHING = Direct()
+
+
+class Family:
+    """A piece of physics: unknowns and their columns.  Subclasses override what applies.
+
+    Attributes:
+        name: of the family, unique in a model.
+        unknowns: in the order of their columns.
+        instead_of: name of a nuisance that has the same columns and gives way to this family.
+    """
+
+    name: str = ""
+    instead_of: str = ""
+    unknowns: tuple[Unknown, ...] = ()
+
+    def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
+        """True if the recording has the signals that the columns need."""
+        return True
+
+    def acceleration(self, nodes: Signals) -> Array | None:  # noqa: ARG002
+        """(K, M + 1, 3, m) body axes, m/s^2 per unit; added to the predicted specific force."""
+        return None
+
+    def rate(self, nodes: Signals) -> Array | None:  # noqa: ARG002
+        """(K, M + 1, 3, m) body axes, rad/s per unit; added to the true angular rate."""
+        return None
+
+    def velocity(self, around: Around) -> Direct:  # noqa: ARG002
+        """Added to the predicted GPS velocity, m/s per unit."""
+        return NOTHING
+
+    def position(self, around: Around) -> Direct:  # noqa: ARG002
+        """Added to the predicted GPS position (NED), m per unit."""
+        return NOTHING
+
+    def attitude(self, around: Around) -> Direct:  # noqa: ARG002
+        """Added to the recorded attitude, rotation vector in NED, rad per unit."""
+        return NOTHING
+
+
+@dataclass(frozen=True, slots=True)
+class StretchColumns:
+    """All columns of K intervals (index k: from epoch k to k + 1) and K + 1 epochs, m unknowns.
+
+    Interval arrays are in body axes of the interval's start, epoch arrays as in :class:`Direct`.
+    """
+
+    force1: Array
+    force2: Array
+    turn: Array
+    velocity_body: Array
+    velocity_ned: Array
+    position_body: Array
+    position_ned: Array
+    along_velocity: Array
+    attitude_body: Array
+    attitude_ned: Array
+
+
+class Model:
+    """An ordered set of families: which column is whose."""
+
+    def __init__(self, families: Sequence[Family]) -> None:
+        """Take the families; their unknowns are numbered in this order."""
+        self.families = tuple(families)
+        self.unknowns = tuple(u for f in self.families for u in f.unknowns)
+        self.slices: dict[str, slice] = {}
+        at = 0
+        for family in self.families:
+            self.slices[family.name] = slice(at, at + len(family.unknowns))
+            at += len(family.unknowns)
+        self.size = at
+        self.index = {u.name: i for i, u in enumerate(self.unknowns)}
+        self.prior = np.array([u.prior for u in self.unknowns])
+        self.prior_sigma = np.array([u.prior_sigma for u in self.unknowns])
+
+    def columns(self, intervals: Intervals, around: Around) -> StretchColumns:
+        """Evaluate every family on one stretch."""
+        K, M1 = intervals.signals.t.shape
+        m, epochs = self.size, len(around.now.t)
+        force = np.zeros((K, M1, 3, m))
+        rate = np.zeros((K, M1, 3, m))
+        turning = False
+        direct = {key: np.zeros((epochs, 3, m)) for key in ("vb", "vn", "pb", "pn", "ab", "an")}
+        along = np.zeros((epochs, m))
+        for family in self.families:
+            s = self.slices[family.name]
+            if not family.available(around.now):
+                continue
+            a = family.acceleration(intervals.signals)
+            if a is not None:
+                force[..., s] = a
+            w = family.rate(intervals.signals)
+            if w is not None:
+                rate[..., s] = w
+                turning = True
+            for key, d in (
+                ("v", family.velocity(around)),
+                ("p", family.position(around)),
+                ("a", family.attitude(around)),
+            ):
+                if d.body is not None:
+                    direct[key + "b"][..., s] = d.body
+                if d.ned is not None:
+                    direct[key + "n"][..., s] = d.ned
+                if d.along_velocity is not None:
+                    along[:, s] = d.along_velocity
+        force1, force2 = intervals.integrals(force)
+        turn = intervals.integrals(rate)[0] if turning else np.zeros((K, 3, m))
+        return StretchColumns(
+            force1,
+            force2,
+            turn,
+            direct["vb"],
+            direct["vn"],
+            direct["pb"],
+            direct["pn"],
+            along,
+            direct["ab"],
+            direct["an"],
+        )

@@ -1,0 +1,175 @@
+"""The examiner: has every flight diagnosed before anything of it may be written.
+
+It lives on the learner's thread.  A diagnosis goes several times over the flight and costs some
+seconds: it is made after the landing, one accelerometer at a time, so that what comes over the
+link is taken in between.  The flight is frozen when it ends, so that all of its accelerometers are
+judged on the same samples however long that takes, and what was found is handed out only when all
+of them are.  Where small steps may be written in flight it is made in flight, too, as seldom as the
+budget asks.
+"""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import msgspec
+import numpy as np
+
+from onboard.answers.answer import answer, diagnosed
+from onboard.answers.explain_document import explain_document
+from onboard.core.diagnosis.procedure import since_reboot
+from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Calibration, Six, Status
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.daemon.learning.flight import Judged, JudgedFlight, in_force
+from onboard.push.conditioning import CHI_SQUARE_999
+from onboard.push.entries import Support
+from onboard.push.physics import Diagnosed
+from onboard.push.watch import preference
+
+logger = logging.getLogger(__name__)
+
+IMUS = range(1, 6)
+IN_FLIGHT_SHARE = 0.02
+"""Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later."""
+
+
+@dataclass(slots=True)
+class Frozen:
+    """A flight under examination: as it was when it ended, and what was found so far."""
+
+    flight: Calibrator
+    support: Support
+    waiting: list[int]
+    at_takeoff: dict[int, Six | None]
+    imus: dict[int, Judged] = field(default_factory=dict)
+
+
+class Examiner:
+    """Diagnoses flights, the latest first.
+
+    Args:
+        clock: monotonic, s.
+        wall_clock: Unix time, s.
+    """
+
+    def __init__(self, clock: Callable[[], float], wall_clock: Callable[[], float]) -> None:
+        self.autopilot = "ardupilot"
+        self.board = ""
+        self.counters: Counter[str] = Counter()
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._frozen: Frozen | None = None
+        self._judged_s = 0.0
+        self._at_takeoff: dict[int, Six | None] = {}
+        self._not_before = -np.inf
+
+    def took_off(self, parameters: ParametersInForce) -> None:
+        """A flight begins: these are the values that it is flown with, unless they are changed."""
+        self._at_takeoff = {imu: in_force(parameters, imu) for imu in IMUS}
+
+    @property
+    def waiting(self) -> tuple[int, ...]:
+        """Accelerometers of the flight under examination: none is judged before all are."""
+        return () if self._frozen is None else tuple(self._frozen.flight.imus)
+
+    def landed(self, flight: Calibrator) -> None:
+        """A flight has ended; nothing is to be said of being armed without having flown."""
+        if flight.flown_s > self._judged_s:
+            self._freeze(flight)
+            self._judged_s = flight.flown_s
+
+    def flying(self, flight: Calibrator) -> None:
+        """In flight, and some of it could be written now, if it were diagnosed."""
+        if self._frozen is None and self._clock() >= self._not_before:
+            self._freeze(flight)
+
+    def begin_anew(self, flight: Calibrator) -> None:
+        """What was learned is of another board, or was reset: nothing of it is judged."""
+        self._frozen = None
+        self._judged_s = flight.flown_s
+
+    def examine_next(self) -> JudgedFlight | None:
+        """Diagnose one accelerometer; the flight, if that was the last one of it."""
+        frozen = self._frozen
+        if frozen is None:
+            return None
+        began = self._clock()
+        if frozen.waiting:
+            self._examine(frozen, frozen.waiting.pop(0))
+            self._not_before = began + (self._clock() - began) / IN_FLIGHT_SHARE
+        if frozen.waiting:
+            return None
+        self._frozen = None
+        return JudgedFlight(frozen.support, frozen.imus)
+
+    def _freeze(self, flight: Calibrator) -> None:
+        trusted_s = flight.flown_s - self._judged_s
+        support = Support(uuid.uuid4().hex, self._wall_clock(), self.board, trusted_s)
+        frozen = flight.frozen()
+        self._frozen = Frozen(frozen, support, list(frozen.imus), dict(self._at_takeoff))
+
+    def _examine(self, frozen: Frozen, imu: int) -> None:
+        flight = frozen.flight
+        self.counters["diagnoses"] += 1
+        device_id = flight.parameters.device_id(imu)
+        six = frozen.at_takeoff.get(imu) or in_force(flight.parameters, imu)
+        if device_id is None or six is None:
+            self.counters["diagnosis_of_unknown"] += 1
+            return
+        try:
+            given = answer(flight, imu, latest=True)
+            document = msgspec.to_builtins(self._document(flight, given.diagnosis))
+            found = diagnosed(given, document)
+        except (ArithmeticError, LookupError, ValueError) as error:  # numbers no model fits
+            self.counters["diagnosis_failed"] += 1
+            logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
+            return
+        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found))
+
+    def _document(self, flight: Calibrator, found: Diagnosis) -> msgspec.Struct:
+        chunks = since_reboot(flight.engine(found.imu).chunks)
+        return explain_document(
+            found,
+            files=(),
+            autopilot=self.autopilot,
+            duration_s=sum(c.duration for c in chunks),
+            samples={
+                "imu": sum(len(c.stretch.t) for c in chunks),
+                "gps": sum(len(c.fixes) for c in chunks),
+            },
+        )
+
+
+def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
+    """With the answer of all flights, where this one says too little by itself but supports it.
+
+    Support is the flight's own: by its likelihood alone it must prefer those values to the ones in
+    force, past the 0.999 quantile of what six numbers that change nothing gain by chance.
+    """
+    alone = found.calibration
+    if found.missing or alone.status is Status.CALIBRATED:
+        return found
+    if not flight.engine(found.imu).aged:
+        return found
+    together = flight.calibration(found.imu)
+    if together.status is not Status.CALIBRATED:
+        return found
+    gain = preference(
+        np.array(together.in_force_scale + together.in_force_offset),
+        np.array(together.scale + together.offset),
+        alone,
+    )
+    if gain is None or gain < CHI_SQUARE_999[6]:
+        return found
+    return replace(found, calibration=_added(together))
+
+
+def _added(together: Calibration) -> Calibration:
+    note = f"together with flights before this one, which agrees with them. {together.note}"
+    return replace(together, note=note.rstrip())

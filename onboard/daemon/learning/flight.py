@@ -1,0 +1,114 @@
+"""A flight that was judged: what every accelerometer's diagnosis said of the same samples.
+
+It is what a push rests on, so it carries what decides whether it still means anything: which
+board it was flown on, with which values in force, and whether that was since the service and the
+autopilot last started.  Identifiers of accelerometers (INS_ACCn_ID) are the same on every board of
+one model; they only rule sensors out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import msgspec
+
+from onboard.core.estimate.result import Calibration, Six
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.entries import Support
+from onboard.push.physics import Diagnosed
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One accelerometer of a flight: its identifier, the six in force at take-off, the diagnosis.
+
+    ``in_force`` are float32, in the order of ``parameter_names(imu).six``.
+    """
+
+    device_id: float
+    in_force: Six
+    diagnosed: Diagnosed
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """A flight whose accelerometers were all diagnosed.
+
+    ``current``: it was flown since the service and the autopilot last started, on a board that has
+    been there all the time as far as it tells.
+    """
+
+    support: Support
+    imus: Mapping[int, Judged] = field(default_factory=dict)
+    current: bool = True
+
+    @property
+    def diagnosed(self) -> dict[int, Diagnosed]:
+        """What was found, by accelerometer."""
+        return {imu: judged.diagnosed for imu, judged in self.imus.items()}
+
+    def outdated(self) -> JudgedFlight:
+        """The same after a gap in which the board may have been changed for another."""
+        return replace(self, current=False)
+
+    def of_these_sensors(self, parameters: ParametersInForce) -> JudgedFlight | None:
+        """Without what is about accelerometers with other identifiers; None: nothing is left."""
+        there = {
+            imu: judged
+            for imu, judged in self.imus.items()
+            if parameters.device_id(imu) in (None, judged.device_id)
+        }
+        return replace(self, imus=there) if there else None
+
+
+def in_force(parameters: ParametersInForce, imu: int) -> Six | None:
+    """The six as they were reported, float32; None if one was not."""
+    values = [parameters.values.get(name) for name in parameter_names(imu).six]
+    if any(value is None for value in values):
+        return None
+    a, b, c, d, e, f = (to_float32(value) for value in values if value is not None)
+    return a, b, c, d, e, f
+
+
+def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calibration:
+    """The calibration of a flight, compared with the values in force now.
+
+    Args:
+        then: as it was diagnosed.
+        live: the estimator's own answer, which knows the residual with the values in force now.
+        now: the six in force.
+    """
+    scale, offset = now[:3], now[3:]
+    if (*map(to_float32, (*then.in_force_scale, *then.in_force_offset)),) == now:
+        return then
+    nan = float("nan")
+    return replace(
+        then,
+        in_force_scale=scale,
+        in_force_offset=offset,
+        parameters_known=then.parameters_known if live is None else live.parameters_known,
+        whitened_rms_before=nan if live is None else live.whitened_rms_before,
+        held_out_before=nan if live is None else live.held_out_before,
+        velocity_rms_before=nan if live is None else live.velocity_rms_before,
+    )
+
+
+def encode(flight: JudgedFlight) -> bytes:
+    """For the disk."""
+    return msgspec.msgpack.encode(flight)
+
+
+def decode(data: bytes) -> JudgedFlight | None:
+    """From the disk: nothing flown since; None if another version wrote it differently."""
+    try:
+        flight = msgspec.msgpack.decode(data, type=JudgedFlight)
+    except msgspec.DecodeError:
+        return None
+    told = {
+        imu: replace(judged, diagnosed=replace(judged.diagnosed, resumed=True))
+        for imu, judged in flight.imus.items()
+    }
+    return replace(flight, imus=told, current=False)

@@ -1,0 +1,387 @@
+"""The learner: samples in, calibrations out; its sums survive the process.
+
+It lives on the worker's thread and is only called there; what it gives back is frozen.  It
+knows no link.
+
+**Gaps.**  While the service is off, or the autopilot reboots or is silent, somebody can change the
+board for another one or calibrate it on a bench.  After each gap :meth:`Learner.identify` is told
+who answers.  The same board (by its own word) with the same values in force goes on as if nothing
+had been; of everything else what was learned is laid aside until a flight agrees with it, and what
+was proposed waits for a flight or a person.
+
+What a flight has taught is diagnosed after the landing (:mod:`onboard.daemon.learning.examiner`).
+Where physics was missing that moves the numbers, the sums are forgotten at once: they are known to
+be wrong and must not be added to those of a flight that is right.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import msgspec
+
+from onboard import __version__
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.calibrator import Advanced, Calibrator, FlightEnded, Restarted
+from onboard.core.estimate.result import Calibration, Six, Status
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.gps.trust import WindowClosed, WindowOpened
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.daemon.learning.examiner import IMUS, Examiner
+from onboard.daemon.learning.flight import JudgedFlight, compared_now, decode, encode, in_force
+from onboard.daemon.learning.heap import trim
+from onboard.daemon.learning.proof import ProofFlight, answers
+from onboard.daemon.learning.store import Store
+from onboard.daemon.view.snapshot import TrustView
+from onboard.daemon.view.view import trust_view
+from onboard.errors import StateError
+
+SOLVING_SHARE = 0.005
+"""Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
+KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
+"""Beginnings of the names that change what an estimator makes of the messages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who answers on the link; ``board`` is its unique id in hex, empty if it tells none."""
+
+    system_id: int
+    autopilot: str = "ardupilot"
+    board: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """Something that a person should hear of: kind, sentence, and whether it is a warning."""
+
+    kind: str
+    text: str
+    warning: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """Where the learner stands after a batch.
+
+    ``calibrations`` are of the last flight as it was judged, or of what was flown since then;
+    ``flown`` is the answer of the flight that has just ended, if a push waits for it; ``flight``
+    the one that was judged, None if none was or a new one is not judged yet; ``diagnosing`` the
+    accelerometers of one that is being judged.
+    """
+
+    calibrations: dict[int, Calibration]
+    trust: TrustView
+    counters: dict[str, int]
+    news: tuple[News, ...] = ()
+    flown: dict[int, Calibration] = field(default_factory=dict)
+    flight: JudgedFlight | None = None
+    diagnosing: tuple[int, ...] = ()
+
+
+class Learner:
+    """Feeds the calibrator and keeps its sums on disk, by board.
+
+    Args:
+        store: the disk.
+        settings: of the estimator.
+        clock: monotonic, s.
+        wall_clock: Unix time, s.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        settings: EstimatorSettings,
+        *,
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+    ) -> None:
+        self._store = store
+        self._settings = settings
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._identity: Identity | None = None
+        self._before_gap: dict[int, Six | None] = {}
+        self._calibrator = Calibrator(settings)
+        self._proof = ProofFlight(settings)
+        self._flown: dict[int, Calibration] = {}
+        self._examiner = Examiner(clock, wall_clock)
+        self._flight: JudgedFlight | None = None
+        self._in_air = False
+        self._unjudged = False
+        self._windows = 0
+        self._parameters: dict[str, ParameterValue] = {}
+        self._answers: dict[int, Calibration] = {}
+        self._calibrated: set[int] = set()
+        self._stale = self._urgent = False
+        self._next_solution = 0.0
+        self._counters: Counter[str] = Counter()
+        self._news: list[News] = []
+
+    # Who is there
+
+    def identify(self, there: Identity, told: Sequence[ParameterValue] = ()) -> None:
+        """An autopilot is there, for the first time or after a gap.
+
+        Args:
+            there: who it is.
+            told: the parameters that it has told since.
+        """
+        before, self._identity = self._identity, there
+        self._examiner.autopilot, self._examiner.board = there.autopilot, there.board
+        same = before is not None and bool(there.board) and there == before
+        if not same and before is not None:
+            self._parameters.clear()  # of another board, for all that is known
+        for parameter in told:
+            self._parameter(parameter)
+        if same and self._values_in_force() == self._before_gap:
+            return
+        calibrator = Calibrator(self._settings)
+        kept = None
+        if before is not None and not _surely_another(before, there):
+            calibrator.lay_aside(self._calibrator.to_bytes())
+            kept = self._flight
+        if before != there:
+            if before is not None:
+                self._save_quietly(before)
+            loaded = self._load(calibrator)
+            kept = kept or loaded
+        self._begin(calibrator)
+        self._flight = None if kept is None else kept.outdated()
+        if calibrator.waiting:
+            text = "what was learned before is added when a flight agrees with it"
+            self._tell("state_resumed", text)
+
+    def gap(self) -> None:
+        """The autopilot rebooted or was silent: from here on it may be another board."""
+        self._before_gap = self._values_in_force()
+
+    def _values_in_force(self) -> dict[int, Six | None]:
+        values = {p.name: p.value for p in self._parameters.values()}
+        return {imu: in_force(ParametersInForce(values), imu) for imu in IMUS}
+
+    def _load(self, calibrator: Calibrator) -> JudgedFlight | None:
+        """Lay what is on the disk beside this calibrator; the last flight that was judged."""
+        if self._identity is None:
+            return None
+        try:
+            saved = self._store.load(self._identity.system_id, self._identity.board)
+            if saved is None:
+                return None
+            calibrator.lay_aside(saved.sums)
+        except StateError as error:
+            self._counters["state_refused"] += 1
+            self._tell("state_refused", f"starting from nothing: {error}", warning=True)
+            return None
+        self._counters["state_resumed"] += 1
+        return decode(saved.flight) if saved.flight else None
+
+    def _begin(self, calibrator: Calibrator) -> None:
+        """Go on with another calibrator; what the messages mean stays known."""
+        self._calibrator = calibrator
+        for parameter in self._parameters.values():
+            calibrator.feed(parameter)
+        self._examiner.begin_anew(calibrator)
+        self._calibrated.clear()
+        self._answers = {}
+        self._proof.drop()
+        self._in_air = self._unjudged = False
+        self._stale = self._urgent = True
+
+    # What comes in
+
+    def learn(
+        self, samples: Iterable[Sample], *, judging: bool, in_flight: bool = False
+    ) -> Learned:
+        """Take a batch.
+
+        Args:
+            samples: in the order in which they came.
+            judging: a push waits for the verdict of a flight.
+            in_flight: values may be written in flight, so diagnose there, too.
+        """
+        for sample in samples:
+            if type(sample) is ParameterValue:
+                self._parameter(sample)
+            for event in self._calibrator.feed(sample):
+                self._note(event)
+            if judging:
+                flown = self._proof.feed(sample, self._parameters.values())
+                self._flown = self._flown if flown is None else flown
+        if not judging:
+            self._proof.drop()
+        self._of_these_sensors()
+        learned = self._learned()
+        if in_flight and self._in_air:
+            ready = (c.status is Status.CALIBRATED for c in self._answers.values())
+            if any(ready):
+                self._examiner.flying(self._calibrator)
+        return learned
+
+    def examine(self) -> Learned:
+        """Diagnose one accelerometer of those that wait for it; takes seconds."""
+        trim()  # what the refinement of the flight has left
+        flight = self._examiner.examine_next()
+        if flight is not None:
+            self._judged(flight)
+        trim()
+        return self._learned()
+
+    def reset(self) -> Learned:
+        """Forget everything that was learned, on disk too; the parameters in force stay known."""
+        self._begin(Calibrator(self._settings))
+        self._windows = 0
+        self._flight = None
+        if self._identity is not None:
+            place = self._store.path(self._identity.system_id, self._identity.board)
+            place.unlink(missing_ok=True)
+        return self._learned()
+
+    def save(self, saved_at: float) -> None:
+        """Write the sums to disk.
+
+        Raises:
+            StateError: the disk does not take them.
+        """
+        if self._identity is not None:
+            self._save(self._identity, saved_at)
+            trim()
+
+    def _save(self, whose: Identity, saved_at: float) -> None:
+        self._store.save(
+            whose.system_id,
+            self._calibrator.to_bytes(),
+            version=__version__,
+            saved_at=saved_at,
+            board=whose.board,
+            flight=b"" if self._flight is None else encode(self._flight),
+        )
+        self._counters["saves"] += 1
+
+    def _save_quietly(self, whose: Identity) -> None:
+        """Before another board takes over; a disk that does not take it costs that board's sums."""
+        try:
+            self._save(whose, self._wall_clock())
+        except StateError as error:
+            self._tell("save_failed", str(error), warning=True)
+
+    def _judged(self, flight: JudgedFlight) -> None:
+        """Take what the diagnosis said; a flight that says nothing takes nothing away."""
+        self._unjudged = False
+        silent = all(
+            d.verdict == Verdict.INSUFFICIENT.value
+            and d.calibration.status is not Status.CALIBRATED
+            for d in flight.diagnosed.values()
+        )
+        if silent and self._flight is not None:
+            self._tell(
+                "flight_too_short", "the flight says too little: what was known before stays"
+            )
+            return
+        self._flight = flight
+        for imu, found in flight.diagnosed.items():
+            if found.missing:
+                self._calibrator.begin_anew(imu)
+                self._calibrated.discard(imu)
+                self._stale = self._urgent = True
+                self._tell("begun_anew", f"IMU {imu}: learning anew, physics was missing")
+
+    def _of_these_sensors(self) -> None:
+        """A flight of before the restart is forgotten where other sensors say who they are."""
+        flight = self._flight
+        if flight is not None and not flight.current:
+            self._flight = flight.of_these_sensors(self._calibrator.parameters)
+
+    # What goes out
+
+    def _learned(self) -> Learned:
+        self._solve()
+        news, self._news = tuple(self._news), []
+        flown, self._flown = self._flown, {}
+        trust = trust_view(self._calibrator.trust, windows=self._windows)
+        return Learned(
+            calibrations=self._calibrations(),
+            trust=msgspec.structs.replace(trust, trusted_s=self._calibrator.flown_s),
+            counters={**self._counters, **self._examiner.counters},
+            news=news,
+            flown=flown,
+            flight=None if self._unjudged else self._flight,
+            diagnosing=self._examiner.waiting,
+        )
+
+    def _calibrations(self) -> dict[int, Calibration]:
+        """Of the flight as it was judged, or the estimator's own answers since then."""
+        judged = {}
+        for imu, found in (self._flight.diagnosed if self._flight else {}).items():
+            now = in_force(self._calibrator.parameters, imu)
+            if now is not None:
+                judged[imu] = compared_now(found.calibration, self._answers.get(imu), now)
+        both = judged | self._answers if self._unjudged else self._answers | judged
+        return dict(sorted(both.items()))
+
+    def _solve(self) -> None:
+        """Solve anew if something has come to it, and not too often unless it is urgent."""
+        began = self._clock()
+        if not self._stale or (began < self._next_solution and not self._urgent):
+            return
+        self._stale = self._urgent = False
+        self._answers = answers(self._calibrator)
+        self._next_solution = began + (self._clock() - began) / SOLVING_SHARE
+        for imu, answer in self._answers.items():
+            if answer.status is Status.CALIBRATED and imu not in self._calibrated:
+                self._calibrated.add(imu)
+                self._tell("calibrated", f"IMU {imu} is calibrated")
+            elif answer.status is Status.INVALID and imu in self._calibrated:
+                self._calibrated.discard(imu)
+                self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
+
+    # How
+
+    def _note(self, event: object) -> None:
+        self._stale = True
+        match event:
+            case WindowOpened():
+                self._windows += 1
+                self._tell("window_opened", "GPS is trusted: learning")
+            case WindowClosed(_, reason):
+                why = reason.value.replace("_", " ")
+                self._tell("window_closed", f"GPS is not trusted: {why}")
+            case Advanced():
+                # What was found of the flight before is not about this one.
+                if not self._in_air:
+                    self._examiner.took_off(self._calibrator.parameters)
+                    self._in_air = self._unjudged = True
+                self._counters["event_Advanced"] += 1
+            case _:
+                # A flight that ends with the power of the autopilot has ended, too.
+                if isinstance(event, FlightEnded) or (
+                    isinstance(event, Restarted) and self._in_air
+                ):
+                    self._in_air = False
+                    self._examiner.landed(self._calibrator)
+                self._urgent |= isinstance(event, FlightEnded)
+                self._counters[f"event_{type(event).__name__}"] += 1
+
+    def _parameter(self, parameter: ParameterValue) -> None:
+        """Keep what a reset must not forget."""
+        name, value = parameter.name, parameter.value
+        if not name.startswith(KEPT_PARAMETERS):
+            return
+        before = self._parameters.get(name)
+        if before is None or before.value != value:
+            self._stale = self._urgent = True
+        self._parameters[name] = parameter
+
+    def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
+        self._news.append(News(kind, text, warning))
+
+
+def _surely_another(before: Identity, there: Identity) -> bool:
+    """Whether it is not the one of before by its own word."""
+    if before.system_id != there.system_id:
+        return True
+    return bool(before.board and there.board) and before.board != there.board

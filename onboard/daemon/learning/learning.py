@@ -1,0 +1,250 @@
+"""Between the loop and the learner's thread: batches go over, what was learned comes back."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import Counter
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.daemon.learning.learner import Identity, Learned, Learner
+from onboard.daemon.learning.worker import Worker
+from onboard.daemon.view.notices import Notices
+from onboard.errors import StateError
+from onboard.mavlink.decode import Decoder
+from onboard.mavlink.dialect import Message
+from onboard.outage import Outage
+
+P = ParamSpec("P")
+T = TypeVar("T")
+logger = logging.getLogger(__name__)
+
+BATCH_S = 0.25
+WAITING_LIMIT = 200_000
+"""Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
+PARAMETERS_S = 30.0
+"""So long is waited for the parameters that say what the messages mean; what comes is kept."""
+BEHIND_S, CAUGHT_UP_S = 15.0, 2.0
+"""A diagnosis makes what comes in wait for some seconds; more is told, until it has caught up."""
+STEP_LIMIT_S = 120.0
+"""A refinement or a diagnosis takes seconds, on a slow companion a minute; longer is a hang."""
+
+
+class Learning:
+    """Decodes, batches, saves.
+
+    Args:
+        learner: whom to hand the batches.
+        notices: where its news go.
+        judging: whether a push waits for the flight that judges it.
+        in_flight: whether values may be written in flight.
+        identity: who is there, as far as it is known; None while nobody is heard.
+        ready: whether it has said who it is, and the parameters are known that say what its
+            messages mean.
+        clock: monotonic time, s.
+        wall_clock: Unix time, s.
+        save_every_s: how often sums go to disk.
+    """
+
+    def __init__(
+        self,
+        learner: Learner,
+        notices: Notices,
+        *,
+        judging: Callable[[], bool],
+        identity: Callable[[], Identity | None],
+        in_flight: Callable[[], bool] = lambda: False,
+        ready: Callable[[], bool] = lambda: True,
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+        save_every_s: float,
+    ) -> None:
+        self.decoder = Decoder()
+        self.learned: Learned | None = None
+        self.counters: Counter[str] = Counter()
+        self._learner = learner
+        self._notices = notices
+        self._judging = judging
+        self._in_flight = in_flight
+        self._identity = identity
+        self._ready = ready
+        self._begun = False
+        self._clock = clock
+        self._wall_clock = wall_clock
+        self._save_every_s = save_every_s
+        self._next_save = 0.0
+        self._samples: list[Sample] = []
+        self._before_gap: list[Sample] | None = None
+        self._arrived: float | None = None
+        self._taken: float | None = None
+        self._behind = False
+        self._disk = Outage(settle_s=0.0)
+        self._worker: Worker | None = None
+        self._busy_since: float | None = None
+        self._closing = False
+        self._listeners: list[Callable[[Learned], None]] = []
+
+    def listen(self, listener: Callable[[Learned], None]) -> None:
+        """Have ``listener(learned)`` called on the loop after every batch."""
+        self._listeners.append(listener)
+
+    def take(self, message: Message) -> tuple[Sample, ...]:
+        """Decode a message of the autopilot and put its samples into the next batch."""
+        samples = self.decoder.decode(message)
+        if samples and self._arrived is None:
+            self._arrived = self._clock()
+        self._samples += samples
+        if len(self._samples) > WAITING_LIMIT:
+            half = WAITING_LIMIT // 2
+            self.counters["samples_dropped"] += half
+            del self._samples[:half]
+        return samples
+
+    @property
+    def identified(self) -> bool:
+        """Whether what was learned is of the autopilot that is there now."""
+        return self._begun and self.learned is not None
+
+    def gap(self) -> None:
+        """The autopilot rebooted or is silent: another may answer next, so it is asked who it is.
+
+        What comes from here on waits for that; what came before is learned at once.
+        """
+        self.counters["gaps"] += 1
+        self._before_gap = [*(self._before_gap or ()), *(self._samples if self._begun else ())]
+        if self._begun:
+            self._samples = []
+        self._begun, self._arrived = False, None
+
+    async def run(self) -> None:
+        """Learn until cancelled."""
+        self._worker = Worker("learner")
+        while True:
+            await self.step()
+            await asyncio.sleep(BATCH_S)
+
+    async def step(self) -> None:
+        """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
+        now = self._busy_since = self._clock()
+        if self._before_gap is not None:
+            await self._close_gap()
+        if self._begun or await self._begin(now):
+            await self._learn(self._next_batch())
+            self._taken = None
+        # Also of a board that has gone: often the power goes right after the landing.
+        if self.learned is not None and self.learned.diagnosing and not self._closing:
+            self._busy_since = self._clock()
+            self._accept(await self._call(self._learner.examine))
+            self._next_save = now  # the flight cannot be diagnosed again after a power cut
+        if now >= self._next_save:
+            self._next_save = now + self._save_every_s
+            await self.save()
+        self._busy_since = None
+
+    async def _close_gap(self) -> None:
+        """Learn what came before the gap, and note what was in force then."""
+        before, self._before_gap = self._before_gap, None
+        if before:
+            await self._learn(before)
+        await self._call(self._learner.gap)
+
+    async def _begin(self, now: float) -> bool:
+        """Whether it is known who is there and what the messages mean, or is waited for in vain."""
+        waited = 0.0 if self._arrived is None else now - self._arrived
+        identity = self._identity()
+        ready = self._ready() or waited > PARAMETERS_S or self._closing
+        if identity is None or not ready:
+            return False
+        # The parameters before all else; a stable order: the latest report still comes last.
+        self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
+        told = [s for s in self._samples if type(s) is ParameterValue]
+        gaps = self.counters["gaps"]
+        await self._call(self._learner.identify, identity, told)
+        self._begun = gaps == self.counters["gaps"]  # no other one while that was done
+        return self._begun
+
+    async def _learn(self, samples: list[Sample]) -> None:
+        self._accept(
+            await self._call(
+                self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+            )
+        )
+
+    def _next_batch(self) -> list[Sample]:
+        samples, self._samples = self._samples, []
+        self._taken, self._arrived = self._arrived, None
+        return samples
+
+    async def reset(self) -> None:
+        """Forget what was learned."""
+        self._accept(await self._call(self._learner.reset))
+
+    async def save(self) -> None:
+        """Put the sums on disk; a disk that does not take them is told and tried again."""
+        now = self._clock()
+        try:
+            await self._call(self._learner.save, self._wall_clock())
+        except StateError as error:
+            self.counters["save_failed"] += 1
+            if self._disk.failed(str(error), now):
+                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            return
+        self._disk.works(now)
+        over = self._disk.over(now)
+        if over is not None:
+            logger.info("what was learned is on the disk again, after %s", over)
+
+    def keeps_up(self, now: float) -> bool:
+        """Whether the learner is not stuck in a batch."""
+        return self._busy_since is None or now - self._busy_since < STEP_LIMIT_S
+
+    def behind(self, now: float) -> float:
+        """How long ago the oldest sample came that is not learned yet, s."""
+        oldest = self._arrived if self._taken is None else self._taken
+        return 0.0 if oldest is None else max(0.0, now - oldest)
+
+    def tell_of_lag(self, now: float) -> None:
+        """Say when the learner falls behind what comes in, and when it has caught up."""
+        lag = self.behind(now)
+        if not self._begun:
+            return
+        if not self._behind and lag > BEHIND_S:
+            self._behind = True
+            self.counters["fell_behind"] += 1
+            text = f"the learner is {lag:.0f} s behind what comes in: answers come late"
+            self._notices.post("learner_behind", text, warning=True)
+        elif self._behind and lag < CAUGHT_UP_S:
+            self._behind = False
+            self._notices.post("learner_caught_up", "the learner has caught up")
+
+    async def close(self, limit_s: float) -> None:
+        """Learn what has come, save, and let the thread go; if it is busy, the last save counts."""
+        self._closing = True
+        try:
+            async with asyncio.timeout(limit_s):
+                await self.step()
+                await self.save()
+                if self._worker is not None:
+                    await self._worker.close()
+        except TimeoutError:
+            logger.warning("the learner is busy: the next start goes on from the last save")
+
+    def let_go(self) -> None:
+        """Stop at once; the thread ends when it can, or with the process."""
+        if self._worker is not None:
+            self._worker.dismiss()
+
+    def _accept(self, learned: Learned) -> None:
+        self.learned = learned
+        for news in learned.news:
+            self._notices.post(news.kind, news.text, warning=news.warning)
+        for listener in self._listeners:
+            listener(learned)
+
+    async def _call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """On the learner's thread, or here while there is none."""
+        if self._worker is None:
+            return function(*args, **kwargs)
+        return await self._worker.call(function, *args, **kwargs)

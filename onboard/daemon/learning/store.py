@@ -1,0 +1,128 @@
+"""The sums on disk: what the daemon has learned of each vehicle, across restarts.
+
+With them goes what was found of the last flight: the flight itself is not kept.
+
+One file per board of a vehicle (system id and the unique id that the board tells, if it does),
+replaced whole: temporary file, fsync, rename, fsync of the directory.  A file that is damaged or of
+another version is set aside with the reason, never half used.  Whether sums are of the sensors that
+are there now, a flight has to confirm (:mod:`onboard.core.estimate.agreement`).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from zlib import crc32
+
+import msgspec
+
+from onboard.errors import StateError
+
+SCHEMA = 2
+
+
+class Saved(msgspec.Struct, frozen=True, kw_only=True):
+    """The sums of one board; ``saved_at`` is Unix time, ``flight`` the last one, or empty."""
+
+    schema: int = SCHEMA
+    version: str
+    system_id: int
+    saved_at: float
+    sums: bytes
+    check: int
+    board: str = ""
+    flight: bytes = b""
+
+
+class Store:
+    """Reads and writes the files.
+
+    Raises:
+        StateError: the directory cannot be made.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StateError(f"{directory}: {error.strerror}") from None
+
+    def path(self, system_id: int, board: str = "") -> Path:
+        """File of one board; ``board`` is its unique id in hex, empty if it tells none."""
+        if not re.fullmatch("[0-9a-f]*", board):
+            raise ValueError(f"{board!r} is no board's id")
+        return self.directory / f"sums-{system_id}{f'-{board}' if board else ''}.bin"
+
+    def load(self, system_id: int, board: str = "") -> Saved | None:
+        """What was saved for this board, None if nothing was.
+
+        Raises:
+            StateError: there is a file, but it cannot be used; it has been set aside.
+        """
+        path = self.path(system_id, board)
+        try:
+            saved = msgspec.msgpack.decode(path.read_bytes(), type=Saved)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise StateError(f"{path}: {error.strerror}") from None
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise StateError(
+                f"{path}: damaged, set aside as {self.set_aside(system_id, board)}"
+            ) from None
+        if saved.schema != SCHEMA or crc32(saved.sums + saved.flight) != saved.check:
+            why = "damaged" if saved.schema == SCHEMA else f"of version {saved.schema}"
+            raise StateError(f"{path}: {why}, set aside as {self.set_aside(system_id, board)}")
+        return saved
+
+    def save(
+        self,
+        system_id: int,
+        sums: bytes,
+        *,
+        version: str,
+        saved_at: float,
+        board: str = "",
+        flight: bytes = b"",
+    ) -> None:
+        """Replace the file; it is on the disk when this returns.
+
+        Raises:
+            StateError: it could not be written; the file before is untouched.
+        """
+        path = self.path(system_id, board)
+        saved = Saved(
+            version=version,
+            system_id=system_id,
+            board=board,
+            saved_at=saved_at,
+            sums=sums,
+            check=crc32(sums + flight),
+            flight=flight,
+        )
+        temporary = path.with_suffix(".new")
+        try:
+            with temporary.open("wb") as file:
+                file.write(msgspec.msgpack.encode(saved))
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+            directory = os.open(self.directory, os.O_RDONLY)
+            try:
+                os.fsync(directory)
+            finally:
+                os.close(directory)
+        except OSError as error:
+            raise StateError(f"{path}: {error.strerror}") from None
+
+    def set_aside(self, system_id: int, board: str = "") -> str:
+        """Rename the file so that it is not read again but can be looked at; its new name."""
+        path = self.path(system_id, board)
+        aside = path.with_suffix(".refused")
+        try:
+            path.replace(aside)
+        except OSError as error:
+            return f"(not renamed: {error.strerror})"
+        return aside.name

@@ -1,0 +1,367 @@
+"""The publisher: one connection to the broker, kept for as long as the service runs.
+
+The service hands over a snapshot now and then and never waits; a broker that is absent, refuses
+or hangs is told of once, and tried again with full-jitter back-off.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import random
+import re
+import ssl
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import aiomqtt
+
+from onboard.daemon.mqtt.outbox import Outbox, newer
+from onboard.daemon.mqtt.payloads import (
+    ReplyMessage,
+    calibration_message,
+    document,
+    event_message,
+    read_command,
+)
+from onboard.daemon.setup.configuration import MqttSettings, read_secret
+from onboard.daemon.view.notices import Notices
+from onboard.daemon.view.snapshot import JournalLine, Snapshot
+from onboard.errors import ConfigurationError, OnboardError, UsageError
+from onboard.mavlink.connection import Backoff
+from onboard.outage import Outage
+
+if TYPE_CHECKING:
+    from onboard.daemon.view.actions import Actions
+
+logger = logging.getLogger(__name__)
+library = logging.getLogger("onboard.daemon.mqtt.library")
+library.setLevel(logging.CRITICAL)
+"""The library's own log has a line for every attempt; what matters is told as a notice."""
+
+ONLINE, OFFLINE = b"online", b"offline"
+KEEPALIVE_S = 30
+ANSWER_S = 10.0
+"""A broker that confirms nothing for so long has hung."""
+BACKOFF_BASE_S = 1.0
+BACKOFF_CAP_S = 60.0
+STABLE_S = 10.0
+"""A connection that held this long starts the back-off from the beginning."""
+COMMANDS_WAITING = 16
+FAREWELL_S = 2.0
+_CODES = re.compile(r"^\[[^]]*\] | \(_ssl\.c:\d+\)$")
+"""What is around the words of a system's or a broker's error: [Errno 111], [code:135]."""
+
+
+class Publisher:
+    """Publishes what it is given; carries commands where they are enabled.
+
+    Args:
+        settings: [mqtt].
+        actions: what a command may ask for.
+        notices: where to tell that the broker is there or not.
+        clock: monotonic time, s.
+        rng: jitter of the back-off.
+
+    Raises:
+        ConfigurationError: a password, certificate or key file that cannot be used.
+    """
+
+    def __init__(
+        self,
+        settings: MqttSettings,
+        actions: Actions,
+        notices: Notices,
+        *,
+        clock: Callable[[], float],
+        rng: random.Random | None = None,
+    ) -> None:
+        self.counters: Counter[str] = Counter()
+        self.connected = False
+        self._settings = settings
+        self._actions = actions
+        self._notices = notices
+        self._clock = clock
+        self._password = (
+            read_secret(settings.password_file, key="[mqtt] password_file")
+            if settings.password_file is not None
+            else None
+        )
+        self._tls = tls_context(settings)
+        jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
+        self._backoff = Backoff(jitter, BACKOFF_BASE_S, BACKOFF_CAP_S)
+        self._outbox = Outbox()
+        self._news = asyncio.Event()
+        self._named = asyncio.Event()
+        self._prefix = (settings.prefix or "").rstrip("/")
+        if self._prefix:
+            self._named.set()
+        self._journal: tuple[JournalLine, ...] | None = None
+        self._next_state = 0.0
+        self._outage = Outage(STABLE_S)
+        self._refused = self._retained = False
+        self._closing = asyncio.Event()
+        self._diagnosed = False
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def prefix(self) -> str:
+        """What all topics begin with; empty until the vehicle is known."""
+        return self._prefix
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Take a snapshot; what is new in it goes to the broker as soon as it takes it."""
+        if not self._named.is_set() and snapshot.link.system_id is not None:
+            self._prefix = f"onboard/{snapshot.link.system_id}"
+            self._named.set()
+        journal = snapshot.journal
+        if self._journal is not None:
+            for line in newer(self._journal, journal):
+                self._outbox.event("event", event_message(line))
+        self._journal = journal
+        now = self._clock()
+        self._tell_of_recovery(now)
+        if now >= self._next_state or self._closing.is_set():
+            self._next_state = now + self._settings.state_interval_s
+            self._outbox.retain("state", snapshot.to_json())
+        self._outbox.retain("calibration", calibration_message(snapshot))
+        if snapshot.diagnosis is not None:
+            self._diagnosed = True
+            self._outbox.retain("diagnosis", document(snapshot.diagnosis))
+        elif self._diagnosed:
+            self._outbox.retain("diagnosis", b"")  # an empty retained message is none
+        self._news.set()
+
+    async def run(self) -> None:
+        """Keep the connection until :meth:`close` or cancellation."""
+        self._task = asyncio.current_task()
+        await self._named.wait()
+        while not self._closing.is_set():
+            began = self._clock()
+            try:
+                await self._session()
+            except asyncio.CancelledError:
+                if not self._closing.is_set():
+                    raise
+            except (aiomqtt.MqttError, OSError, TimeoutError) as error:
+                self._lost(_reason(error))
+            except Exception as error:
+                # Whatever it is, calibrating goes on without a broker.
+                if self._lost(str(error)):
+                    logger.exception("MQTT failed")
+            finally:
+                self.connected = False
+            if self._closing.is_set():
+                return
+            if self._clock() - began >= STABLE_S:
+                self._backoff.reset()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(self._backoff.next()):
+                    await self._closing.wait()
+
+    async def close(self, last: Snapshot | None = None) -> None:
+        """Send what waits, say that we are offline, and let :meth:`run` end; bounded.
+
+        Args:
+            last: the state that stays with the broker.
+        """
+        self._closing.set()
+        if last is not None:
+            self.publish(last)
+        self._named.set()
+        self._news.set()
+        task = self._task
+        if task is None or task.done():
+            return
+        await asyncio.wait((task,), timeout=FAREWELL_S)
+        if not task.done():
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    # One connection
+
+    async def _session(self) -> None:
+        settings = self._settings
+        self.counters["mqtt_attempts"] += 1
+        client = aiomqtt.Client(
+            settings.host,
+            settings.port,
+            identifier=settings.client_id or self._prefix.replace("/", "-"),
+            username=settings.username,
+            password=self._password,
+            will=aiomqtt.Will(self._topic("availability"), OFFLINE, qos=1, retain=True),
+            tls_context=self._tls,
+            keepalive=KEEPALIVE_S,
+            logger=library,
+            timeout=ANSWER_S,
+            # Commands of an hour ago are not to be carried out when the line is back.
+            clean_session=True,
+            max_queued_incoming_messages=COMMANDS_WAITING,
+        )
+        async with client:
+            if settings.commands:
+                await self._subscribe(client)
+            self._outbox.connected()
+            await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
+            self.counters["mqtt_connects"] += 1
+            self.connected = True
+            if self._outage.since is None:
+                self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
+            self._outage.works(self._clock())
+            try:
+                await self._speak(client)
+            finally:
+                # Leaving in good order keeps the broker from publishing the last will.
+                with contextlib.suppress(aiomqtt.MqttError):
+                    await client.publish(
+                        self._topic("availability"), OFFLINE, qos=1, retain=True, timeout=FAREWELL_S
+                    )
+
+    async def _speak(self, client: aiomqtt.Client) -> None:
+        """Send and listen, which also notices at once that the broker has gone."""
+        tasks = {
+            asyncio.create_task(self._listen(client), name="mqtt listener"),
+            asyncio.create_task(self._send(client), name="mqtt sender"),
+        }
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        for task in done:
+            task.result()
+
+    async def _subscribe(self, client: aiomqtt.Client) -> None:
+        granted = await client.subscribe(self._topic("command"), qos=1)
+        for code in granted:
+            refused = (code if isinstance(code, int) else code.value) >= 0x80
+            if refused and not self._refused:
+                self._notices.post(
+                    "mqtt_commands_refused",
+                    f"broker {self._where} does not let us subscribe to commands",
+                    warning=True,
+                )
+            self._refused = refused
+
+    async def _send(self, client: aiomqtt.Client) -> None:
+        """Send what is due; ends when closing and nothing is left."""
+        while True:
+            self._news.clear()
+            while (parcel := self._outbox.next()) is not None:
+                await client.publish(
+                    self._topic(parcel.topic), parcel.payload, qos=1, retain=parcel.retain
+                )
+                self._outbox.confirm(parcel)
+                self.counters["mqtt_published"] += 1
+            if self._closing.is_set():
+                return
+            await self._news.wait()
+
+    async def _listen(self, client: aiomqtt.Client) -> None:
+        async for message in client.messages:
+            payload = message.payload if isinstance(message.payload, bytes) else b""
+            if message.retain:
+                # Somebody's mistake: it would be carried out anew at every connection.
+                self.counters["mqtt_commands_ignored"] += 1
+                if not self._retained:
+                    logger.warning("a retained command is ignored, and all further ones")
+                self._retained = True
+                continue
+            reply = await self._carry_out(payload)
+            self._outbox.event("command/reply", document(reply))
+            self._news.set()
+
+    async def _carry_out(self, payload: bytes) -> ReplyMessage:
+        try:
+            wanted = read_command(payload)
+        except UsageError as error:
+            self.counters["mqtt_commands_refused"] += 1
+            return ReplyMessage(command=None, error=str(error))
+        action = getattr(self._actions, wanted.command)
+        try:
+            done = await action(wanted.imus)
+        except OnboardError as error:
+            self.counters["mqtt_commands_refused"] += 1
+            return ReplyMessage(command=wanted.command, id=wanted.id, error=str(error))
+        self.counters["mqtt_commands"] += 1
+        self._notices.post("mqtt_command", f"over MQTT: {wanted.command}: {done}")
+        return ReplyMessage(command=wanted.command, id=wanted.id, done=done)
+
+    # How
+
+    @property
+    def _where(self) -> str:
+        return f"{self._settings.host}:{self._settings.port}"
+
+    def _topic(self, name: str) -> str:
+        return f"{self._prefix}/{name}"
+
+    def _lost(self, reason: str) -> bool:
+        """Say so once for each reason, and whether that was now; every further try only counts."""
+        self.counters["mqtt_failures"] += 1
+        happened = self._outage.lost if self.connected else self._outage.failed
+        told = happened(reason, self._clock())
+        if told:
+            text = f"broker {self._where}: {reason}; tried again until it answers"
+            self._notices.post("mqtt_lost", text, warning=True)
+        else:
+            logger.debug("broker %s: %s", self._where, reason)
+        return told
+
+    def _tell_of_recovery(self, now: float) -> None:
+        over = self._outage.over(now)
+        if over is not None:
+            self._notices.post(
+                "mqtt_connected", f"broker {self._where}: publishing again after {over}"
+            )
+
+
+def tls_context(settings: MqttSettings) -> ssl.SSLContext | None:
+    """What [mqtt] says of TLS; None for plain text.
+
+    Raises:
+        ConfigurationError: a file that cannot be read or holds no certificate or key.
+    """
+    if not settings.tls:
+        return None
+    context = ssl.create_default_context()
+    if settings.ca_file is not None:
+        with _explained(settings.ca_file, "ca_file"):
+            # Only this authority: a broker of one's own is not vouched for by the web's.
+            context = ssl.create_default_context(cafile=str(Path(settings.ca_file).expanduser()))
+    if settings.certificate_file is not None and settings.key_file is not None:
+        with _explained(f"{settings.certificate_file}, {settings.key_file}", "certificate_file"):
+            context.load_cert_chain(
+                Path(settings.certificate_file).expanduser(),
+                Path(settings.key_file).expanduser(),
+                password=_no_passphrase,
+            )
+    return context
+
+
+def _no_passphrase() -> str:
+    """Instead of OpenSSL's question at a terminal that a service does not have."""
+    return ""
+
+
+@contextlib.contextmanager
+def _explained(files: str, key: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:  # ssl.SSLError is one
+        reason = error.strerror or str(error)
+        if isinstance(error, ssl.SSLError):
+            reason = f"no usable certificate or key ({error.reason or reason})"
+        raise ConfigurationError(f"{files} ([mqtt] {key}): {reason}") from None
+
+
+def _reason(error: Exception) -> str:
+    """Why there is no connection, in a few words."""
+    text = str(error) or type(error).__name__
+    if isinstance(error, aiomqtt.exceptions.MqttConnectError):
+        return f"it refuses: {_CODES.sub('', text)}"
+    return _CODES.sub("", text)

@@ -1,0 +1,272 @@
+"""The control API: JSON over HTTP, one server inside the daemon's loop.
+
+========  ==================  ================================================================
+method    path                does
+========  ==================  ================================================================
+GET       /api/snapshot       the snapshot (onboard.daemon.view.snapshot)
+GET       /api/live           WebSocket: a snapshot at once, then one per tick
+POST      /api/approve        ``{"imus": [1, 2]}``; no list: every accelerometer that waits.
+                              ``"despite_diagnosis": true`` those, too, that are named and that
+                              the diagnosis holds back
+POST      /api/reject         ``{"imus": [1, 2]}``; no list: all
+POST      /api/rollback       the same
+POST      /api/reset          the same: forgets the sums
+========  ==================  ================================================================
+
+Errors are ``{"error": {"status": 400, "message": "...", "field": "imu"}}``.  Whatever changes state
+wants ``Content-Type: application/json`` and, where a token is configured,
+``Authorization: Bearer TOKEN``.  Requests that another site's page makes a browser send are
+refused by their Origin, and so are names that merely resolve to this machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import ipaddress
+import logging
+import re
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from typing import Annotated
+from urllib.parse import urlsplit
+
+import msgspec
+from aiohttp import WSCloseCode, WSMsgType, web
+from msgspec import Meta
+
+from onboard.daemon.view.actions import Actions
+from onboard.errors import OnboardError, RefusedError
+
+logger = logging.getLogger(__name__)
+
+SEND_LIMIT_S = 10.0  # a viewer that takes longer for one snapshot is gone
+VIEWERS_MAX = 32
+BODY_MAX = 16 * 1024
+
+Page = Callable[[web.Application], None]
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Body of every POST."""
+
+    imus: tuple[Annotated[int, Meta(ge=1, le=5)], ...] = ()
+
+
+class Approval(Request, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Body of an approval; ``despite_diagnosis``: although physics is missing."""
+
+    despite_diagnosis: bool = False
+
+
+class Live:
+    """The latest snapshot, for any number of viewers: a slow one skips, none is waited for."""
+
+    def __init__(self) -> None:
+        self.viewers = 0
+        self._latest: bytes | None = b""
+        self._version = 0
+        self._changed = asyncio.Event()
+
+    def publish(self, document: bytes | None) -> None:
+        """Replace the latest snapshot and wake the viewers; None: there will be no more."""
+        self._latest = document
+        self._version += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def follow(self) -> AsyncIterator[bytes]:
+        """Every snapshot from the next one on that the viewer is quick enough for."""
+        seen = self._version
+        while self._latest is not None:
+            if seen == self._version:
+                await self._changed.wait()
+                continue
+            seen = self._version
+            yield self._latest
+
+
+class ControlServer:
+    """HTTP server; ``pages`` add further handlers to the same application."""
+
+    def __init__(
+        self, actions: Actions, *, token: str | None = None, pages: Iterable[Page] = ()
+    ) -> None:
+        self._actions = actions
+        self._token = token
+        self._runner: web.AppRunner | None = None
+        self.live = Live()
+        self.application = web.Application(
+            middlewares=[_errors_as_json, self._guard], client_max_size=BODY_MAX
+        )
+        self.application.router.add_get("/api/snapshot", self._snapshot)
+        self.application.router.add_get("/api/live", self._live)
+        self.application.router.add_post("/api/approve", _approving(actions))
+        for name, action in (
+            ("reject", actions.reject),
+            ("rollback", actions.rollback),
+            ("reset", actions.reset),
+        ):
+            self.application.router.add_post(f"/api/{name}", _acting(action))
+        for page in pages:
+            page(self.application)
+
+    async def start(self, listening: socket.socket) -> None:
+        """Serve on a socket that listens already; closing it is its owner's."""
+        runner = web.AppRunner(self.application, access_log=None, shutdown_timeout=2.0)
+        await runner.setup()
+        await web.SockSite(runner, listening).start()
+        self._runner = runner
+
+    async def stop(self) -> None:
+        """Close all connections and the port."""
+        if self._runner is not None:
+            self.live.publish(None)
+            await self._runner.cleanup()
+            self._runner = None
+
+    def publish(self) -> None:
+        """Send a new snapshot to the viewers, if there are any."""
+        if self.live.viewers:
+            self.live.publish(self._actions.snapshot().to_json())
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse foreign pages, foreign host names and, for changes, a wrong token."""
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != request.host:
+            raise web.HTTPForbidden(text=f"requests from {origin} are not accepted")
+        if self._token is None and not _names_loopback(request.host):
+            raise web.HTTPForbidden(text=f"host {request.host} is not this machine's loopback")
+        if request.method not in {"GET", "HEAD"}:
+            if self._token is not None and not _token_matches(request, self._token):
+                raise web.HTTPUnauthorized(
+                    text="token missing or wrong", headers={"WWW-Authenticate": "Bearer"}
+                )
+            if request.content_type != "application/json":
+                raise web.HTTPUnsupportedMediaType(text="Content-Type must be application/json")
+        return await handler(request)
+
+    async def _snapshot(self, _request: web.Request) -> web.Response:
+        return web.Response(
+            body=self._actions.snapshot().to_json(),
+            content_type="application/json",
+            headers={"Cache-Control": "no-store"},
+        )
+
+    async def _live(self, request: web.Request) -> web.WebSocketResponse:
+        if self.live.viewers >= VIEWERS_MAX:
+            raise web.HTTPServiceUnavailable(text=f"{VIEWERS_MAX} viewers already")
+        viewer = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
+        await viewer.prepare(request)
+        self.live.viewers += 1
+        sender = asyncio.create_task(self._feed(viewer), name="live viewer")
+        try:
+            async for message in viewer:  # only to notice that the viewer has gone
+                if message.type == WSMsgType.ERROR:
+                    break
+        finally:
+            self.live.viewers -= 1
+            sender.cancel()
+            await asyncio.gather(sender, return_exceptions=True)
+        return viewer
+
+    async def _feed(self, viewer: web.WebSocketResponse) -> None:
+        try:
+            await _send(viewer, self._actions.snapshot().to_json())
+            async for document in self.live.follow():
+                await _send(viewer, document)
+            await viewer.close(code=WSCloseCode.GOING_AWAY, message=b"service stops")
+        except (TimeoutError, ConnectionError):
+            await viewer.close()
+
+
+async def _send(viewer: web.WebSocketResponse, document: bytes) -> None:
+    async with asyncio.timeout(SEND_LIMIT_S):
+        await viewer.send_str(document.decode())
+
+
+def _acting(action: Callable[[tuple[int, ...]], Awaitable[str]]) -> Handler:
+    """A POST handler around one action."""
+
+    async def handle(request: web.Request) -> web.Response:
+        body = await request.read()
+        wanted = msgspec.json.decode(body or b"{}", type=Request)
+        return _json(200, {"done": await action(wanted.imus)})
+
+    return handle
+
+
+def _approving(actions: Actions) -> Handler:
+    """The POST handler of approvals."""
+
+    async def handle(request: web.Request) -> web.Response:
+        body = await request.read()
+        wanted = msgspec.json.decode(body or b"{}", type=Approval)
+        done = await actions.approve(wanted.imus, despite_diagnosis=wanted.despite_diagnosis)
+        return _json(200, {"done": done})
+
+    return handle
+
+
+@web.middleware
+async def _errors_as_json(request: web.Request, handler: Handler) -> web.StreamResponse:
+    """Every failure leaves as one JSON object with a sentence in it."""
+    try:
+        return await handler(request)
+    except web.HTTPException as error:
+        headers = {
+            name: value
+            for name, value in error.headers.items()
+            if name in {"Allow", "WWW-Authenticate"}
+        }
+        return _error(error.status, error.text or error.reason, headers=headers)
+    except msgspec.DecodeError as error:
+        unknown = re.search(r"unknown field `([^`]*)`", str(error))
+        place = re.search(r"`\$\.?([^`]*)`", str(error))
+        field = unknown or place
+        return _error(400, str(error), field=field.group(1) if field else None)
+    except RefusedError as error:
+        return _error(409, str(error))
+    except OnboardError as error:
+        return _error(500, str(error))
+    except Exception:
+        logger.exception("request %s %s failed", request.method, request.path)
+        return _error(500, "internal error; the service's log has it")
+
+
+def _error(
+    status: int, message: str, *, field: str | None = None, headers: dict[str, str] | None = None
+) -> web.Response:
+    detail: dict[str, object] = {"status": status, "message": message}
+    if field is not None:
+        detail["field"] = field
+    return _json(status, {"error": detail}, headers=headers)
+
+
+def _json(
+    status: int, document: dict[str, object], *, headers: dict[str, str] | None = None
+) -> web.Response:
+    return web.Response(
+        status=status,
+        body=msgspec.json.encode(document),
+        content_type="application/json",
+        headers={"Cache-Control": "no-store"} | (headers or {}),
+    )
+
+
+def _token_matches(request: web.Request, token: str) -> bool:
+    scheme, _, given = request.headers.get("Authorization", "").partition(" ")
+    return scheme.lower() == "bearer" and hmac.compare_digest(given.encode(), token.encode())
+
+
+def _names_loopback(host: str) -> bool:
+    """Whether a Host header names this machine itself (a rebound name does not)."""
+    name = urlsplit(f"//{host}").hostname or ""
+    if name == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(name).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,1 @@
+"""The process: tasks in one group, signals of the system, the parts put together."""

@@ -1,0 +1,56 @@
+"""The vehicle's condition as the push policy needs it, from the samples that tell of it."""
+
+from __future__ import annotations
+
+import math
+
+from onboard.core.inputs.samples import EkfHealth, Sample, VehicleState
+from onboard.push.policy import VehicleCondition
+
+STALE_S = 5.0
+"""A flag not repeated for so long says nothing about now (HEARTBEAT comes every second)."""
+
+
+class Observed:
+    """Keeps the last word on each flag and when it came; ``now`` is a monotonic clock, s."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """The autopilot rebooted or is another one: nothing is known."""
+        self._armed: bool | None = None
+        self._armed_at = -math.inf
+        self._disarmed_since: float | None = None
+        self._landed: bool | None = None
+        self._landed_at = -math.inf
+        self._ekf: int | None = None
+        self._ekf_at = -math.inf
+
+    def feed(self, sample: Sample, now: float) -> None:
+        """Take a sample of any kind."""
+        match sample:
+            case VehicleState(armed=armed, landed=landed):
+                if armed is not None:
+                    if armed:
+                        self._disarmed_since = None
+                    elif self._disarmed_since is None or now - self._armed_at > STALE_S:
+                        self._disarmed_since = now
+                    self._armed, self._armed_at = armed, now
+                if landed is not None:
+                    self._landed, self._landed_at = landed, now
+            case EkfHealth(_, flags):
+                self._ekf, self._ekf_at = flags, now
+            case _:
+                pass
+
+    def condition(self, now: float) -> VehicleCondition:
+        """What is known now; what is stale counts as unknown."""
+        armed = self._armed if now - self._armed_at <= STALE_S else None
+        since = self._disarmed_since
+        return VehicleCondition(
+            armed=armed,
+            disarmed_for=now - since if armed is False and since is not None else 0.0,
+            landed=self._landed if now - self._landed_at <= STALE_S else None,
+            ekf_flags=self._ekf if now - self._ekf_at <= STALE_S else None,
+        )

@@ -1,0 +1,155 @@
+"""The autopilot's parameters that the service lives by: read at the start, then watched.
+
+Sans-IO participant of the link.  The values themselves reach the estimator as samples, like
+any PARAM_VALUE; this only causes them, and knows what is still missing.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.mavlink.dialect import COMPONENT, Message, mavlink
+from onboard.mavlink.parameter_messages import (
+    SendAction,
+    parameter_event,
+    parameter_message,
+)
+from onboard.mavlink.parameters import ParameterClient, ReadFailed, ValueChanged, ValueRead
+from onboard.push.policy import context_names
+
+logger = logging.getLogger(__name__)
+
+IMUS = (1, 2, 3)
+"""MAVLink has messages for three accelerometers."""
+REREAD_S = 30.0
+"""A change whose broadcast was lost is found this late at most."""
+RETRY_S = 10.0
+ABSENT_S = 300.0
+"""A name that was not answered may only have been unlucky: try again then."""
+OPTIONAL_ATTEMPTS = 2
+REQUIRED = tuple(
+    name for imu in IMUS for name in (*parameter_names(imu).six, parameter_names(imu).device_id)
+)
+FIRST = REQUIRED[:7]
+MEANING = (
+    "AHRS_ORIENTATION",
+    "AHRS_EKF_TYPE",
+    "AHRS_TRIM_X",
+    "AHRS_TRIM_Y",
+    "AHRS_TRIM_Z",
+    "INS_ACCEL_FILTER",
+    "INS_GYRO_FILTER",
+    *dict.fromkeys(name for imu in IMUS for name in context_names(imu)),
+)
+"""Change what the messages mean or what may be written; not every firmware has all."""
+KNOWLEDGE = (
+    "GPS1_DELAY_MS",
+    "GPS_DELAY_MS",
+    *(f"GPS1_POS_{axis}" for axis in "XYZ"),
+    *(f"GPS_POS1_{axis}" for axis in "XYZ"),
+    *(f"INS_POS{imu}_{axis}" for imu in IMUS for axis in "XYZ"),
+    "FLIGHT_OPTIONS",
+    "PTCH_TRIM_DEG",
+)
+"""Good to have, in a recording too; under one of two names, by version; the last two of planes."""
+
+
+class ParameterWatch:
+    """Reads what is needed, again after every reboot or silence, and now and then."""
+
+    names = ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")
+
+    def __init__(self) -> None:
+        self.counters: Counter[str] = Counter()
+        self.enabled = True
+        self._client = ParameterClient()
+        self._codec = mavlink.MAVLink(None)
+        self._target: tuple[int, int] | None = None
+        self._next_read = 0.0
+        self._absent: dict[str, float] = {}
+        self._answered: set[str] = set()
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Every value that the autopilot has reported, by name."""
+        return self._client.cache
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything that decides what may be written was read or is not there."""
+        return self._answered.issuperset((*REQUIRED, *MEANING))
+
+    @property
+    def confirmed(self) -> set[str]:
+        """Names whose values were read since the autopilot was (again) there."""
+        return (self._answered & self.values.keys()) - self._absent.keys()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the first accelerometer that are needed and not known."""
+        return tuple(name for name in FIRST if name not in self.values)
+
+    def start(self, system: int, component: int, now: float) -> None:
+        """Read everything (anew): the autopilot may have rebooted, or be another."""
+        if self._target != (system, component):
+            self._client = ParameterClient()
+        self._target = (system, component)
+        self._client.cancel()
+        self._absent.clear()
+        self._answered.clear()
+        self._next_read = now
+
+    def feed(self, message: Message, now: float) -> Sequence[Message]:
+        """Take an answer, or a change by somebody else."""
+        if self._target is None:
+            return ()
+        system, component = self._target
+        event = parameter_event(
+            message,
+            system=system,
+            component=component,
+            own_system=system,
+            own_component=COMPONENT,
+        )
+        return () if event is None else self._act(self._client.feed(event, now), now)
+
+    def poll(self, now: float) -> Sequence[Message]:
+        """Requests that are due."""
+        if self._target is None or not self.enabled:
+            return ()
+        messages = self._act(self._client.tick(now), now)
+        if now >= self._next_read:
+            self._next_read = now + REREAD_S
+            for names, attempts in ((REQUIRED, None), (MEANING + KNOWLEDGE, OPTIONAL_ATTEMPTS)):
+                due = [name for name in names if self._absent.get(name, now) <= now]
+                messages += self._act(self._client.read(due, now, attempts), now)
+        return messages
+
+    def _act(self, outputs: Sequence[object], now: float) -> list[Message]:
+        messages = []
+        for output in outputs:
+            match output:
+                case ValueRead(name):
+                    self._answered.add(name)
+                case ReadFailed(name):
+                    self._answered.add(name)
+                    self.counters["parameters_not_read"] += 1
+                    self._absent[name] = now + ABSENT_S
+                    if name in FIRST:  # every autopilot that we write to has these: ask again soon
+                        self._absent[name] = now
+                        self._next_read = min(self._next_read, now + RETRY_S)
+                case ValueChanged(name, previous, value) if previous is not None:
+                    self.counters["parameters_changed"] += 1
+                    logger.info("%s changed from %.7g to %.7g", name, previous, value)
+                case _ if isinstance(output, SendAction):
+                    messages.append(self._encode(output))
+                case _:
+                    pass
+        return messages
+
+    def _encode(self, action: SendAction) -> Message:
+        system, component = self._target or (0, 0)
+        return parameter_message(action, self._codec, system=system, component=component)

@@ -1,0 +1,353 @@
+"""Proposals: what would be written for each accelerometer, and every reason why it is not yet.
+
+The policy's reasons come from :mod:`onboard.push.policy`; added here are those of the diagnosis
+(:mod:`onboard.push.physics`), of people (approval, refusal), of past failures, and of what kind
+of autopilot it is.
+
+What is proposed is what was diagnosed.  Where physics was missing, or nobody could look for it, a
+person may have it written all the same, but has to say so: naming the accelerometer and with
+``despite_diagnosis``.  That holds for this diagnosis only.
+
+What was learned belongs to a board and to the values in force
+(:mod:`onboard.daemon.learning.flight`).  A proposal that no flight since the start has confirmed,
+or whose values somebody has changed since, is *unconfirmed*: it waits for the next flight, or for a
+person who has read why it waits.  An approval is for the values that were shown, old and new: those
+are written, or none.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from onboard.core.estimate.result import Status
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.daemon.learning.flight import JudgedFlight
+from onboard.daemon.learning.learner import Learned
+from onboard.daemon.view.snapshot import ChangeView, ProposalView
+from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
+from onboard.errors import PushError, RefusedError
+from onboard.push.physics import Diagnosed
+from onboard.push.plan import PushPlan, propose
+from onboard.push.policy import Accelerometer, Mode, PolicySettings, VehicleCondition, judge
+
+WAIT_AFTER_FAILURE_S = (30.0, 60.0, 120.0, 300.0)
+"""Between a transaction that did not complete and the next for that accelerometer."""
+MOVED_SIGMAS = 2.0
+"""An approval is of the values shown: it lapses when an estimate moves by more than this."""
+PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
+"""Reasons that a person lifts."""
+DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
+"""Reasons that a person lifts by saying so explicitly."""
+
+
+NOT_DIAGNOSED = object()
+"""Stands for the diagnosis that there is not."""
+
+
+@dataclass(slots=True)
+class Standing:
+    """Where one accelerometer stands with people and with past failures.
+
+    ``despite`` is the diagnosis in spite of which it was approved; ``written`` the six as they
+    were after the last transaction, by our own doing.
+    """
+
+    approved: PushPlan | None = None
+    despite: object = None
+    refused: str = ""
+    failures: int = 0
+    not_before: float = 0.0
+    written: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A plan and every reason, by name, why it is not written now, with a sentence each."""
+
+    plan: PushPlan
+    held_back: Mapping[str, str] = field(default_factory=dict)
+
+
+class Proposals:
+    """The current proposals and what people said about them."""
+
+    def __init__(
+        self, settings: PolicySettings, *, approval: bool, imus: tuple[int, ...] = ()
+    ) -> None:
+        self.settings = settings
+        self.approval = approval
+        self.forbidden = ""
+        self.current: dict[int, Proposal] = {}
+        self.counters: Counter[str] = Counter()
+        self.writing: int | None = None
+        """Accelerometer of the transaction under way: its values change by our own doing."""
+        self._imus = imus
+        self._standing: dict[int, Standing] = {}
+        self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
+        """Called when a refusal begins, or ends (then with nothing to say)."""
+        self._flight: JudgedFlight | None = None
+
+    def update(
+        self,
+        now: float,
+        *,
+        system_id: int,
+        learned: Learned,
+        parameters: Mapping[str, float],
+        condition: VehicleCondition,
+        board: str = "",
+    ) -> None:
+        """Make them anew from what was learned and the autopilot's values of this moment."""
+        self._flight = learned.flight
+        calibrations = learned.calibrations
+        plans: dict[int, PushPlan] = {}
+        for imu, calibration in calibrations.items():
+            try:
+                plans[imu] = propose(
+                    calibration,
+                    parameters,
+                    system_id=system_id,
+                    board=board,
+                    scale_bounds=(self.settings.scale_min, self.settings.scale_max),
+                    offset_bound=self.settings.offset_max,
+                )
+            except PushError:
+                self.counters["not_proposed"] += 1
+        alone = {
+            imu: judge(plan, calibrations[imu], condition, self.settings, values=parameters)
+            for imu, plan in plans.items()
+        }
+        self.current = {}
+        for imu, plan in plans.items():
+            others = [
+                Accelerometer(
+                    other,
+                    SixParameters(calibrations[other].scale, calibrations[other].offset),
+                    # Those that nothing holds back are written in the same sitting.
+                    plans[other].six_before() if alone[other] else plans[other].six_wanted(),
+                )
+                for other in plans
+                if other != imu and calibrations[other].status is Status.CALIBRATED
+            ]
+            refusals = judge(
+                plan, calibrations[imu], condition, self.settings, values=parameters, others=others
+            )
+            held_back = self._beyond_policy(imu, plan, now)
+            held_back |= self._physics(imu, diagnosing=bool(learned.diagnosing))
+            for refusal in refusals:  # several of one name (six sigmas): the first says enough
+                held_back.setdefault(refusal.objection.value, refusal.sentence)
+            self.current[imu] = Proposal(self.standing(imu).approved or plan, held_back)
+
+    def ready(self) -> PushPlan | None:
+        """The first plan that nothing holds back."""
+        return next((p.plan for p in self.current.values() if not p.held_back), None)
+
+    def approve(self, imus: Sequence[int], *, despite_diagnosis: bool = False) -> str:
+        """A person allows what is proposed now (no number: all that wait for one).
+
+        Args:
+            imus: which accelerometers.
+            despite_diagnosis: those, too, that the diagnosis holds back; they must be named.
+
+        Raises:
+            RefusedError: nothing waits for a person, or only the diagnosis is against it and
+                that was not said.
+        """
+        chosen = {i: self.current[i].held_back for i in imus or self.current if i in self.current}
+        against = {i: held.keys() & DIAGNOSIS for i, held in chosen.items()}
+        if despite_diagnosis and not imus:
+            raise RefusedError("despite a diagnosis, accelerometers are approved by their number")
+        waiting = [
+            imu
+            for imu, held in chosen.items()
+            if approvable(held) and (despite_diagnosis or not against[imu])
+        ]
+        if not waiting:
+            for imu, names in against.items():
+                if names and approvable(chosen[imu]):
+                    why = chosen[imu][min(names)]
+                    raise RefusedError(
+                        f"IMU {imu}: {why}; `onboard approve {imu} --despite-diagnosis` "
+                        "writes it all the same"
+                    )
+            raise RefusedError("nothing waits for approval")
+        for imu in waiting:
+            despite = (self._diagnosed(imu) or NOT_DIAGNOSED) if against[imu] else None
+            self._lift(imu)
+            written = self.standing(imu).written
+            self._standing[imu] = Standing(self.current[imu].plan, despite, written=written)
+        self.counters["approvals"] += len(waiting)
+        when = "written as soon as policy and flight state allow"
+        if self.settings.mode is Mode.NEVER:
+            when = "not written, for the push policy is 'never'"
+        return f"{named(waiting)} approved: {when}"
+
+    def reject(self, imus: Sequence[int]) -> str:
+        """A person refuses, until it is approved or what was learned is reset.
+
+        Raises:
+            RefusedError: nothing is proposed.
+        """
+        chosen = [imu for imu in imus or self.current if imu in self.current]
+        if not chosen:
+            raise RefusedError("nothing is proposed")
+        for imu in chosen:
+            self.refuse(imu, "a person rejected it")
+        self.counters["rejections"] += len(chosen)
+        return f"{named(chosen)} rejected"
+
+    def refuse(self, imu: int, why: str) -> None:
+        """Hold this accelerometer back until a person approves."""
+        standing = self.standing(imu)
+        standing.approved = None
+        if standing.refused != why:
+            standing.refused = why
+            self.on_refusal(imu, why)
+
+    def restore(self, refusals: Mapping[int, str]) -> None:
+        """What was refused before the service started."""
+        for imu, why in refusals.items():
+            self.standing(imu).refused = why
+
+    def succeeded(self, imu: int, values: Sequence[float]) -> None:
+        """A transaction completed: its approval is used up; ``values`` are the six now."""
+        standing = self.standing(imu)
+        standing.approved = None
+        standing.failures = 0
+        standing.written = tuple(values)
+
+    def failed(self, imu: int, now: float, *, changed_by_other: bool = False) -> None:
+        """A transaction did not complete: wait, the longer the oftener.
+
+        An approval outlives that, unless somebody else has changed what it was given for.
+        """
+        standing = self.standing(imu)
+        if changed_by_other:
+            standing.approved = standing.despite = None
+        wait = WAIT_AFTER_FAILURE_S[min(standing.failures, len(WAIT_AFTER_FAILURE_S) - 1)]
+        standing.failures += 1
+        standing.not_before = now + wait
+
+    def standing(self, imu: int) -> Standing:
+        """What is remembered of one accelerometer."""
+        return self._standing.setdefault(imu, Standing())
+
+    def forget(self) -> None:
+        """What was learned is reset: what was said about it means nothing any more."""
+        for imu in self._standing:
+            self._lift(imu)
+        self._standing.clear()
+        self.current = {}
+
+    def _lift(self, imu: int) -> None:
+        """It is refused no longer."""
+        if self.standing(imu).refused:
+            self.standing(imu).refused = ""
+            self.on_refusal(imu, "")
+
+    def view(self) -> tuple[ProposalView, ...]:
+        """For the snapshot."""
+        return tuple(
+            ProposalView(
+                imu=imu,
+                changes=tuple(
+                    ChangeView(
+                        name=c.name, before=c.before, after=c.wanted, sigma=c.sigma, kept=c.kept
+                    )
+                    for c in proposal.plan.changes
+                ),
+                held_back=dict(proposal.held_back),
+                approved=self.standing(imu).approved is not None,
+                rejected=bool(self.standing(imu).refused),
+                approvable=approvable(proposal.held_back),
+            )
+            for imu, proposal in self.current.items()
+        )
+
+    def _physics(self, imu: int, *, diagnosing: bool) -> dict[str, str]:
+        """What the diagnosis says against it, unless a person has approved in spite of it."""
+        if diagnosing:  # none before all of them are
+            return {"diagnosing": "the flight is being diagnosed"}
+        found = self._diagnosed(imu)
+        standing = self.standing(imu)
+        if standing.approved is not None and standing.despite is (found or NOT_DIAGNOSED):
+            return {}
+        if found is None:
+            return {"not_diagnosed": "no flight was diagnosed yet: that is done after a landing"}
+        if not found.missing:
+            return {}
+        offered = "; these values have it modelled" if found.modelled else ""
+        return {"physics_missing": f"physics missing: {found.missing}{offered}"}
+
+    def _diagnosed(self, imu: int) -> Diagnosed | None:
+        return None if self._flight is None else self._flight.diagnosed.get(imu)
+
+    def _unconfirmed(self, imu: int, plan: PushPlan) -> str:
+        """Why it takes another flight, or a person, to believe that this is of what is there."""
+        flight = self._flight
+        if flight is None or imu not in flight.imus or imu == self.writing:
+            return ""  # not diagnosed, which is said, or in our own hands
+        if not flight.current:
+            return (
+                "it was learned before the service or the autopilot last started, and no flight "
+                "has confirmed it since"
+            )
+        then, now = flight.imus[imu].in_force, tuple(c.before for c in plan.changes)
+        if now in (then, self.standing(imu).written):
+            return ""
+        changed = [
+            f"{c.name} from {old:.6g} to {c.before:.6g}"
+            for c, old in zip(plan.changes, then, strict=True)
+            if c.before != old
+        ]
+        return f"somebody has changed {', '.join(changed)} since the flight began"
+
+    def _beyond_policy(self, imu: int, plan: PushPlan, now: float) -> dict[str, str]:
+        standing = self.standing(imu)
+        found: dict[str, str] = {}
+        if self.forbidden:
+            found["advise_only"] = self.forbidden
+        if self._imus and imu not in self._imus:
+            found["not_selected"] = f"IMU {imu} is not among [push] imus"
+        if standing.refused:
+            found["refused"] = f"{standing.refused}; `onboard approve {imu}` lifts that"
+        if now < standing.not_before:
+            wait = standing.not_before - now
+            found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
+        if standing.approved is not None and _lapsed(standing.approved, plan):
+            standing.approved = standing.despite = None
+            self.counters["approvals_lapsed"] += 1
+        unconfirmed = self._unconfirmed(imu, plan)
+        if unconfirmed and standing.approved is None:
+            found["unconfirmed"] = f"{unconfirmed}: fly, or `onboard approve {imu}`"
+        if self.approval and standing.approved is None:
+            found["approval"] = "a person has to approve"
+        return found
+
+
+def approvable(held_back: Mapping[str, str]) -> bool:
+    """Whether a person's approval would lift one of the reasons, and something is to be gained.
+
+    That this flight is not diagnosed yet, which it will be after the landing, is none of them.
+    """
+    lifted = [n for n in held_back if n in PEOPLE | DIAGNOSIS and not landing_lifts(n, held_back)]
+    return bool(lifted) and not held_back.keys() & NOTHING_GAINED
+
+
+def named(imus: Sequence[int]) -> str:
+    """IMU 1, IMU 2."""
+    return ", ".join(f"IMU {imu}" for imu in imus)
+
+
+def _lapsed(approved: PushPlan, plan: PushPlan) -> bool:
+    """Whether what was approved is no longer what is there, or what is known."""
+    return any(
+        now.before != then.before
+        or (
+            abs(now.wanted - then.wanted) > MOVED_SIGMAS * max(now.sigma, then.sigma)
+            and not (then.kept and now.kept)
+        )
+        for then, now in zip(approved.changes, plan.changes, strict=True)
+    )

@@ -1,0 +1,100 @@
+"""The configuration's sections turned into the settings of the parts that they are about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.gps.trust import TrustLimits
+from onboard.daemon.setup import configuration
+from onboard.daemon.setup.recording import RollingRecorder
+from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.signing import Signing
+from onboard.mavlink.streams import StreamRequest
+from onboard.push.policy import Mode, PolicySettings
+
+
+def policy_settings(push: configuration.PushSettings) -> PolicySettings:
+    """[push]."""
+    return PolicySettings(
+        mode=Mode(push.policy),
+        disarmed_s=push.disarmed_s,
+        scale_min=push.scale_min,
+        scale_max=push.scale_max,
+        offset_max=push.offset_max,
+        scale_sigma_max=push.scale_sigma_max,
+        offset_sigma_max=push.offset_sigma_max,
+        improvement=push.improvement,
+        in_flight_scale_step=push.in_flight_scale_step,
+        in_flight_offset_step=push.in_flight_offset_step,
+    )
+
+
+def estimator_settings(estimator: configuration.EstimatorSettings) -> EstimatorSettings:
+    """[estimator]."""
+    trust = replace(
+        TrustLimits(),
+        satellites=estimator.satellites_min,
+        hdop=estimator.hdop_max,
+        speed_accuracy=estimator.speed_accuracy_max,
+        duration=estimator.window_s or None,
+    )
+    return replace(
+        EstimatorSettings(),
+        minimum_s=estimator.minimum_trusted_s,
+        buffer_s=estimator.buffer_s,
+        memory_s=estimator.memory_s,
+        trust=trust,
+    )
+
+
+def stream_requests(rates: configuration.RatesSettings) -> tuple[StreamRequest, ...]:
+    """[link.rates]; rate 0 asks for nothing."""
+    wanted = (
+        (rates.imu, ("RAW_IMU", "HIGHRES_IMU", "SCALED_IMU2", "SCALED_IMU3")),
+        (rates.attitude, ("ATTITUDE",)),
+        (rates.gps, ("GPS_RAW_INT", "GPS2_RAW")),
+        (rates.status, ("EKF_STATUS_REPORT", "EXTENDED_SYS_STATE", "VIBRATION")),
+        (rates.regime, ("VFR_HUD",)),
+        (min(rates.regime, 1.0), ("WIND", "BATTERY_STATUS", "SYSTEM_TIME")),
+    )
+    return tuple(StreamRequest(name, rate) for rate, names in wanted if rate for name in names)
+
+
+def endpoints(link: configuration.LinkSettings) -> tuple[Endpoint, ...]:
+    """[link] endpoints.
+
+    Raises:
+        ConfigurationError: one of them is not understood.
+    """
+    return tuple(Endpoint.parse(text) for text in link.endpoints)
+
+
+def signing(link: configuration.LinkSettings, wall_clock: Callable[[], float]) -> Signing | None:
+    """[link] signing_key_file: the passphrase as entered in a ground station.
+
+    Raises:
+        ConfigurationError: the file cannot be read.
+    """
+    if link.signing_key_file is None:
+        return None
+    secret = configuration.read_secret(link.signing_key_file, key="[link] signing_key_file")
+    return Signing.from_passphrase(secret, wall_clock)
+
+
+def recorder(
+    recording: configuration.RecordingSettings, state: Path, wall_clock: Callable[[], float]
+) -> Recorder | None:
+    """[recording]; beside the state unless it says where."""
+    if not recording.enabled:
+        return None
+    given = recording.directory
+    return RollingRecorder(
+        Path(given).expanduser() if given else state / "recordings",
+        keep=recording.keep_files,
+        file_bytes=int(recording.file_size_mb * 1e6),
+        wall_clock=wall_clock,
+    )

@@ -1,0 +1,1 @@
+"""What there is to see: one snapshot of the service, and its state in sentences."""

@@ -1,0 +1,186 @@
+"""The state of one accelerometer, in one sentence.
+
+Coverage, status, proposal and push each know a part of it.  Put side by side they contradict
+each other; here they are made into one statement, and everybody (page, terminal, parameters,
+messages, broker) shows that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from onboard.core.estimate.result import Calibration, Status
+from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView
+
+NAMES: Final = (
+    "collecting",
+    "calibrated",
+    "insufficient",
+    "invalid",
+    "approval",
+    "held_back",
+    "writing",
+    "up_to_date",
+    "rejected",
+)
+"""All that a state may be called."""
+AFTER_LANDING: Final = frozenset({"armed", "disarmed_too_short", "in_air", "diagnosing"})
+"""Reasons against a push that go away by themselves when the vehicle has landed."""
+WAITING: Final = frozenset({"approval", "unconfirmed"})
+"""Reasons that wait for a person who looks at the values."""
+BY_CHOICE: Final = frozenset({"policy_never", "advise_only", "not_selected"})
+"""Reasons that somebody has configured: no fault, and nothing to wait for."""
+NOTHING_GAINED: Final = frozenset({"nothing_to_change", "no_improvement", "not_calibrated"})
+"""Reasons that leave nothing worth writing, and so nothing to approve."""
+STEADY: Final[Mapping[str, str]] = MappingProxyType(
+    {"failed_before": "the last try to write it failed; it is tried again by itself"}
+)
+"""Instead of sentences that count seconds: a state is the same until something happens."""
+FLY_ON = "fly on with GPS trusted, changing speed and direction often"
+GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
+_GRAVEST = (ERROR, WARNING, INFO, GOOD)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circumstances:
+    """What else decides: ``writing`` and ``written`` are about this accelerometer."""
+
+    proposal: ProposalView | None = None
+    writing: bool = False
+    written: bool = False
+    flying: bool = False
+
+
+ALONE: Final = Circumstances()
+"""An answer of which nothing has been made yet."""
+
+
+def state_of(c: Calibration, now: Circumstances = ALONE) -> StateView:
+    """Where an accelerometer stands, in one sentence.
+
+    Args:
+        c: its answer.
+        now: proposal, push and flight.
+    """
+    if now.writing:
+        return _state("writing", "being written", "its values are being written", INFO)
+    match c.status:
+        case Status.INVALID:
+            return _state("invalid", "cannot be used", c.note or "it has no valid answer", ERROR)
+        case Status.COLLECTING:
+            return _state("collecting", "learning", _so_far(c), INFO, _to_fly(c))
+        case Status.INSUFFICIENT:
+            return _state("insufficient", "not enough flown", _so_far(c), WARNING, _to_fly(c))
+        case _:
+            return _calibrated(c, now)
+
+
+def next_step(views: Sequence[ImuView]) -> StepView | None:
+    """What a person should do: of the gravest state, of those the least covered; None: unknown."""
+    if not views:
+        return None
+    wanting = [view for view in views if view.state.next]
+    if wanting:
+        worst = min(wanting, key=lambda v: (_GRAVEST.index(v.state.severity), v.coverage.percent))
+        return StepView(imu=worst.imu, text=worst.state.next, severity=worst.state.severity)
+    if all(view.state.severity == GOOD for view in views):
+        return StepView(imu=None, text="nothing more needed", severity=GOOD)
+    return StepView(imu=None, text="nothing to do now", severity=INFO)
+
+
+def landing_lifts(name: str, held_back: Mapping[str, str]) -> bool:
+    """Whether a reason goes away by itself after the landing; a flight is diagnosed then."""
+    flying = bool(held_back.keys() & {"armed", "in_air"})
+    return name in AFTER_LANDING or (name == "not_diagnosed" and flying)
+
+
+def _calibrated(c: Calibration, now: Circumstances) -> StateView:
+    known = _known(c)
+    further = c.coverage.advice if now.flying else ""
+    if now.proposal is None:
+        return _state("calibrated", "calibrated", known, GOOD, further)
+    held = now.proposal.held_back
+    if now.proposal.rejected:
+        why = held.get("refused", "a person rejected it")
+        return _state("rejected", "rejected", f"{known}; not written: {why}", INFO)
+    lasting = {n: STEADY.get(n, s) for n, s in held.items() if not landing_lifts(n, held)}
+    if "physics_missing" in lasting:
+        title, why = "held back by the diagnosis", lasting["physics_missing"]
+        return _state("held_back", title, f"{known}; not written: {why}", WARNING, "see diagnosis")
+    if "nothing_to_change" in lasting:
+        whose = "the values that were written" if now.written else "these values already"
+        return _state("up_to_date", "up to date", f"{known}; the autopilot has {whose}", GOOD)
+    if (
+        "no_improvement" in lasting
+        and lasting.keys() <= {"no_improvement", "approval"}
+        and _judged(c)
+    ):
+        why = f"{known}; they would hardly do better than the values in force"
+        return _state("up_to_date", "up to date", why, GOOD)
+    return _proposed(known, now.proposal, lasting, further)
+
+
+def _proposed(
+    known: str, proposal: ProposalView, lasting: Mapping[str, str], further: str
+) -> StateView:
+    """What becomes of values that could be written; ``lasting`` is what a landing leaves."""
+    held, approved = proposal.held_back, "approved, " if proposal.approved else ""
+    if not held:
+        return _state("calibrated", f"{approved}about to be written", known, GOOD)
+    if not lasting:
+        then = "it is written after the landing"
+        if "diagnosing" in held:
+            then = "it is written when the flight has been diagnosed"
+        return _state("calibrated", f"{approved}calibrated", f"{known}; {then}", GOOD, further)
+    chosen = [sentence for name, sentence in lasting.items() if name in BY_CHOICE]
+    if chosen and lasting.keys() <= BY_CHOICE | {"approval"}:
+        why = "; ".join(chosen)
+        return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
+    if lasting.keys() <= WAITING:
+        if len(held) > len(lasting):
+            then = "after the landing a person has to approve it"
+            return _state("calibrated", "calibrated", f"{known}; {then}", GOOD, further)
+        todo = "look at the values, then approve or reject them"
+        why = f"{known}; {lasting.get('unconfirmed', 'a person has to approve it')}"
+        return _state("approval", "waits for your approval", why, WARNING, todo)
+    rest = [sentence for name, sentence in lasting.items() if name != "approval"]
+    title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
+    more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
+    todo = further or ("approve it if that is all right" if proposal.approvable else "")
+    title = f"{approved}but {title}" if approved else title
+    return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+
+
+def _judged(c: Calibration) -> bool:
+    """Whether flight that was not fitted has compared old and new values."""
+    return math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after)
+
+
+def _known(c: Calibration) -> str:
+    shown = sum(c.observable)
+    if shown == len(c.observable):
+        return "all six numbers are known"
+    return f"{shown} of 6 numbers are known, the others stay as they are"
+
+
+def _so_far(c: Calibration) -> str:
+    """How far an accelerometer has come that is not calibrated."""
+    if not c.coverage.advice and c.note:
+        return f"not calibrated: {c.note.strip().rstrip('.')}"
+    if not c.coverage.advice:
+        return f"all six numbers are covered, {c.trusted_s:.0f} s of flight are not enough yet"
+    shown = sum(c.observable)
+    return f"{shown} of 6 numbers are known; least of all the {c.coverage.weakest}"
+
+
+def _to_fly(c: Calibration) -> str:
+    """Coverage says what to fly; where nothing is left to cover, more of the same is."""
+    return c.coverage.advice or FLY_ON
+
+
+def _state(name: str, title: str, sentence: str, severity: str, then: str = "") -> StateView:
+    return StateView(name=name, title=title, sentence=sentence, severity=severity, next=then)

@@ -1,0 +1,86 @@
+"""What was written, from the journal: old values, new values, and what they have brought.
+
+An estimate is compared with the values in force, and after a push these are the new ones: what
+the push was good for is then seen nowhere but here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from onboard.daemon.view.snapshot import WrittenValue, WrittenView
+from onboard.push.entries import Closed, Entry, Planned, Purpose, Result, Watched
+
+LATEST_SHOWN = 4
+"""Pushes of one accelerometer besides its first, which is mostly the one that mattered."""
+
+
+def written_view(
+    lines: Sequence[tuple[float, Entry]], system_id: int | None = None, board: str = ""
+) -> tuple[WrittenView, ...]:
+    """Pushes that were completed, oldest first.
+
+    Args:
+        lines: the journal: Unix time and entry, oldest first.
+        system_id: of the vehicle that is there: of others nothing is shown; None: of all.
+        board: its unique id, empty if it tells none.
+    """
+    plans: dict[str, Planned] = {}
+    verdicts: dict[str, Watched] = {}
+    completed: dict[int, dict[str, tuple[float, Closed]]] = {}
+    in_force: dict[int, str] = {}
+    for at, entry in lines:
+        match entry:
+            case Planned(plan=plan) if system_id is None or plan.vehicle.same_airframe(
+                system_id, board
+            ):
+                plans[entry.transaction] = entry
+            case Watched():
+                verdicts[entry.transaction] = entry
+            case Closed() if entry.transaction in plans:
+                planned = plans[entry.transaction]
+                imu = planned.plan.imu
+                pushes = completed.setdefault(imu, {})
+                if entry.result is Result.COMPLETED:
+                    in_force.pop(imu, None)
+                    if planned.purpose is Purpose.PUSH:
+                        pushes[entry.transaction] = (at, entry)
+                        in_force[imu] = entry.transaction
+                elif pushes.pop(entry.transaction, None) is not None:
+                    # Completed once; after a reboot it was gone and was taken back.
+                    in_force.pop(imu, None)
+            case _:
+                pass
+    shown = []
+    for imu, pushes in completed.items():
+        names = list(pushes)
+        for name in names[:1] + names[1:][-LATEST_SHOWN:]:
+            at, closed = pushes[name]
+            current = in_force.get(imu) == name
+            shown.append(_view(plans[name], at, closed, verdicts.get(name), in_force=current))
+    return tuple(sorted(shown, key=lambda view: view.at))
+
+
+def _view(
+    planned: Planned, at: float, closed: Closed, watched: Watched | None, *, in_force: bool
+) -> WrittenView:
+    plan, baseline = planned.plan, planned.plan.baseline
+    return WrittenView(
+        imu=plan.imu,
+        at=at,
+        values=tuple(
+            WrittenValue(
+                name=c.name, before=c.before, written=c.wanted, read_back=closed.values.get(c.name)
+            )
+            for c in plan.changes
+        ),
+        in_force=in_force,
+        held_out_before=baseline.held_out_before,
+        held_out_after=baseline.held_out_after,
+        velocity_rms_before_m_s=baseline.velocity_rms_before,
+        velocity_rms_after_m_s=baseline.velocity_rms_after,
+        verdict=None if watched is None else watched.verdict.value,
+        verdict_sentence="" if watched is None else watched.sentence,
+        next_held_out=None if watched is None else watched.held_out,
+        next_velocity_rms_m_s=None if watched is None else watched.velocity_rms,
+    )

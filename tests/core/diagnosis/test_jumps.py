@@ -1,0 +1,52 @@
+"""A jump is placed from the flight around it and the sums of the rest."""
+
+import numpy as np
+import pytest
+
+from benchmarks.explaining import heard
+from onboard.core.diagnosis import jumps
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.physics.catalogue import catalogue
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.offsets import BiasStep
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec
+
+AT = 70.0
+
+
+@pytest.fixture(scope="module", params=["copter", "plane"])
+def full(request):
+    """A flight of 220 s whose offsets jump at :data:`AT`, with the columns of the catalogue."""
+    spec = FlightSpec(
+        vehicle=request.param,
+        seed=5,
+        duration=220.0,
+        imus=random_imus(5),
+        effects=(concealed.BiasStep(time=AT, x=0.15, y=-0.1, z=0.08),),
+    )
+    calibrator = heard(spec)
+    t0 = calibrator.first_sample
+    engine = calibrator.engine(1)
+    return Examination(engine, catalogue(Origin(t0)), t0=t0, chunks=engine.chunks).with_noise()
+
+
+def gains(full, times):
+    scored = jumps._scored(full, (), [BiasStep(float(t)) for t in times])
+    return np.array([g for g, _ in scored])
+
+
+def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeypatch):
+    times = full.point.skew_from + AT + np.arange(-8.0, 9.0, 4.0)
+    near = gains(full, times)
+    monkeypatch.setattr(jumps, "SETTLING_S", 1e6)
+    whole = gains(full, times)
+    assert whole.max() > 200.0
+    assert near == pytest.approx(whole, rel=0.15)
+
+
+def test_it_is_found_to_the_second(full):
+    begun = full.point.skew_from  # the first sample, on the ground
+    found = jumps.jump_near(full, (), begun + AT + 30.0)
+    assert found.at - begun == pytest.approx(AT, abs=1.5)

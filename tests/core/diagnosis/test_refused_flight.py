@@ -1,0 +1,173 @@
+"""What the trust window refused in flight: when, why, and what the inertia says of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.answers.verdict import headline, unused_in_words
+from onboard.core.diagnosis.coasting import _between_steps
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Mismatch, Verdict
+from onboard.core.diagnosis.timing_effects import _of_latency
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.gps_clock import FixClock
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, Reason, TrustWindow
+from onboard.core.inputs.samples import EkfHealth, GpsFix
+from onboard.mavlink.decode import Decoder
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import GpsTruth, random_imus
+from sitl.recording import FlightSpec, fly_messages
+
+NOISY = GpsTruth(delay=0.04, stamped_early=0.02, velocity_noise=0.15, velocity_coloured=0.15)
+PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
+QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
+
+
+def complaining(health, begin, end):
+    bad = begin <= health.t <= end
+    return replace(health, flags=EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0))
+
+
+def flagged(seed, gps, complaint, *effects, duration=200.0):
+    """Diagnosed with an EKF that complains of GPS from and to the times of ``complaint``, s."""
+    spec = FlightSpec(
+        vehicle="copter",
+        seed=seed,
+        duration=duration,
+        imus=random_imus(seed),
+        gps=gps,
+        effects=effects,
+    )
+    made, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    for _, message in fly_messages(spec):
+        for sample in decoder.decode(message):
+            made.feed(complaining(sample, *complaint) if isinstance(sample, EkfHealth) else sample)
+    made.finish()
+    return diagnose(made, 1), made.first_sample
+
+
+def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
+    fault = concealed.GpsFault(start=90.0, end=123.0, north=1.2, east=-0.9)
+    said, first = flagged(70, NOISY, (91.0, 128.0), fault)
+    assert said.verdict is Verdict.EXPLAINED
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    ((begin, end),) = effect.intervals
+    assert begin + first == pytest.approx(fault.start, abs=1.5)
+    assert end + first == pytest.approx(fault.end, abs=1.5)
+    offset = effect.unknowns["offset"]
+    assert offset.value == pytest.approx(1.5, abs=3.0 * offset.sigma)
+    assert offset.sigma < 0.5
+    (unused,) = said.unused
+    assert (unused.reason, unused.contradicted) == ("ekf_gps_glitch", True)
+
+
+def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_clean():
+    said, first = flagged(41, PROMPT, (70.0, 90.0), duration=150.0)
+    assert said.verdict is Verdict.CLEAN
+    (unused,) = said.unused
+    assert unused.start_s + first == pytest.approx(70.0, abs=1.0)
+    assert unused.contradicted is False
+    assert "where GPS was believed" in headline(said)
+    (sentence,) = unused_in_words(said)
+    assert "the autopilot reports a GPS glitch" in sentence
+    assert "nothing there contradicts GPS" in sentence
+
+
+def innovations(*stages):
+    """Times and innovations: each stage has its length, s, its error, and its drift, m/s/s."""
+    rng = np.random.default_rng(7)
+    errors = [np.tile(error, (round(5 * s), 1)) for s, error, _ in stages]
+    drift = np.cumsum(np.concatenate([np.full(round(5 * s), 0.2 * d) for s, _, d in stages]))
+    y = np.concatenate(errors) + drift[:, None] * np.array([1.0, 0.0])
+    return 0.2 * np.arange(len(y)), y + 0.1 * rng.standard_normal(y.shape)
+
+
+NONE, OFF = np.zeros(2), np.array([1.2, -0.9])
+
+
+def test_an_error_is_what_the_velocity_jumps_by_however_far_the_inertia_has_drifted():
+    flown = innovations((5.0, NONE, 0.0), (33.0, OFF, -0.1), (8.0, NONE, -0.1))
+    (found,) = _between_steps(flown, QUIET, anchored=True)
+    assert (found.start, found.end) == pytest.approx((5.0, 38.0), abs=0.5)
+    assert found.off == pytest.approx(OFF, abs=3.0 * found.sigma)
+
+
+def test_one_that_crept_in_is_counted_back_from_where_gps_is_right_again():
+    creeping = [(1.0, 0.1 * k * OFF, 0.0) for k in range(10)]
+    flown = innovations(*creeping, (20.0, OFF, 0.0), (8.0, NONE, 0.0))
+    (found,) = _between_steps(flown, QUIET, anchored=True)
+    assert found.end == pytest.approx(30.0, abs=0.5)
+    assert found.size == pytest.approx(1.5, abs=3.0 * found.sigma)
+
+
+@pytest.mark.parametrize("drift", [0.3, 2.0, 5.0])
+def test_what_only_grows_is_the_inertias_own(drift):
+    flown = innovations((5.0, NONE, 0.0), (20.0, NONE, drift))
+    assert _between_steps(flown, QUIET, anchored=False) == []
+
+
+def test_the_window_remembers_when_it_refused_and_why():
+    window = TrustWindow()
+    for k in range(100):
+        t = 0.2 * k
+        if k % 5 == 0:
+            bad = 5.0 <= t < 8.0
+            window.feed(EkfHealth(t, EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0)))
+        window.feed(GpsFix(t, 1, 3, 0.5, 0.5, 10.0, 0.0, 0.0, satellites=12))
+    (refusal,) = window.refusals
+    assert refusal.reason is Reason.EKF_GPS_GLITCH
+    # Until the recovery time of five seconds has passed.
+    assert (refusal.start, refusal.end) == pytest.approx((5.0, 12.8), abs=0.21)
+
+
+def test_a_proof_on_less_than_half_of_the_fixes_supports_nothing():
+    nan = float("nan")
+    made = Mismatch(
+        detected=True,
+        whitened_rms_before=1.0,
+        whitened_rms_after=1.0,
+        p_value=0.0,
+        velocity_rms_before=nan,
+        velocity_rms_after=nan,
+        held_out_before=nan,
+        held_out_after=nan,
+        fixes=7,
+        believed=742,
+    )
+    assert not made.supported
+    assert replace(made, fixes=371).supported
+
+
+@pytest.mark.recordings
+def test_a_flight_of_which_hardly_a_fix_fits_is_not_explained(recordings):
+    from onboard.answers.explain import explain  # noqa: PLC0415 - not needed without the recordings
+
+    said = explain([recordings / "real" / "real-quad-12-gpsglitch.BIN"]).diagnosis
+    assert said.verdict is Verdict.INSUFFICIENT
+    assert said.mismatch.fixes < 0.5 * said.mismatch.believed
+    assert f"only {said.mismatch.fixes} of {said.mismatch.believed} GPS fixes" in said.note
+
+
+def test_the_advice_counts_from_the_ekfs_own_stamp():
+    clock = FixClock(late=0.032, assumed=(0.12, 0.22))
+    cure, parameters = _of_latency(0.214, clock)
+    assert parameters == {"GPS1_DELAY_MS": 182.0}
+    assert "32 ms later" in cure
+    assert "120 or 220 ms" in cure
+
+
+def test_what_the_driver_assumes_by_itself_is_not_advised():
+    cure, parameters = _of_latency(0.19, FixClock(assumed=(0.2,)))
+    assert parameters == {}
+    assert cure.startswith("none")
+    _, parameters = _of_latency(0.19, FixClock(told=0.1, assumed=(0.1,)))
+    assert parameters == {"GPS1_DELAY_MS": 190.0}
+
+
+@pytest.mark.parametrize(("delay", "value"), [(-0.02, 1.0), (0.0, 1.0), (0.4, 250.0)])
+def test_zero_would_mean_the_drivers_own_and_more_than_the_ekf_keeps_is_not_set(delay, value):
+    assert FixClock().setting(delay) == value

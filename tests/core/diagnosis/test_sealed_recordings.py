@@ -1,0 +1,132 @@
+"""Effects concealed in simulated flights of one and a half minutes and more, and their absence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import EstimatorSettings
+from onboard.mavlink.decode import Decoder
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import GpsTruth, random_imus
+from sitl.recording import FlightSpec, fly_messages
+
+PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
+
+
+def diagnosed(vehicle, seed, *effects, duration=150.0, imus=None, gps=PROMPT):
+    spec = FlightSpec(
+        vehicle=vehicle,
+        seed=seed,
+        duration=duration,
+        imus=imus or random_imus(seed),
+        gps=gps,
+        effects=effects,
+    )
+    calibrator, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    for _, message in fly_messages(spec):
+        for sample in decoder.decode(message):
+            calibrator.feed(sample)
+    calibrator.finish()
+    before = calibrator.to_bytes()
+    said = diagnose(calibrator, 1)
+    assert calibrator.to_bytes() == before, "a diagnosis leaves the calibrator as it is"
+    return said, calibrator.first_sample
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    said, _ = diagnosed("copter", 41)
+    assert said.verdict is Verdict.CLEAN
+    assert said.effects == ()
+
+
+def test_a_false_velocity_is_found_from_beginning_to_end():
+    fault = concealed.GpsFault(start=70.0, end=84.0, north=0.0, east=2.5)
+    said, first = diagnosed("plane", 42, fault)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    begin, end = effect.intervals[0][0] + first, effect.intervals[-1][1] + first
+    assert abs(begin - fault.start) < 2.0
+    assert abs(end - fault.end) < 2.0
+    assert effect.unknowns["offset"].value == pytest.approx(2.5, abs=0.4)
+    assert effect.where[0].axis == "earth_east"
+
+
+def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jumps_back():
+    fault = concealed.GpsFault(start=60.0, end=85.0, north=0.0, east=3.3)
+    said, first = diagnosed("copter", 46, fault)
+    effect = next(e for e in said.effects if e.name == "gps_fault")
+    assert abs(effect.intervals[0][0] + first - fault.start) < 2.0
+    assert abs(effect.intervals[-1][1] + first - fault.end) < 2.0
+
+
+def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
+    # The EKF levels with the accelerometer: 1.4 m/s^2 in the first minute tilt it by degrees.
+    warm = {"temperature_start": 15.0, "temperature_end": 50.0, "temperature_time": 25.0}
+    imus = tuple(replace(imu, **warm) for imu in random_imus(20156))
+    heating = concealed.TemperatureDrift(x=0.045, y=0.0, z=0.0)
+    said, _ = diagnosed("copter", 20156, heating, imus=imus)
+    (effect,) = said.effects
+    assert effect.name == "temperature_drift"
+    for axis, truth in zip("xyz", (heating.x, heating.y, heating.z), strict=True):
+        found = effect.unknowns[axis]
+        assert abs(found.value - truth) < max(0.1 * abs(truth), 3.0 * found.sigma)
+
+
+def test_a_very_late_attitude_leaves_nothing_over_for_other_effects():
+    said, _ = diagnosed("copter", 48, concealed.ImuDelay(delay=0.09))
+    (effect,) = said.effects
+    assert effect.name == "imu_delay"
+    assert effect.unknowns["delay"].value == pytest.approx(0.09, rel=0.04)
+
+
+def test_a_jump_of_one_axis_is_said_to_be_on_that_axis():
+    step = concealed.BiasStep(time=80.0, x=0.5)
+    said, first = diagnosed("copter", 43, step)
+    effect = next(e for e in said.effects if e.name == "bias_step")
+    assert abs(effect.unknowns["time"].value + first - step.time) < 2.0
+    assert effect.where[0].axis == "body_x"
+    assert {e.name for e in said.effects} == {"bias_step"}
+
+
+def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
+    said, _ = diagnosed("copter", 44, concealed.Saturation(limit=11.4))
+    effect = next(e for e in said.effects if e.name == "saturation")
+    assert effect.unknowns["limit"].value == pytest.approx(11.4, rel=0.1)
+    assert effect.intervals
+    assert np.all(np.diff(np.array(effect.intervals)) >= 0.0)
+
+
+def test_what_has_no_name_gets_none_but_its_formula():
+    hidden = concealed.Nameless(term="dynamic_pressure", x=-0.2, y=-0.2, z=-0.2)
+    said, _ = diagnosed("copter", 45, hidden, duration=200.0)
+    assert said.verdict is Verdict.UNEXPLAINED
+    (effect,) = said.effects
+    assert effect.name == "empirical"
+    assert "speed" in effect.formula
+
+
+@pytest.mark.parametrize(("seed", "axis", "size"), [(50, "x", -0.33), (51, "y", 0.37)])
+def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
+    # Sideways it looks like a tilt that wanders: noise found without it would be made of it.
+    sizes = {a: size if a == axis else 0.0 for a in "xyz"}
+    step = concealed.BiasStep(time=110.0, **sizes)
+    said, first = diagnosed("copter", seed, step, duration=190.0)
+    (effect,) = said.effects
+    assert effect.name == "bias_step"
+    assert abs(effect.unknowns["time"].value + first - step.time) < 2.0
+    assert effect.unknowns[axis].value == pytest.approx(size, rel=0.1)
+
+
+def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_rival():
+    # In a hover's force, 24 r / g of a squared window is an antenna r higher.
+    averaging = replace(PROMPT, smoothing=0.3)
+    said, _ = diagnosed("copter", 60, gps=averaging)
+    (effect,) = said.effects
+    assert effect.name == "gps_smoothing"
+    window = effect.unknowns["window"]
+    assert abs(window.value - 0.3) < max(0.03, 3.0 * window.sigma)
+    assert ("gps_smoothing", "gps_lever_arm") in [a.names for a in said.ambiguous]

@@ -1,0 +1,105 @@
+"""A receiver's faults are named, counted, and leave the answer within its limits."""
+
+from functools import reduce
+
+import numpy as np
+import pytest
+
+from benchmarks.faults import FAULTS
+from benchmarks.recorded import Flight, moving_span, recorded, simulated
+from benchmarks.robustness import outcomes
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.result import Status
+from onboard.core.gps.trust import Reason, WindowClosed
+from onboard.core.inputs.samples import GpsFix, ImuSample
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec
+
+BY_NAME = {fault.name: fault for fault in FAULTS}
+STEP, GLITCH, NOISE, GAPS, NO_FIX, SILENT = (
+    BY_NAME[name]
+    for name in (
+        "velocity step of 1.5 m/s for 25 s",
+        "50 m/s for 3 s, twice",
+        "noise of 2.5 m/s for 25 s",
+        "gaps of 5, 20 and 40 s",
+        "lost for good, fix type 1",
+        "lost for good, silent",
+    )
+)
+
+
+def told(o):
+    return o.flight, o.fault, o.imu, o.error, o.sigma, o.observed, o.named
+
+
+@pytest.fixture(scope="module", params=["copter", "plane"])
+def flight(request):
+    imus = random_imus(12)
+    return simulated(FlightSpec(vehicle=request.param, seed=12, duration=300.0, imus=imus))
+
+
+def test_each_fault_changes_the_receiver_alone(flight):
+    span = moving_span(flight.samples)
+    others = [s for s in flight.samples if not isinstance(s, GpsFix)]
+    for fault in FAULTS:
+        faulted = list(fault.laid_over(flight.samples, span))
+        assert faulted != flight.samples
+        assert [s for s in faulted if not isinstance(s, GpsFix)] == others
+
+
+def test_step_glitch_and_gaps_in_one_flight(flight):
+    span = moving_span(flight.samples)
+    every = (STEP, GLITCH, GAPS)
+    samples = reduce(lambda s, f: list(f.laid_over(s, span)), every[:-1], flight.samples)
+    faulted = Flight(flight.name, flight.vehicle, samples, flight.truth, flight.delay)
+    (o,) = outcomes(faulted, GAPS)
+    assert o.calibrated
+    assert o.named == {"gps_gap": 3}
+    # A third of the flight is spoilt: what is left holds what its sigmas say, and five of the
+    # numbers are still shown with small ones.
+    assert np.all(np.abs(o.error) < 4.0 * o.sigma), told(o)
+    small = o.sigma < np.repeat([0.006, 0.045], 3)
+    assert np.sum(small & np.array(o.observed)) >= 5, told(o)
+
+
+def test_a_noisy_receiver_is_not_believed_when_it_is_right_by_chance(flight):
+    """After seconds of coasting the gate is as wide as the noise."""
+    (o,) = outcomes(flight, NOISE)
+    assert o.calibrated
+    assert "innovation" in o.named
+    assert o.good, told(o)
+
+
+@pytest.mark.parametrize("fault", [NO_FIX, SILENT], ids=["no fix", "silent"])
+def test_the_last_answer_outlives_gps(flight, fault):
+    span = moving_span(flight.samples)
+    made, last, closed = Calibrator(), 0.0, []
+    for sample in fault.laid_over(flight.samples, span):
+        if isinstance(sample, GpsFix) and sample.fix_type >= 3:
+            last = sample.t
+        for event in made.feed(sample):
+            if isinstance(event, WindowClosed):
+                assert isinstance(sample, ImuSample) or fault is NO_FIX
+                closed.append(event)
+    assert not made.trust.is_open
+    assert closed[-1].reason is (Reason.GPS_GAP if fault is SILENT else Reason.NO_FIX)
+    assert closed[-1].t == pytest.approx(last, abs=0.5)
+    made.finish()
+    got = made.calibration(1)
+    assert got.status is Status.CALIBRATED
+    assert got.rejected["gps_gap" if fault is SILENT else "no_fix"] >= 1
+    error = np.array(got.scale + got.offset) - flight.truth[1]
+    assert np.all(np.abs(error) < 4.0 * np.array(got.scale_sigma + got.offset_sigma))
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [("a01", STEP), ("b05", STEP), ("b05", GLITCH), ("a01", GAPS), ("a01", SILENT)],
+    ids=lambda x: getattr(x, "name", x),
+)
+def test_recordings_stay_within_their_limits(recordings, name, fault):
+
+    for o in outcomes(recorded(recordings / "sitl" / f"{name}.tlog"), fault):
+        assert o.good, told(o)

@@ -1,0 +1,300 @@
+"""The calibrator on simulated flights: right numbers, whatever the stream does to itself."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from onboard.core.estimate.calibrator import Calibrator, Restarted
+from onboard.core.estimate.result import Status
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
+from onboard.core.inputs.tracks import untruncated
+from onboard.errors import StateError
+from onboard.mavlink.decode import Decoder
+from sitl import recording
+from sitl.builtin.truth import GpsTruth, ImuTruth
+from sitl.recording import FlightSpec
+
+TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
+RATES = {"VFR_HUD": 0, "VIBRATION": 0, "BATTERY_STATUS": 0, "GLOBAL_POSITION_INT": 0}
+MOVED = {"scale": (0.98, 1.01, 1.03), "offset": (-0.1, 0.2, 0.4)}
+
+
+def flown(vehicle, duration, *, rates=RATES, **more):
+    spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(TRUE,), rates=rates, **more)
+    parser, decoder = mav.MAVLink(None), Decoder(system=1, component=1)
+    messages = (m for _, frame in recording.fly(spec) for m in parser.parse_buffer(frame))
+    samples = [s for m in messages for s in decoder.decode(m)]
+    return samples, recording.truth_record(spec)["net_gps_delay_s"]
+
+
+def fed(samples, made=None):
+    made = made or Calibrator()
+    for sample in samples:
+        made.feed(sample)
+    made.finish()
+    return made
+
+
+def calibrated(samples):
+    return fed(samples).calibration(1)
+
+
+def time_of(sample):
+    return getattr(sample, "t", None)
+
+
+def split(samples, t):
+    """Samples before and after a moment; those without a time stay where they are."""
+    at = next(i for i, s in enumerate(samples) if isinstance(s, ImuSample) and s.t >= t)
+    return samples[:at], samples[at:]
+
+
+def parameters_of(samples):
+    return [s for s in samples if isinstance(s, ParameterValue)]
+
+
+def assert_true(got, scale_limit=0.01, offset_limit=0.05):
+    error = np.abs(np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset))
+    sigma = np.array(got.scale_sigma + got.offset_sigma)
+    assert np.all(error < 4.0 * sigma), (error, sigma)
+    # A number that the flight does not show says so; its sigma, above, has to cover its error.
+    seen = np.array(got.observable)
+    assert seen.sum() >= 4
+    assert np.all((error < np.repeat([scale_limit, offset_limit], 3))[seen]), (error, sigma)
+
+
+def assert_same(a, b, tolerance=0.0):
+    for name in ("scale", "offset", "scale_sigma", "offset_sigma"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=tolerance)
+    assert a.status is b.status
+
+
+@pytest.fixture(scope="module")
+def copter_flight():
+    return flown("copter", 150.0)
+
+
+@pytest.fixture(scope="module")
+def copter(copter_flight):
+    return copter_flight[0]
+
+
+@pytest.fixture(scope="module", params=["copter", "plane"])
+def long(request):
+    if request.param == "copter":
+        return request.getfixturevalue("copter_flight")
+    return flown("plane", 120.0)
+
+
+@pytest.fixture(scope="module")
+def short(copter):
+    """A minute of it: enough for what must not change a bit."""
+    return split(copter, 60.0)[0]
+
+
+@pytest.fixture(scope="module")
+def of_short(short):
+    return calibrated(short)
+
+
+def test_the_truth_comes_out(long):
+    samples, delay = long
+    got = calibrated(samples)
+    assert got.status is Status.CALIBRATED
+    assert_true(got)
+    told = got.timing["gps_delay_s"]
+    assert abs(told.value - delay) < max(0.005, 4.0 * told.sigma)
+    assert got.whitened_rms_after < got.whitened_rms_before
+    assert got.held_out_after < got.held_out_before
+
+
+ANTENNA = (0.6, -0.2, -0.4)
+PLACES = {
+    "antenna": {f"GPS1_POS_{a}": x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "old name": {f"GPS_POS1_{a}": x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "accelerometer": {f"INS_POS1_{a}": -x for a, x in zip("XYZ", ANTENNA, strict=True)},
+    "untold": {},
+}
+
+
+@pytest.fixture(scope="module")
+def long_armed():
+    """A flight with its antenna far from the accelerometer, the autopilot's parameters left out."""
+    samples, _ = flown("copter", 120.0, gps=GpsTruth(antenna=ANTENNA))
+    return [s for s in samples if not (isinstance(s, ParameterValue) and "_POS" in s.name)]
+
+
+@pytest.mark.parametrize("told", PLACES)
+def test_an_antenna_whose_place_is_told_does_no_harm(long_armed, told):
+    """The receiver reports its antenna's velocity; nobody but the estimator moves it."""
+    places = [ParameterValue(name, x) for name, x in PLACES[told].items()]
+    made = fed([*places, *long_armed])
+    engine = made.engine(1)
+    first = engine.model.index["antenna_x"]
+    left = engine.solution().theta[first : first + 3]
+    if told == "untold":
+        # What is not told is left for the prior of a few centimetres to allow.
+        np.testing.assert_allclose(left, ANTENNA, atol=0.1)
+    else:
+        assert_true(made.calibration(1))
+        assert np.max(np.abs(left)) < 0.02
+
+
+@pytest.mark.parametrize("wrong", [0.01, -0.01, 0.03])
+def test_an_antenna_told_a_little_wrong_does_no_harm(long_armed, wrong):
+    """Nobody measures it to a centimetre, and nothing else may pay for that."""
+    off = [x + wrong for x in ANTENNA]
+    told = [ParameterValue(f"GPS1_POS_{a}", x) for a, x in zip("XYZ", off, strict=True)]
+    got = calibrated([*told, *long_armed])
+    error = np.abs(np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset))
+    assert np.all(error <= 3.0 * np.array(got.scale_sigma + got.offset_sigma))
+    assert_true(got)
+
+
+def test_a_sparse_attitude_is_not_interpolated():
+    """At 4 Hz a copter tips over and back between two samples."""
+    samples, delay = flown("copter", 150.0, rates=RATES | {"ATTITUDE": 4.0}, seed=7)
+    got = calibrated(samples)
+    assert_true(got)
+    told = got.timing["gps_delay_s"]
+    assert abs(told.value - delay) < 3.0 * told.sigma
+
+
+def test_repeated_and_late_samples_change_nothing(short, of_short):
+    noisy, recent = [], []
+    for sample in short:
+        noisy.append(sample)
+        if isinstance(sample, ImuSample | AttitudeSample | GpsFix):
+            noisy.append(sample)
+            recent.append(sample)
+            if len(recent) > 9 and time_of(recent[-9]) < sample.t:
+                noisy.append(recent[-9])
+    got = calibrated(noisy)
+    assert_same(got, of_short)
+    assert got.rejected["imu_repeated"] > 1000
+    assert got.rejected["imu_late"] > 100
+
+
+def exact(sample):
+    """Truncation undone, so that other parameters may be applied without another truncation."""
+    if not isinstance(sample, ImuSample):
+        return sample
+    f = tuple(untruncated(x, sample.f_step) for x in sample.f_b)
+    return dataclasses.replace(sample, f_b=f, f_step=0.0)
+
+
+def test_a_change_of_parameters_in_flight_leaves_the_estimate(short):
+    before, after = split([exact(s) for s in short], 35.0)
+    in_force = {p.name: p.value for p in parameters_of(short)}
+    s0 = np.array([in_force[f"INS_ACCSCAL_{a}"] for a in "XYZ"])
+    o0 = np.array([in_force[f"INS_ACCOFFS_{a}"] for a in "XYZ"])
+    s1, o1 = np.array(MOVED["scale"]), np.array(MOVED["offset"])
+    change = [
+        ParameterValue(f"INS_ACC{kind}_{a}", float(x))
+        for kind, values in (("SCAL", s1), ("OFFS", o1))
+        for a, x in zip("XYZ", values, strict=True)
+    ]
+    now = [
+        dataclasses.replace(s, f_b=tuple(float(x) for x in (np.array(s.f_b) / s0 + o0 - o1) * s1))
+        if isinstance(s, ImuSample)
+        else s
+        for s in after
+    ]
+    changed, plain = calibrated([*before, *change, *now]), calibrated([*before, *after])
+    assert_same(changed, plain, 1e-7)
+    assert changed.in_force_scale == pytest.approx(MOVED["scale"])
+    assert changed.in_force_offset == pytest.approx(MOVED["offset"])
+
+
+def test_the_finer_stream_is_preferred(short):
+    def fine(sample):
+        return dataclasses.replace(exact(sample), source=ImuSource.HIGHRES_IMU)
+
+    def coarse(sample):
+        f = tuple(x + 1.0 for x in sample.f_b)  # would be seen
+        return dataclasses.replace(sample, f_b=f, t=sample.t + 1e-3)
+
+    alone, both = [], []
+    for s in short:
+        if isinstance(s, ImuSample):
+            assert s.source is ImuSource.RAW_IMU
+            alone.append(fine(s))
+            both += [fine(s), coarse(s)]
+        else:
+            alone.append(s)
+            both.append(s)
+    assert_same(calibrated(both), calibrated(alone))
+
+
+def test_a_reboot_in_flight_keeps_what_was_learnt(copter):
+    before, after = split(copter, 75.0)
+    start = next(s.t for s in after if isinstance(s, ImuSample)) - 4.0
+    moved = [
+        s if time_of(s) is None else dataclasses.replace(s, t=s.t - start)
+        for s in after
+        if not isinstance(s, ParameterValue)
+    ]
+    made = Calibrator()
+    events = [e for s in [*before, *moved] for e in made.feed(s)]
+    made.finish()
+    assert [e.reason for e in events if isinstance(e, Restarted)] == ["reboot"]
+    got = made.calibration(1)
+    assert_true(got)
+    assert got.trusted_s > calibrated(copter).trusted_s - 15.0
+    assert got.rejected["reboots"] == 1
+
+
+def test_twenty_seconds_without_gps(copter):
+    got = calibrated([s for s in copter if not (isinstance(s, GpsFix) and 50.0 < s.t < 70.0)])
+    assert got.status is Status.CALIBRATED
+    assert_true(got)
+
+
+@pytest.fixture(scope="module")
+def halves(copter):
+    before, after = split(copter, 75.0)
+    return fed(before), [*parameters_of(before), *after]
+
+
+def test_saved_sums_go_on_where_they_stopped(halves):
+    first, rest = halves
+    assert first.parameters.device_id(1)
+    alone = fed(rest).calibration(1)
+    got = fed(rest, Calibrator.from_bytes(first.to_bytes())).calibration(1)
+    assert_true(got)
+    assert got.trusted_s == pytest.approx(first.calibration(1).trusted_s + alone.trusted_s, rel=0.1)
+    assert np.linalg.slogdet(got.covariance)[1] < np.linalg.slogdet(alone.covariance)[1]
+
+
+def test_sums_that_wait_for_their_sensor_are_not_lost(halves):
+    data = halves[0].to_bytes()
+    assert Calibrator.from_bytes(data).to_bytes() == data
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda d: d[:-30],
+        lambda d: b"",
+        lambda d: d.replace(b'"prior"', b'"later"'),
+        lambda d: d[::-1],
+    ],
+)
+def test_damaged_state_is_refused(halves, damage):
+    with pytest.raises(StateError):
+        Calibrator.from_bytes(damage(halves[0].to_bytes()))
+
+
+def test_a_hover_is_never_called_calibrated():
+    samples, _ = flown("copter", 90.0, dull=True)
+    made = Calibrator()
+    for i, sample in enumerate(samples):
+        made.feed(sample)
+        if i % 2000 == 0 and made.imus:
+            assert made.calibration(1).status is not Status.CALIBRATED
+    made.finish()
+    got = made.calibration(1)
+    assert got.status is Status.INSUFFICIENT
+    assert got.note

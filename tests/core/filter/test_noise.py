@@ -1,0 +1,96 @@
+"""The search for noise levels, on likelihoods whose top is known."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from onboard.core.filter.noise import ESTIMATED, LIMITS, NoiseLevels, distance, line, star, stepped
+
+CENTRE = NoiseLevels()
+
+
+def parabola(top):
+    """A log-likelihood that is quadratic in every log-level, highest at ``top``."""
+
+    def of(levels):
+        logs = [np.log(getattr(levels, n) / getattr(top, n)) for n in ESTIMATED]
+        return 1234.5 - 7.0 * float(np.square(logs).sum())
+
+    return of
+
+
+def climbed(start, likelihood, searches=6):
+    levels = start
+    for _ in range(searches):
+        target = stepped(levels, [likelihood(m) for m in star(levels)])
+        members = line(levels, target)
+        levels = members[int(np.argmax([likelihood(m) for m in members]))]
+    return levels
+
+
+@pytest.mark.parametrize("name", ESTIMATED)
+@pytest.mark.parametrize("share", [0.03, 0.2, 0.5, 0.8, 0.97])
+def test_the_top_is_found_wherever_it_lies_between_the_limits(name, share):
+    low, high = LIMITS[name]
+    top = replace(CENTRE, **{name: low * (high / low) ** share})
+    assert distance(climbed(CENTRE, parabola(top)), top) < 0.01
+
+
+@pytest.mark.parametrize("name", ESTIMATED)
+@pytest.mark.parametrize("end", [0, 1])
+def test_from_a_limit_it_comes_back_to_a_top_just_inside(name, end):
+    """At a limit one side cannot be tried: the other has to tell where the top is."""
+    limit = LIMITS[name][end]
+    start = replace(CENTRE, **{name: limit})
+    top = replace(CENTRE, **{name: limit * (1.3, 1 / 1.3)[end]})
+    one = stepped(start, [parabola(top)(m) for m in star(start)])
+    assert distance(one, top) < 0.01
+
+
+@pytest.mark.parametrize("beyond", [0.1, 10.0])
+def test_a_top_beyond_the_limits_ends_at_the_limit(beyond):
+    top = replace(CENTRE, velocity=LIMITS["velocity"][beyond > 1.0] * beyond)
+    found = climbed(CENTRE, parabola(top))
+    assert found.velocity == pytest.approx(LIMITS["velocity"][beyond > 1.0])
+
+
+def test_a_star_has_three_different_values_of_every_level_inside_its_limits():
+    for edge in (0, 1):
+        centre = replace(CENTRE, **{n: LIMITS[n][edge] for n in ESTIMATED})
+        members = star(centre)
+        for i, name in enumerate(ESTIMATED):
+            values = [getattr(m, name) for m in (centre, *members[1 + 2 * i : 3 + 2 * i])]
+            assert len(set(values)) == 3
+            assert all(LIMITS[name][0] <= v <= LIMITS[name][1] for v in values)
+            others = [n for n in ESTIMATED if n != name]
+            assert all(getattr(members[1 + 2 * i], n) == getattr(centre, n) for n in others)
+
+
+def test_a_flat_likelihood_moves_nothing():
+    assert stepped(CENTRE, [5.0] * (1 + 2 * len(ESTIMATED))) == CENTRE
+
+
+def test_a_line_leads_from_the_centre_to_the_target():
+    target = replace(CENTRE, velocity=0.4, tilt_walk=1e-3)
+    members = line(CENTRE, target)
+    assert members[0] == CENTRE
+    assert distance(members[-1], target) < 1e-12
+    steps = [distance(members[0], m) for m in members]
+    assert steps == sorted(steps)
+    assert {f.name for f in fields(NoiseLevels)} == set(LIMITS)
+
+
+def test_levels_that_trade_with_each_other_do_not_make_the_search_climb_down():
+    """A narrow ridge across two levels: each by itself asks for a step that is too long."""
+
+    def ridge(levels):
+        a, b = np.log(levels.force_walk / 0.05), np.log(levels.velocity_colour / 0.1)
+        return -50.0 * (a + b) ** 2 - 0.5 * (a - b) ** 2
+
+    levels, heights = CENTRE, [ridge(CENTRE)]
+    for _ in range(8):
+        levels = climbed(levels, ridge, searches=1)
+        heights.append(ridge(levels))
+    assert heights == sorted(heights)
+    assert heights[-1] > -1.0

@@ -1,0 +1,421 @@
+"""The trust window: one test per reason, its recovery, and invariants under anything at all."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from onboard.core.gps.trust import (
+    GIVEN_UP_S,
+    RECOVERY,
+    Phase,
+    Reason,
+    TrustLimits,
+    TrustWindow,
+    WindowClosed,
+    WindowOpened,
+)
+from onboard.core.inputs.samples import (
+    AttitudeSample,
+    EkfHealth,
+    GpsFix,
+    GpsIntegrity,
+    ImuSample,
+    VehicleState,
+)
+
+HEALTHY = 0b11_0011_1111  # all but terrain, not constant position
+STEP = 0.2
+
+
+def fix(t, **changes):
+    """A receiver that flies north at 10 m/s from 47 N 8 E, five times a second."""
+    good = GpsFix(
+        t=t,
+        receiver=1,
+        fix_type=3,
+        latitude=0.82 + 10 * t / 6.371e6,
+        longitude=0.14,
+        altitude=400.0,
+        v_n=10.0,
+        v_e=0.0,
+        satellites=11,
+        hdop=0.9,
+    )
+    return replace(good, **changes)
+
+
+def fly(window, start, end, **changes):
+    """Feed fixes every STEP from start up to and including end; all events."""
+    events = []
+    for k in range(round((end - start) / STEP) + 1):
+        events += window.feed(fix(start + k * STEP, **changes))
+    return events
+
+
+def opened(window, events):
+    """Time of the only opening in ``events``, which must be of an open window."""
+    assert window.is_open
+    (event,) = [e for e in events if isinstance(e, WindowOpened)]
+    return event.t
+
+
+def test_waits_then_opens_on_the_first_good_fix_and_counts_trusted_time():
+    window = TrustWindow()
+    assert window.phase is Phase.WAITING
+    assert window.feed(ImuSample(0.0, 1, (0, 0, -9.8))) == ()
+    assert fly(window, 1.0, 11.0) == [WindowOpened(1.0)]
+    assert window.is_open
+    assert window.reason is None
+    assert window.trusted_s == pytest.approx(10.0)
+    assert window.rejected == {}
+
+
+@pytest.mark.parametrize(
+    ("reason", "bad"),
+    [
+        (Reason.NO_FIX, {"fix_type": 1}),
+        (Reason.NO_FIX, {"v_n": math.nan}),
+        (Reason.NO_FIX, {"altitude": math.inf}),
+        (Reason.FEW_SATELLITES, {"satellites": 5}),
+        (Reason.HDOP, {"hdop": 3.0}),
+        (Reason.SPEED_ACCURACY, {"speed_accuracy": 2.0}),
+    ],
+)
+def test_a_bad_fix_suspends_and_recovers_after_its_time(reason, bad):
+    window = TrustWindow()
+    fly(window, 0.0, 5.0)
+    assert fly(window, 5.2, 6.2, **bad) == [WindowClosed(5.2, reason)]
+    assert window.phase is Phase.SUSPENDED
+    assert window.reason is reason
+    again = opened(window, fly(window, 6.4, 20.0))
+    assert again == pytest.approx(6.4 + RECOVERY[reason], abs=STEP)
+    assert again >= 6.4 + RECOVERY[reason]
+    assert window.trusted_s == pytest.approx(5.0 + 20.0 - again, abs=1e-6)
+    assert window.rejected == {reason.value: 6 + round((again - 6.4) / STEP)}
+
+
+@pytest.mark.parametrize(
+    "unknown",
+    [
+        {"satellites": None},
+        {"hdop": None},
+        {"speed_accuracy": None},
+        {"speed_accuracy": 0.0},
+        {"v_d": None},
+    ],
+)
+def test_absence_is_not_distrust(unknown):
+    window = TrustWindow()
+    assert fly(window, 0.0, 5.0, **unknown) == [WindowOpened(0.0)]
+
+
+def test_a_value_at_its_limit_does_not_flap():
+    window = TrustWindow()
+    events = []
+    for k in range(200):
+        events += window.feed(fix(k * STEP, hdop=2.4 if k % 4 else 2.6))
+    assert [type(e) for e in events].count(WindowOpened) == 0
+    assert window.reason is Reason.HDOP
+
+
+@pytest.mark.parametrize(
+    ("reason", "bad", "good"),
+    [
+        (Reason.JAMMED, GpsIntegrity(5.1, True, False), GpsIntegrity(6.1, False, False)),
+        (Reason.SPOOFED, GpsIntegrity(5.1, False, True), GpsIntegrity(6.1, False, False)),
+        (Reason.EKF_GPS_GLITCH, EkfHealth(5.1, HEALTHY | 1 << 15), EkfHealth(6.1, HEALTHY)),
+        (Reason.EKF_UNHEALTHY, EkfHealth(5.1, HEALTHY & ~1), EkfHealth(6.1, HEALTHY)),
+        (Reason.EKF_UNHEALTHY, EkfHealth(5.1, HEALTHY | 1 << 10), EkfHealth(6.1, HEALTHY)),
+        (Reason.EKF_UNHEALTHY, EkfHealth(5.1, 0b1010_0111), EkfHealth(6.1, HEALTHY)),
+    ],
+)
+def test_reports_of_the_autopilot_suspend_until_they_are_denied(reason, bad, good):
+    window = TrustWindow()
+    fly(window, 0.0, 5.0)
+    assert window.feed(bad) == (WindowClosed(5.1, reason),)
+    assert fly(window, 5.2, 6.0) == []  # good fixes alone do not mend it
+    assert window.feed(good) == ()
+    assert opened(window, fly(window, 6.2, 60.0)) == pytest.approx(6.1 + RECOVERY[reason], abs=STEP)
+
+
+def test_navigation_flags_of_the_ekf_do_not_matter():
+    window = TrustWindow()
+    window.feed(EkfHealth(0.0, 0b1))  # attitude only
+    assert fly(window, 0.2, 1.0) == [WindowOpened(0.2)]
+
+
+def test_vehicle_state_does_not_gate():
+    window = TrustWindow()
+    window.feed(VehicleState(0.0, armed=False, landed=True))
+    assert fly(window, 0.2, 1.0) == [WindowOpened(0.2)]
+
+
+def test_the_gravest_of_several_reasons_is_named_and_all_are_listed():
+    window = TrustWindow()
+    fly(window, 0.0, 2.0)
+    window.feed(fix(2.2, hdop=9.0, satellites=4))
+    window.feed(GpsIntegrity(2.3, False, True))
+    window.feed(fix(2.4))
+    assert window.reason is Reason.SPOOFED
+    assert window.reasons == (Reason.SPOOFED, Reason.FEW_SATELLITES, Reason.HDOP)
+
+
+def test_a_gap_ends_the_trusted_span_at_the_last_fix_and_needs_no_recovery():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    assert window.feed(AttitudeSample(6.4, 0, 0, 0)) == ()
+    assert window.feed(AttitudeSample(6.6, 0, 0, 0)) == (WindowClosed(4.0, Reason.GPS_GAP),)
+    assert fly(window, 9.0, 10.0) == [WindowOpened(9.0)]
+    assert window.trusted_s == pytest.approx(5.0)
+
+
+def test_a_gap_is_seen_from_the_fixes_alone():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    assert fly(window, 24.0, 25.0) == [WindowClosed(4.0, Reason.GPS_GAP), WindowOpened(24.0)]
+
+
+def test_a_receiver_that_repeats_its_last_fix_is_stale():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    events = []
+    for k in range(1, 200):
+        events += window.feed(ImuSample(4.0 + 0.02 * k, 1, (0, 0, -9.8)))
+        if k % 10 == 0:
+            events += window.feed(fix(4.0))
+    assert events == [WindowClosed(4.0, Reason.STALE)]
+    assert opened(window, fly(window, 8.2, 20.0)) == pytest.approx(11.2, abs=STEP)
+
+
+def test_repeats_between_fixes_are_neither_counted_nor_harmful():
+    window = TrustWindow()
+    for k in range(50):
+        window.feed(fix(k * STEP))
+        window.feed(fix(k * STEP))
+    assert window.is_open
+    assert window.trusted_s == pytest.approx(49 * STEP)
+    assert window.rejected == {}
+
+
+def test_a_moving_receiver_with_frozen_content_is_stale():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    events = fly(window, 4.2, 6.0, latitude=fix(4.0).latitude)
+    assert events == [WindowClosed(pytest.approx(5.0, abs=STEP), Reason.STALE)]
+
+
+def test_a_resting_receiver_may_repeat_itself():
+    window = TrustWindow()
+    assert fly(window, 0.0, 20.0, latitude=0.9, v_n=0.0) == [WindowOpened(0.0)]
+
+
+def test_late_fixes_are_refused_and_counted():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    assert window.feed(fix(3.5)) == ()
+    assert window.rejected == {"stale": 1}
+    assert fly(window, 4.2, 6.0) == []
+    assert window.is_open
+
+
+def test_one_stamp_from_the_future_does_not_end_trust_for_good():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    window.feed(fix(1e6, latitude=0.82))
+    fly(window, 4.2, 12.0)
+    assert window.is_open
+
+
+def test_velocity_that_jumps_is_a_glitch_and_real_manoeuvres_are_not():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    assert window.feed(fix(4.2, v_n=15.0)) == ()  # 25 m/s^2: a hard turn
+    assert window.feed(fix(4.4, v_n=38.0)) == (WindowClosed(4.4, Reason.GPS_GLITCH),)
+
+
+def test_vertical_jumps_count_where_there_is_a_vertical_speed():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0, v_d=0.0)
+    assert window.feed(fix(4.2, v_d=25.0)) == (WindowClosed(4.2, Reason.GPS_GLITCH),)
+
+
+def test_position_that_leaves_velocity_behind_is_a_glitch():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    events = []
+    for k in range(1, 10):  # the position drifts east at 6 m/s, the velocity does not say so
+        t = 4.0 + k * STEP
+        events += window.feed(fix(t, longitude=0.14 + 6 * k * STEP / 4.35e6))
+    assert [e.reason for e in events] == [Reason.GPS_GLITCH]
+
+
+def test_recordings_with_one_constant_position_are_judged_by_velocity_only():
+    window = TrustWindow()
+    events = []
+    for k in range(50):
+        events += window.feed(fix(k * STEP, latitude=0.0, longitude=0.0, v_e=0.1 * k))
+    assert events == [WindowOpened(0.0)]
+
+
+def test_one_innovation_outside_is_an_outlier_three_in_a_row_a_glitch():
+    window = TrustWindow()
+    fly(window, 0.0, 4.0)
+    for ratio in (1.5, 0.3, 1.5, 1.5, 0.9):
+        assert window.judge_innovation(4.0, ratio) == ()
+    assert window.rejected == {"gps_glitch": 3}
+    assert window.judge_innovation(4.0, 2.0) == ()
+    assert window.judge_innovation(4.0, 2.0) == ()
+    assert window.judge_innovation(4.0, 2.0) == (WindowClosed(4.0, Reason.GPS_GLITCH),)
+    assert window.judge_innovation(4.0, 2.0) == ()  # closed: nothing more to judge
+    assert opened(window, fly(window, 4.2, 20.0)) == pytest.approx(9.2, abs=STEP)
+
+
+def test_the_configured_end_is_for_good():
+    window = TrustWindow(TrustLimits(duration=10.0))
+    events = fly(window, 3.0, 30.0)
+    assert events == [WindowOpened(3.0), WindowClosed(pytest.approx(13.0), Reason.CONFIGURED_END)]
+    assert window.phase is Phase.ENDED
+    assert window.reason is Reason.CONFIGURED_END
+    assert window.rejected == {}
+    assert window.trusted_s == pytest.approx(10.0)
+
+
+def test_the_configured_end_comes_also_while_suspended():
+    window = TrustWindow(TrustLimits(duration=10.0))
+    fly(window, 0.0, 8.0)
+    fly(window, 8.2, 30.0, fix_type=2)
+    assert window.phase is Phase.ENDED
+
+
+def test_a_restart_closes_forgets_conditions_and_accepts_the_new_clock():
+    window = TrustWindow()
+    window.feed(EkfHealth(0.0, HEALTHY))
+    fly(window, 100.0, 104.0)
+    window.feed(GpsIntegrity(104.1, True, False))
+    assert window.restart(104.1) == ()
+    assert window.phase is Phase.WAITING
+    assert fly(window, 1.0, 2.0) == [WindowOpened(1.0)]
+    assert window.restart(2.0) == (WindowClosed(2.0, Reason.RESTARTED),)
+    assert window.trusted_s == pytest.approx(5.0)
+
+
+def test_finish_closes_at_the_last_fix_once():
+    window = TrustWindow()
+    fly(window, 0.0, 3.0)
+    assert window.finish() == (WindowClosed(3.0, Reason.END_OF_DATA),)
+    assert window.finish() == ()
+    assert window.feed(fix(4.0)) == ()
+    assert TrustWindow().finish() == ()
+
+
+def test_only_one_receiver_is_watched():
+    window = TrustWindow(receiver=2)
+    assert fly(window, 0.0, 1.0) == []
+    assert fly(window, 1.2, 2.0, receiver=2) == [WindowOpened(1.2)]
+    first = TrustWindow()
+    fly(first, 0.0, 1.0)
+    assert first.feed(fix(1.1, receiver=2, fix_type=0)) == ()
+    assert first.receiver == 1
+
+
+def both(window, start, end, *, first, second):
+    """Two receivers side by side; ``first`` and ``second`` are changes, None: silent."""
+    events = []
+    for k in range(round((end - start) / STEP) + 1):
+        t = start + k * STEP
+        for number, changes in ((1, first), (2, second)):
+            if changes is not None:
+                events += window.feed(fix(t, receiver=number, **changes))
+        events += window.feed(ImuSample(t, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)))
+    return events
+
+
+@pytest.mark.parametrize("after", [{"fix_type": 0}, None])
+def test_a_receiver_that_has_never_had_a_fix_is_given_up_for_one_that_has(after):
+    window = TrustWindow()
+    window.feed(fix(0.0, fix_type=0))
+    assert both(window, 0.2, GIVEN_UP_S - 1.0, first=after, second={}) == []
+    assert window.receiver == 1
+    events = both(window, GIVEN_UP_S - 0.8, GIVEN_UP_S + 5.0, first=after, second={})
+    assert window.receiver == 2
+    assert opened(window, events) == pytest.approx(GIVEN_UP_S, abs=1.0)
+
+
+def test_a_receiver_that_was_trusted_is_not_exchanged():
+    window = TrustWindow()
+    both(window, 0.0, 5.0, first={}, second={})
+    both(window, 5.2, 5.0 + 2 * GIVEN_UP_S, first={"fix_type": 0}, second={})
+    assert window.receiver == 1
+    assert not window.is_open
+
+
+def test_a_slow_start_is_waited_for():
+    window = TrustWindow()
+    both(window, 0.0, GIVEN_UP_S - 5.0, first={"fix_type": 0}, second={})
+    both(window, GIVEN_UP_S - 4.8, 2 * GIVEN_UP_S, first={}, second={})
+    assert window.receiver == 1
+    assert window.is_open
+
+
+def test_counts_continue_after_a_restart_of_the_program():
+    window = TrustWindow()
+    window.restore(100.0, {"hdop": 3, "of a newer version": 9})
+    fly(window, 0.0, 2.0)
+    assert window.trusted_s == pytest.approx(102.0)
+    assert window.rejected == {"hdop": 3}
+
+
+number = st.one_of(st.floats(), st.floats(-20, 20))
+anything = st.one_of(
+    st.builds(
+        GpsFix,
+        t=st.one_of(st.floats(0, 60), number),
+        receiver=st.just(1),
+        fix_type=st.integers(0, 6),
+        latitude=number,
+        longitude=number,
+        altitude=number,
+        v_n=number,
+        v_e=number,
+        v_d=st.none() | number,
+        satellites=st.none() | st.integers(0, 30),
+        hdop=st.none() | number,
+        speed_accuracy=st.none() | number,
+    ),
+    st.builds(fix, st.floats(0, 60)),
+    st.builds(ImuSample, number, st.just(1), st.just((0.0, 0.0, -9.8))),
+    st.builds(EkfHealth, number, st.sampled_from([HEALTHY, 0, HEALTHY | 1 << 15])),
+    st.builds(GpsIntegrity, st.floats(0, 60), st.booleans(), st.booleans()),
+    st.floats(0, 3),  # an innovation ratio
+    st.none(),  # a reboot
+)
+
+
+@settings(max_examples=200)
+@given(st.lists(anything, max_size=60))
+def test_invariants_under_anything(inputs):
+    """Never raises; openings and closings alternate; every refusal and second is accounted for."""
+    window = TrustWindow(TrustLimits(duration=40.0))
+    is_open = False
+    for item in inputs:
+        before = sum(window.rejected.values())
+        if item is None:
+            events = window.restart(0.0)
+        elif isinstance(item, float):
+            events = window.judge_innovation(0.0, item)
+        else:
+            events = window.feed(item)
+        for event in events:
+            assert isinstance(event, WindowOpened) is not is_open
+            is_open = isinstance(event, WindowOpened)
+        assert window.is_open is is_open
+        assert (window.reason is None) or not is_open
+        assert sum(window.rejected.values()) - before in (0, 1)
+        assert 0 <= window.trusted_s < math.inf
+        if is_open:
+            assert window.reasons == ()
+    assert isinstance(window.finish(), tuple)
+    assert not window.is_open

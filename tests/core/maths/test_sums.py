@@ -1,0 +1,146 @@
+"""Sums of whitened rows: what may be added, taken out, moved and stored without a look back."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from onboard.core.maths.sums import NormalSums
+from onboard.errors import StateError
+
+M = 5
+
+
+def rows(seed, count):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(count, M)), rng.normal(size=count)
+
+
+def summed(h, y):
+    out = NormalSums.zeros(M)
+    out.add_rows(h, y)
+    out.log_det = 0.1 * len(y)
+    out.G = 0.01 * h.T @ h
+    return out
+
+
+def assert_same(a, b, rtol=1e-11):
+    scale = max(1.0, float(np.abs(a.N).max()), a.s)
+    for x, y in ((a.N, b.N), (a.b, b.b), (a.G, b.G), (a.s, b.s), (a.log_det, b.log_det)):
+        np.testing.assert_allclose(x, y, rtol=rtol, atol=rtol * scale)
+    assert a.rows == pytest.approx(b.rows)
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(0, 40), min_size=1, max_size=6))
+@settings(max_examples=60, deadline=None)
+def test_sums_of_pieces_are_the_sums_of_the_whole(seed, lengths):
+    h, y = rows(seed, sum(lengths))
+    cuts = np.cumsum(lengths)[:-1]
+    pieces = [summed(*p) for p in zip(np.split(h, cuts), np.split(y, cuts), strict=True)]
+    whole = summed(h, y)
+    forward, backward = NormalSums.zeros(M), NormalSums.zeros(M)
+    for piece in pieces:
+        forward = forward + piece
+    for piece in reversed(pieces):
+        backward = piece + backward
+    assert_same(forward, whole)
+    assert_same(backward, whole)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(0, 30))
+@settings(max_examples=40, deadline=None)
+def test_taking_a_piece_out_leaves_the_other(seed, one, two):
+    h, y = rows(seed, one + two)
+    rest = summed(h, y) - summed(h[:one], y[:one])
+    assert_same(rest, summed(h[one:], y[one:]), rtol=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.sets(st.integers(0, M - 1), min_size=1))
+@settings(max_examples=60, deadline=None)
+def test_eliminating_is_solving_for_all_and_reading_some(seed, keep):
+    h, y = rows(seed, 40)
+    sums, kept = summed(h, y), sorted(keep)
+    S, c = sums.eliminate(kept)
+    joint = np.linalg.lstsq(h, y, rcond=None)[0]
+    np.testing.assert_allclose(np.linalg.solve(S, c), joint[kept], rtol=1e-8, atol=1e-9)
+    # Its inverse is the block of the joint covariance: nothing is claimed that was not there.
+    covariance = np.linalg.inv(sums.N)[np.ix_(kept, kept)]
+    np.testing.assert_allclose(np.linalg.inv(S), covariance, rtol=1e-7, atol=1e-10)
+
+
+def test_eliminating_an_unknown_without_a_trace_is_refused():
+    h, y = rows(3, 20)
+    h[:, 4] = 0.0
+    with pytest.raises(np.linalg.LinAlgError):
+        summed(h, y).eliminate([0, 1])
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_shifted_sums_are_those_of_the_shifted_rows(seed):
+    h, y = rows(seed, 25)
+    theta = np.random.default_rng(seed + 1).normal(size=M)
+    assert_same(summed(h, y).shifted(theta), summed(h, y - h @ theta), rtol=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_residual_is_that_of_the_rows(seed):
+    h, y = rows(seed, 25)
+    theta = np.random.default_rng(seed + 1).normal(size=M)
+    assert summed(h, y).residual(theta) == pytest.approx(float(np.sum((y - h @ theta) ** 2)))
+
+
+def test_subset_is_the_smaller_model():
+    h, y = rows(11, 30)
+    index = [4, 0, 2]
+    small = summed(h, y).subset(index)
+    np.testing.assert_allclose(small.N, h[:, index].T @ h[:, index])
+    np.testing.assert_allclose(small.b, h[:, index].T @ y)
+    np.testing.assert_allclose(small.G, 0.01 * small.N)
+    assert (small.s, small.rows) == (pytest.approx(float(y @ y)), 30)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 30))
+@settings(max_examples=40, deadline=None)
+def test_stored_sums_are_the_same_to_the_bit(seed, count):
+    sums = summed(*rows(seed, count))
+    back = NormalSums.from_bytes(sums.to_bytes())
+    for name in ("N", "b", "G"):
+        assert np.array_equal(getattr(back, name), getattr(sums, name))
+    assert (back.s, back.rows, back.log_det) == (sums.s, sums.rows, sums.log_det)
+
+
+@given(st.integers(0, 600))
+@settings(max_examples=60, deadline=None)
+def test_sums_cut_short_are_refused(length):
+    data = summed(*rows(1, 9)).to_bytes()
+    with pytest.raises(StateError):
+        NormalSums.from_bytes(data[: min(length, len(data) - 1)])
+
+
+@given(st.binary(max_size=200))
+@settings(max_examples=100, deadline=None)
+def test_anything_else_is_refused(data):
+    with pytest.raises(StateError):
+        NormalSums.from_bytes(data)
+
+
+@pytest.mark.parametrize("at", [0, 4, 8])
+def test_a_damaged_head_is_refused(at):
+    data = bytearray(summed(*rows(1, 9)).to_bytes())
+    data[at] ^= 0x41
+    with pytest.raises(StateError):
+        NormalSums.from_bytes(bytes(data))
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+@pytest.mark.parametrize("place", [7, -1])
+def test_numbers_that_are_none_are_refused(number, place):
+    data = bytearray(summed(*rows(1, 9)).to_bytes())
+    at = 12 + 8 * (place % ((len(data) - 12) // 8))
+    data[at : at + 8] = struct.pack("<d", number)
+    with pytest.raises(StateError):
+        NormalSums.from_bytes(bytes(data))

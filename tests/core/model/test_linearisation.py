@@ -1,0 +1,58 @@
+"""The recorded attitude less its errors: late, turned, or both."""
+
+import numpy as np
+import pytest
+
+from onboard.core.estimate.engine import calibration_model, moved
+from onboard.core.inputs.segments import Stretch
+from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.model.linearisation import MOVING, Linearisation
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.receiver import LeverArm
+
+T = np.linspace(0.0, 4.0, 201)
+
+
+def attitude(t):
+    return rotation_from_euler(0.4 * np.sin(1.1 * t), 0.3 * np.cos(0.7 * t), 0.8 * t)
+
+
+def recorded(delay, heading):
+    R = rotation_from_euler(0.0, 0.0, heading) @ attitude(T - delay)
+    still = np.zeros((len(T), 3))
+    return Stretch(T, still, still, T, R, np.eye(3))
+
+
+@pytest.mark.parametrize(("delay", "heading"), [(0.08, 0.0), (0.0, -0.3), (-0.05, 0.25)])
+def test_delay_and_heading_are_taken_out_exactly(delay, heading):
+    point = Linearisation(attitude_delay=delay, heading=heading)
+    at = np.linspace(0.5, 3.5, 40)
+    R, near = point.attitude(recorded(delay, heading), at)
+    assert near.all()
+    # Interpolated between samples 20 ms apart, to well below a tenth of a milliradian.
+    assert np.max(np.abs(R - attitude(at))) < 1e-4
+
+
+def test_a_nuisance_gives_way_to_the_effect_with_its_columns():
+    arm = LeverArm(Origin(t0=0.0))
+    without, with_it = (calibration_model(Linearisation(), more=more) for more in ((), (arm,)))
+    assert [u.name for u in without.unknowns if "antenna" in u.name] == [
+        "antenna_x",
+        "antenna_y",
+        "antenna_z",
+    ]
+    assert not {"antenna_x", "antenna_y", "antenna_z"} & set(with_it.index)
+    assert with_it.size == without.size
+
+
+def test_the_linearisation_follows_its_unknowns():
+    model = calibration_model(Linearisation())
+    theta = model.prior.copy()
+    asked = dict(zip(MOVING, (0.03, 0.04, 0.05, -0.2), strict=True))
+    for name, value in asked.items():
+        theta[model.index[name]] = value
+    point = Linearisation(delay=0.1, window=0.2, attitude_delay=0.01, heading=0.3)
+    after = moved(point, model, theta)
+    assert np.subtract(after.moving, point.moving) == pytest.approx(list(asked.values()))
+    assert not after.near(point, (0.02, 1.0, 1.0, 1.0))
+    assert after.near(point, (0.04, 0.05, 0.06, 0.3))

@@ -1,0 +1,54 @@
+"""Effects proportional to the force: linearised about their size they take themselves off."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from onboard.core.diagnosis.regimes import axis_of
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
+from onboard.core.physics.mount import ForceTilt
+from onboard.core.physics.offsets import BiasRamp
+
+F = np.array([[1.0, -2.0, -14.0], [3.0, 0.5, -9.0], [-2.0, 4.0, -20.0]])
+
+
+@pytest.mark.parametrize(
+    ("kind", "sizes"),
+    [
+        (CrossAxis, [0.05, -0.04, 0.03, 0.02, -0.05, 0.04]),
+        (ForceTilt, [0.06, -0.08]),
+        (ScaleNonlinearity, [0.02, -0.03, 0.02]),
+        (LoadFlex, [0.06, -0.05]),
+    ],
+)
+def test_about_its_size_the_true_force_comes_back(kind, sizes):
+    effect, sizes = kind(Origin(t0=0.0)), np.array(sizes)
+    measured = F - effect.amount(F) @ sizes  # what it reads too much is minus the column
+    rough = measured + effect.acceleration(SimpleNamespace(f_b=measured)) @ sizes
+    fine = measured + effect.about(sizes).acceleration(SimpleNamespace(f_b=measured)) @ sizes
+    assert np.max(np.abs(fine - F)) < 0.35 * np.max(np.abs(rough - F))
+
+
+def test_a_gain_acts_on_the_force_without_the_offsets_beside_it():
+    origin, size = Origin(t0=0.0), np.array([0.0, 0.05, 0.0, 0.0, 0.06, -0.07])
+    beside, rate = BiasRamp(origin), np.array([0.2, -0.15, 0.1])
+    t = np.array([2.0, 8.0, 15.0])
+    offset = t[:, None] * rate
+    cross = CrossAxis(origin)
+    measured = SimpleNamespace(f_b=F - cross.amount(F) @ size + offset, t=t)
+
+    def left(effect):
+        back = measured.f_b - offset + effect.acceleration(measured) @ size
+        return np.max(np.abs(back - F))
+
+    assert left(cross.about(size, ((beside, rate),))) < 0.1 * left(cross.about(size))
+
+
+@pytest.mark.parametrize(
+    ("key", "axis"),
+    [("x", "body_x"), ("zy", "body_z"), ("roll", "body_y"), ("pitch", "body_x"), ("delay", None)],
+)
+def test_an_unknown_acts_on_the_axis_that_it_disturbs(key, axis):
+    assert axis_of(key) == axis
