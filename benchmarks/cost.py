@@ -26,7 +26,7 @@ from onboard.core.physics.effect import Origin
 REPEATS = 5
 BETWEEN_FLIGHTS_S = 3.0
 PARTS = 8
-"""Portions of the long stream that are timed one by one."""
+"""Blocks of the long stream that are timed one by one."""
 ONCE = replace(EstimatorSettings(), refine=False)
 
 
@@ -59,17 +59,17 @@ def per_sample(samples: list[Sample]) -> list[str]:
 
 def by_columns(samples: list[Sample]) -> list[str]:
     """Lines on the same pass with more and more unknowns."""
-    chunks = _seconds(samples, ONCE)[1].engine(1).chunks
-    epochs = sum(len(c.fixes) for c in chunks)
-    families = [f for f in catalogue(Origin(chunks[0].fixes.t[0])) if not f.needs]
+    batches = _seconds(samples, ONCE)[1].engine(1).batches
+    epochs = sum(len(c.fixes) for c in batches)
+    families = [f for f in catalogue(Origin(batches[0].fixes.t[0])) if not f.needs]
     out, least = [], 0.0
     for count in (0, 2, len(families)):
         spent = []
         for _ in range(REPEATS):
             engine = Engine(ONCE, more=tuple(families[:count]))
             began = time.process_time()
-            for chunk in chunks:
-                engine.add(chunk)
+            for batch in batches:
+                engine.add(batch)
             spent.append(time.process_time() - began)
         middle = 1e6 * float(np.median(spent)) / epochs
         least = least or middle

@@ -30,8 +30,8 @@ def told(made: Calibrator, flight: Flight) -> Array:
     """(6,) error of an engine that is told the levels of noise, over the same flight."""
     settings = replace(EstimatorSettings(), refine=False)
     engine = Engine(settings, np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), noise=LEVELS)
-    for chunk in made.engine(1).chunks:
-        engine.add(chunk)
+    for batch in made.engine(1).batches:
+        engine.add(batch)
     engine.refine(rounds=3, noise_rounds=0)
     solution = engine.solution()
     assert solution is not None

@@ -167,10 +167,10 @@ def _against(
     """
     if diagnosis.verdict is not Verdict.EXPLAINED:
         return "what was found does not explain all of the residual"
-    rivals = {r.name for r in effect.rivals if r.delta_bic < AMBIGUOUS}
-    rivals |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
-    if rivals := rivals - {effect.name}:
-        return f"not told apart from {', '.join(sorted(rivals))}"
+    confounders = {r.name for r in effect.confounders if r.delta_bic < AMBIGUOUS}
+    confounders |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
+    if confounders := confounders - {effect.name}:
+        return f"not told apart from {', '.join(sorted(confounders))}"
     if effect.name in GEOMETRY and diagnosis.calibration.status is not Status.CALIBRATED:
         return "it is read off from the accelerometer, which this flight does not calibrate"
     before, after = effect.held_out_before, effect.held_out_after

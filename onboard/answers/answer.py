@@ -117,7 +117,7 @@ def moved_most(diagnosis: Diagnosis) -> tuple[str, float, float] | None:
     if plain is None:
         return None
     by = np.array(fuller.scale + fuller.offset) - np.array(plain.value)
-    # The smaller claim: without what was found the portions may contradict each other, which
+    # The smaller claim: without what was found the blocks may contradict each other, which
     # widens that sigma; with it the columns share what the flight tells.
     claimed = np.minimum(plain.sigma, fuller.scale_sigma + fuller.offset_sigma)
     sigmas = np.where(fuller.observable, np.abs(by) / claimed, 0.0)

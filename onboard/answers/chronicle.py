@@ -225,17 +225,17 @@ class Chronicle:
             self._speed.append((now, float(np.hypot(fix.v_n, fix.v_e))))
 
     def _course(self, imu: int, engine: Engine) -> Course:
-        """Solutions of the sums up to some of the portions, the last of all of them."""
-        portions = engine.all_portions
+        """Solutions of the sums up to some of the blocks, the last of all of them."""
+        blocks = engine.all_blocks
         times = [
             math.nan if piece is None else float(piece.time(np.array(p.end)))
-            for p, piece in zip(portions, self._places([p.start for p in portions]), strict=True)
+            for p, piece in zip(blocks, self._places([p.start for p in blocks]), strict=True)
         ]
-        last = len(portions) - 1
+        last = len(blocks) - 1
         rows = []
         for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
             solution = engine.solution() if i == last else None
-            solution = solution or solve(portions[: i + 1], engine.model)
+            solution = solution or solve(blocks[: i + 1], engine.model)
             scale = solution.theta[:3]
             seen = assess(six_information(solution), engine.settings.needs)
             rows.append(
@@ -270,7 +270,7 @@ class Chronicle:
         held = self.calibrator.parameters.six(imu)
         scale = np.array(held.scale)
         sixes = (np.concatenate([scale, -scale * np.array(held.offset)]), solution.theta[:6])
-        chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
+        chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
         states = list(engine.states)
         known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}
         times, errors = [np.zeros(0)], [np.zeros((2, 0))]

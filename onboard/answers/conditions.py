@@ -50,17 +50,17 @@ def _step(effect: Effect, offset: float, change: float) -> str:
 
 def _drift(effect: Effect, offset: float, change: float) -> str:
     said = f"{offset:.4f} at {REFERENCE_DEGC:.0f} degC, {change:+.4f} per degree"
-    if effect.law is None:
+    if effect.response_curve is None:
         return said
-    low, high = float(np.min(effect.law.x)), float(np.max(effect.law.x))
+    low, high = float(np.min(effect.response_curve.x)), float(np.max(effect.response_curve.x))
     return f"{said}, flown from {low:.0f} to {high:.0f} degC"
 
 
 def _ramp(effect: Effect, offset: float, change: float) -> str:
     said = f"{offset:.4f} at 0 s"
-    if effect.law is None:
+    if effect.response_curve is None:
         return f"{said}, {60.0 * change:+.4f} per minute"
-    end = float(np.max(effect.law.x))
+    end = float(np.max(effect.response_curve.x))
     return f"{said}, {offset + change * end:.4f} at {end:.0f} s"
 
 

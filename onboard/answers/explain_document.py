@@ -250,7 +250,7 @@ def _effect(e: Effect, autopilot: str) -> EffectDocument:
         parameters=dict(e.parameters) if autopilot == "ardupilot" else {},
         cure=e.cure,
         where=[_where(w) for w in e.where],
-        rivals=[RivalDocument(name=r.name, delta_bic=finite(r.delta_bic)) for r in e.rivals],
+        rivals=[RivalDocument(name=r.name, delta_bic=finite(r.delta_bic)) for r in e.confounders],
         intervals=[[float(a), float(b)] for a, b in e.intervals],
         formula=e.formula,
         held_out_velocity_rms_before_m_s=finite(e.held_out_velocity_before),

@@ -108,7 +108,7 @@ class Recorded:
 
 
 def unanswered(calibration: Calibration, why: str = NO_FLIGHT) -> Answer:
-    """The answer where there is no diagnosis: of a recording without a usable stretch of flight."""
+    """The answer where there is no diagnosis: of a recording without a usable segment of flight."""
     nan = float("nan")
     empty = np.zeros((0, 3))
     return Answer(

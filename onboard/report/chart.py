@@ -1,6 +1,6 @@
 """Small charts as inline SVG.
 
-The drawing stretches with the page and its labels are page text, so that a phone shows the same
+The drawing segments with the page and its labels are page text, so that a phone shows the same
 chart with letters of the same size.  Colours come from the page's style sheet by class.
 """
 

@@ -177,7 +177,7 @@ def _card(e: Effect, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
         "charts": residual_charts.of_effect(e),
-        "rivals": [(words.effect_title(r.name), words.number(r.delta_bic)) for r in e.rivals],
+        "rivals": [(words.effect_title(r.name), words.number(r.delta_bic)) for r in e.confounders],
         "cure": e.cure,
         "parameters": []
         if advice is None

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis: residuals over time, what an effect makes of them, its law."""
+"""Charts of a diagnosis: residuals over time, what an effect makes of them, its response curve."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from markupsafe import Markup
 from onboard.answers import words
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.records import Diagnosis, Verdict
-from onboard.core.physics.finding import Effect, Imprint, Law
+from onboard.core.physics.finding import Effect, Imprint, ResponseCurve
 from onboard.report.chart import Band, Line, Ribbon, line_chart
 
 COMPONENTS = ("North", "East", "Down")
@@ -80,12 +80,12 @@ def _onsets(d: Diagnosis) -> list[float]:
 
 
 def of_effect(effect: Effect) -> list[Markup]:
-    """How well the effect follows the data, and the law that it obeys."""
+    """How well the effect follows the data, and the response curve that it obeys."""
     out = []
     if effect.imprint is not None and len(effect.imprint.t) > 1:
         out.append(_imprint(effect.imprint))
-    if effect.law is not None and len(effect.law.x) > 1:
-        out.append(_law(effect.law))
+    if effect.response_curve is not None and len(effect.response_curve.x) > 1:
+        out.append(_law(effect.response_curve))
     return out
 
 
@@ -106,34 +106,35 @@ def _imprint(i: Imprint) -> Markup:
     )
 
 
-def _law(law: Law) -> Markup:
+def _law(response_curve: ResponseCurve) -> Markup:
     lines, ribbons, key = [], [], []
     edges = [0.0]
-    many = len(law.y) > 1
-    for kind, (name, y) in zip(CURVES, law.y.items(), strict=False):
-        lines.append(Line(law.x, y, kind, name))
-        wide = SIGMAS * law.sigma[name]
+    many = len(response_curve.y) > 1
+    for kind, (name, y) in zip(CURVES, response_curve.y.items(), strict=False):
+        lines.append(Line(response_curve.x, y, kind, name))
+        wide = SIGMAS * response_curve.sigma[name]
         flown = np.isfinite(y) & np.isfinite(wide)
         if flown.any():
             low, high = (y - wide)[flown], (y + wide)[flown]
-            ribbons.append(Ribbon(law.x[flown], low, high, kind))
+            ribbons.append(Ribbon(response_curve.x[flown], low, high, kind))
             edges += [float(low.min()), float(high.max())]
         key.append((name, f"var(--curve-{kind})"))
-    sizes = [np.abs(y[np.isfinite(y)]).max(initial=0.0) for y in law.y.values()]
+    sizes = [np.abs(y[np.isfinite(y)]).max(initial=0.0) for y in response_curve.y.values()]
     highest = float(max(sizes, default=math.nan))
-    title = f"{words.capital(law.quantity)} over {law.signal}"
+    unit = words.unit_in_words(response_curve.quantity_unit)
+    title = f"{words.capital(response_curve.quantity)} over {response_curve.signal}"
     margin = 0.05 * (max(edges) - min(edges))
     chart = line_chart(
         title,
-        words.unit_in_words(law.quantity_unit),
+        unit,
         lines,
         ribbons=ribbons,
-        x_label=law.signal,
-        x_unit=words.unit_in_words(law.unit),
-        x_range=(float(law.x[0]), float(law.x[-1])),
+        x_label=response_curve.signal,
+        x_unit=words.unit_in_words(response_curve.unit),
+        x_range=(float(response_curve.x[0]), float(response_curve.x[-1])),
         y_range=(min(edges) - margin, max(edges) + margin) if margin > 0.0 else None,
         symmetric=False,
-        summary=f"up to {words.number(highest)} {words.unit_in_words(law.quantity_unit)}",
+        summary=f"up to {words.number(highest)} {unit}",
     )
     return _with_key(chart, key) if many else chart
 

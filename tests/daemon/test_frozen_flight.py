@@ -47,8 +47,8 @@ def seen(monkeypatch):
 
     def looked_at(flight, imu, *, latest):
         assert latest
-        chunks = flight.engine(imu).chunks
-        given.append((imu, chunks[0].fixes.t[0], chunks[-1].fixes.t[-1], flight.flown_s))
+        batches = flight.engine(imu).batches
+        given.append((imu, batches[0].fixes.t[0], batches[-1].fixes.t[-1], flight.flown_s))
         raise ArithmeticError("only looking")
 
     monkeypatch.setattr(examiner_module, "answer", looked_at)

@@ -52,7 +52,7 @@ def test_no_entry_is_of_an_error_that_does_not_exist():
 
 
 def test_every_reason_to_hold_back_has_an_entry_and_no_other():
-    source = (ROOT / "onboard" / "daemon" / "proposals.py").read_text(encoding="utf-8")
+    source = (ROOT / "onboard" / "daemon" / "pushing" / "proposals.py").read_text(encoding="utf-8")
     beyond = set(re.findall(r'(?:found\[|return \{)"(\w+)"', source))
     assert {"approval", "refused"} <= beyond
     assert set(entries("Nothing is written")) == {o.value for o in Objection} | beyond

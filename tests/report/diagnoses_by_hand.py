@@ -19,7 +19,7 @@ from onboard.core.diagnosis.records import (
     Verdict,
 )
 from onboard.core.estimate.result import Calibration, Coverage, Estimate, Status
-from onboard.core.physics.finding import Effect, Quantity, Rival, Where
+from onboard.core.physics.finding import Confounder, Effect, Quantity, Where
 
 NAN = float("nan")
 SIGMAS = (0.001, 0.001, 0.01, 0.01, 0.01, 0.2)
@@ -77,7 +77,7 @@ def effect(name: str = "gps_latency", **changed: object) -> Effect:
         "parameters": {"GPS1_DELAY_MS": 210.0},
         "cure": "set GPS1_DELAY_MS",
         "where": (Where(10.0, 20.0, "body_x", "turning", 0.4),),
-        "rivals": (Rival("gps_smoothing", 55.0),),
+        "confounders": (Confounder("gps_smoothing", 55.0),),
         "intervals": ((30.0, 40.0),),
     }
     return Effect(**(values | changed))  # type: ignore[arg-type]  # a table of fields
@@ -153,7 +153,7 @@ def unknown() -> Diagnosis:
                 held_out_velocity_before=NAN,
                 held_out_velocity_after=NAN,
                 parameters={"GPS1_DELAY_MS": NAN},
-                rivals=(Rival("gps_smoothing", NAN),),
+                confounders=(Confounder("gps_smoothing", NAN),),
                 intervals=((NAN, NAN),),
             ),
         ),

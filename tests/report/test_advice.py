@@ -12,7 +12,7 @@ from onboard.answers.answer import judged
 from onboard.answers.verdict import cures
 from onboard.core.diagnosis.records import Ambiguity, Verdict
 from onboard.core.estimate.result import Status
-from onboard.core.physics.finding import Law, Quantity, Rival
+from onboard.core.physics.finding import Confounder, Quantity, ResponseCurve
 from onboard.report.parameters import parameter_text
 from tests.report.diagnoses_by_hand import IN_FORCE, NAN, advice_on, calibration, diagnosis, effect
 from tests.report.test_report_parameters import loaded
@@ -27,7 +27,7 @@ STEP = effect(
     },
     parameters={},
     cure="inspect the mount",
-    rivals=(),
+    confounders=(),
 )
 DRIFT = effect(
     "temperature_drift",
@@ -36,8 +36,8 @@ DRIFT = effect(
     },
     parameters={},
     cure="calibrate it",
-    rivals=(),
-    law=Law("temperature", "°C", "", "", np.linspace(24.6, 47.2), {}, {}),
+    confounders=(),
+    response_curve=ResponseCurve("temperature", "°C", "", "", np.linspace(24.6, 47.2), {}, {}),
 )
 TILT = effect(
     "mount_tilt",
@@ -46,7 +46,7 @@ TILT = effect(
     cure="level the autopilot again, or set AHRS_TRIM",
     held_out_before=2.0,
     held_out_after=1.0,
-    rivals=(),
+    confounders=(),
 )
 
 
@@ -123,12 +123,12 @@ def test_a_trim_that_helps_by_three_percent_at_most_is_not_set():
 @pytest.mark.parametrize(
     "doubt",
     [
-        {"effects": (replace(TILT, rivals=(Rival("cross_axis", 9.0),)),)},
+        {"effects": (replace(TILT, confounders=(Confounder("cross_axis", 9.0),)),)},
         {"effects": (TILT,), "ambiguous": (Ambiguity(("cross_axis", "mount_tilt"), "turn"),)},
     ],
     ids=["rival", "ambiguity"],
 )
-def test_a_cure_beside_which_a_rival_stands_is_not_set(doubt):
+def test_a_cure_beside_which_a_confounder_stands_is_not_set(doubt):
     text = written(diagnosis(**doubt))
     assert "AHRS_TRIM_Y" not in loaded(text)
     assert "not told apart from cross_axis" in comment(text, "AHRS_TRIM_Y")

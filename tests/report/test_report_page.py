@@ -10,7 +10,7 @@ import pytest
 
 from onboard.answers.explain import explain
 from onboard.core.diagnosis.records import Diagnosis, Verdict
-from onboard.core.physics.finding import Imprint, Law, Quantity
+from onboard.core.physics.finding import Imprint, Quantity, ResponseCurve
 from onboard.report.explain import explain_html
 from tests.report.diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
 from tests.report.html_page import Page
@@ -67,7 +67,7 @@ def test_the_verdict_names_what_was_found_and_proves_it_in_metres_per_second():
 def test_an_effect_is_drawn_over_the_data_that_it_explains():
     t = np.arange(100) * 0.2
     imprint = Imprint("earth_east", t, np.sin(t), 0.9 * np.sin(t))
-    law = Law(
+    response_curve = ResponseCurve(
         signal="temperature",
         unit="°C",
         quantity="offset error",
@@ -76,7 +76,9 @@ def test_an_effect_is_drawn_over_the_data_that_it_explains():
         y={"x": np.linspace(-0.1, 0.2, 30), "y": np.full(30, np.nan)},
         sigma={"x": np.full(30, 0.01), "y": np.full(30, np.nan)},
     )
-    html, parsed = page(diagnosis(effects=(effect(imprint=imprint, law=law),)))
+    html, parsed = page(
+        diagnosis(effects=(effect(imprint=imprint, response_curve=response_curve),))
+    )
     assert "East velocity: data and effect" in parsed.words
     assert "Offset error over temperature" in parsed.words
     assert len(re.findall('class="line (data|made)"', html)) == 2

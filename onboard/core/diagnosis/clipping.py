@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.regimes import spans
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.physics.finding import Effect, Quantity
 
 RAIL_SAMPLES, RAIL_RUN = 12, 4
@@ -18,22 +18,22 @@ LEAST_RAIL = 10.3
 """More than any accelerometer that is at rest reads, m/s^2."""
 
 
-def saturation_effect(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Effect | None:
     """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
 
     Args:
-        chunks: the flight.
+        batches: the flight.
         t0: first sample, s.
         imu: which accelerometer, from 1.
     """
-    if not chunks:
+    if not batches:
         return None
-    return _stuck(chunks, t0) or _counted(chunks, t0, imu)
+    return _stuck(batches, t0) or _counted(batches, t0, imu)
 
 
-def _counted(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
+def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Effect | None:
     """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
-    names = [c.stretch.slow["clipping"] for c in chunks if "clipping" in c.stretch.slow]
+    names = [c.segment.slow["clipping"] for c in batches if "clipping" in c.segment.slow]
     if not names:
         return None
     t = np.concatenate([x[0] for x in names])
@@ -52,8 +52,8 @@ def _counted(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
             joined[-1] = (joined[-1][0], end)
         else:
             joined.append((begin, end))
-    raw = np.concatenate([c.stretch.raw_s for c in chunks])
-    times = np.concatenate([c.stretch.t for c in chunks])
+    raw = np.concatenate([c.segment.raw_s for c in batches])
+    times = np.concatenate([c.segment.t for c in batches])
     inside = np.zeros(len(times), dtype=bool)
     for begin, end in joined:
         inside |= (times >= begin) & (times <= end)
@@ -62,13 +62,13 @@ def _counted(chunks: Sequence[Chunk], t0: float, imu: int) -> Effect | None:
     tops = np.percentile(np.abs(raw[inside]), 99.9, axis=0)
     worst = int(np.argmax(tops))
     top = float(tops[worst])
-    return _saturation(chunks, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
+    return _saturation(batches, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
 
 
-def _stuck(chunks: Sequence[Chunk], t0: float) -> Effect | None:
+def _stuck(batches: Sequence[Batch], t0: float) -> Effect | None:
     """Accelerometer samples that stay at one extreme value: the rail of its range."""
-    raw = np.concatenate([c.stretch.raw_s for c in chunks])
-    t = np.concatenate([c.stretch.t for c in chunks])
+    raw = np.concatenate([c.segment.raw_s for c in batches])
+    t = np.concatenate([c.segment.t for c in batches])
     best: tuple[int, float, NDArray[np.bool_], int] | None = None
     for j in range(3):
         for sign in (1.0, -1.0):
@@ -86,11 +86,11 @@ def _stuck(chunks: Sequence[Chunk], t0: float) -> Effect | None:
     starts = np.concatenate([[where[0]], where[cuts + 1]])
     ends = np.concatenate([where[cuts], [where[-1]]])
     found = [(float(a), float(b)) for a, b in zip(starts, ends, strict=True)]
-    return _saturation(chunks, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
+    return _saturation(batches, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
 
 
 def _saturation(
-    chunks: Sequence[Chunk],
+    batches: Sequence[Batch],
     t0: float,
     limit: float,
     sigma: float,
@@ -100,7 +100,7 @@ def _saturation(
 ) -> Effect:
     """The record of a clipping accelerometer; ``clipped`` s on the boot clock."""
     intervals = tuple((a - t0, b - t0) for a, b in clipped)
-    axis = "body_" + "xyz"[int(np.argmax(np.abs(chunks[0].stretch.R_bs[:, sensor_axis])))]
+    axis = "body_" + "xyz"[int(np.argmax(np.abs(batches[0].segment.R_bs[:, sensor_axis])))]
     return Effect(
         name="saturation",
         unknowns={"limit": Quantity(limit, sigma, "m/s^2")},
@@ -110,6 +110,6 @@ def _saturation(
         held_out_after=float("nan"),
         parameters={},
         cure="damp the mount; use a sensor with a wider range",
-        where=spans(chunks, t0, intervals, axis),
+        where=spans(batches, t0, intervals, axis),
         intervals=intervals,
     )

@@ -123,10 +123,10 @@ def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[
     )
     made.filter = asking = AskingFilter(full.model.size, levels)
     traces: list[EpochTrace] = []
-    for chunk in full.chunks:
-        if chunk.fresh:
+    for batch in full.batches:
+        if batch.fresh:
             made.restart()
-        traces.extend(made.process(chunk.stretch, chunk.fixes, chunk.trusted).traces)
+        traces.extend(made.process(batch.segment, batch.fixes, batch.trusted).traces)
     return asking.asked, traces
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.physics.finding import Imprint
 
 SHOWN_S = 40.0
@@ -22,30 +22,30 @@ EARTH = ("earth_north", "earth_east", "earth_down")
 class Epochs:
     """Velocity innovations (n, 3) NED, m/s, and their columns (n, 3, m); NaN where not used.
 
-    ``t`` (n,) is on the recording's clock, ``portion`` (n,) the portion that each is of.
+    ``t`` (n,) is on the recording's clock, ``block`` (n,) the block that each is of.
     """
 
     t: Array
     innovation: Array
     columns: Array
     refused: NDArray[np.bool_]
-    portion: NDArray[np.intp]
+    block: NDArray[np.intp]
 
     @classmethod
-    def of(cls, traces: Sequence[EpochTrace], portions: Sequence[Portion], size: int) -> Epochs:
+    def of(cls, traces: Sequence[EpochTrace], blocks: Sequence[Block], size: int) -> Epochs:
         """Put together traces in the order of the flight; ``size`` is the number of unknowns."""
         n = len(traces)
         innovation, columns = np.full((n, 3), np.nan), np.zeros((n, 3, size))
-        portion, at, last = np.zeros(n, dtype=np.intp), 0, -np.inf
+        block, at, last = np.zeros(n, dtype=np.intp), 0, -np.inf
         for k, x in enumerate(traces):
             innovation[k, : x.velocities] = x.innovation
             columns[k, : x.velocities] = x.columns
             # Several recordings may have the same times: the order decides.
-            later = range(at + (x.t < last), len(portions))
-            at = next((i for i in later if _inside(portions[i], x.t)), at)
-            portion[k], last = at, x.t
+            later = range(at + (x.t < last), len(blocks))
+            at = next((i for i in later if _inside(blocks[i], x.t)), at)
+            block[k], last = at, x.t
         refused = np.array(["velocity" in x.refused for x in traces], dtype=bool)
-        return cls(np.array([x.t for x in traces]), innovation, columns, refused, portion)
+        return cls(np.array([x.t for x in traces]), innovation, columns, refused, block)
 
     def residual(self, theta: Array) -> Array:
         """(n, 3) what unknowns (m,) leave, m/s."""
@@ -53,12 +53,12 @@ class Epochs:
         return out
 
     def held_out_rms(self, folds: Sequence[tuple[NDArray[np.intp], Array]]) -> float:
-        """Velocity residual, m/s, of portions with the unknowns that the others gave.
+        """Velocity residual, m/s, of blocks with the unknowns that the others gave.
 
         Args:
-            folds: portions, and the unknowns (m,) of a fit that has not seen them.
+            folds: blocks, and the unknowns (m,) of a fit that has not seen them.
         """
-        left = [self.residual(theta)[np.isin(self.portion, members)] for members, theta in folds]
+        left = [self.residual(theta)[np.isin(self.block, members)] for members, theta in folds]
         return rms(np.concatenate(left)) if left else float("nan")
 
     def imprint(self, index: Sequence[int], change: Array, theta: Array, t0: float) -> Imprint:
@@ -84,8 +84,8 @@ class Epochs:
         return Imprint(EARTH[axis], self.t[shown] - t0, left[shown, axis], made[shown, axis])
 
 
-def _inside(portion: Portion, t: float) -> bool:
-    return portion.start - 1e-6 <= t <= portion.end + 1e-6
+def _inside(block: Block, t: float) -> bool:
+    return block.start - 1e-6 <= t <= block.end + 1e-6
 
 
 def rms(x: Array) -> float:

@@ -15,7 +15,7 @@ from onboard.core.diagnosis.hypotheses import (
     SIGNIFICANT,
     Candidate,
     Choice,
-    rivals_of,
+    confounders_of,
 )
 from onboard.core.diagnosis.plain import plain_six
 from onboard.core.diagnosis.records import (
@@ -51,7 +51,7 @@ from onboard.core.maths.chi_square import survival
 from onboard.core.model.nuisances import AntennaPlace
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
-from onboard.core.physics.finding import Effect, Quantity, Rival, Where
+from onboard.core.physics.finding import Confounder, Effect, Quantity, Where
 from onboard.core.physics.mount import trim_in_words
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
@@ -64,7 +64,7 @@ APART = {
 }
 """Manoeuvres that tell a timing error from what looks alike."""
 AMBIGUOUS = 10.0
-"""Rivals within this difference of BIC cannot be told apart."""
+"""Confounders within this difference of BIC cannot be told apart."""
 NOT_AT_FIRST = (
     *("gps_delay", "window_squared", "attitude_delay"),
     *("tilt_roll", "tilt_pitch", "heading"),
@@ -109,12 +109,14 @@ class Judge:
         self.full_point, self.doubts = evidence.full.point, evidence.doubts
         self.believed, self.unused = evidence.believed, evidence.unused
         self.excluded = list(excluded)
-        self.clock = fix_clock(calibrator.parameters, final.chunks)
+        self.clock = fix_clock(calibrator.parameters, final.batches)
         self.traces = final.traces
-        self.epochs = Epochs.of(final.traces, final.all_portions, final.model.size)
+        self.epochs = Epochs.of(final.traces, final.all_blocks, final.model.size)
         self.calibration: Calibration = calibrator.calibration_with(imu, final)
         self.solution = final.found()
-        self.fitter = Fitter(final.all_portions, final.model, self.solution.inflation, final.absent)
+        self.fitter = Fitter(
+            final.all_blocks, final.model, self.solution.variance_inflation, final.absent
+        )
         self.index = final.model.index
         self.all = list(range(final.model.size))
         self.axes = self._axes()
@@ -168,7 +170,7 @@ class Judge:
             ambiguous=self._ambiguous(effects),
             not_testable=(*self.absent, *self._too_weak(effects)),
             ladder=ladder,
-            regimes=regime_residuals(self.traces, self.engine.chunks, before.theta, after.theta),
+            regimes=regime_residuals(self.traces, self.engine.batches, before.theta, after.theta),
             series=self._series(before.theta, after.theta),
             note=note,
             plain=plain_six(self.engine, self.families) if self.families else None,
@@ -237,7 +239,7 @@ class Judge:
         index = [self.index[c] for c in columns]
         held = self._held(columns)
         made = self._record(name, quantities, index, held, parameters, cure)
-        return replace(made, rivals=self._standing_rivals(name, columns))
+        return replace(made, confounders=self._standing_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
         """Whether timing or a constant attitude error is needed, also on data not fitted.
@@ -252,7 +254,7 @@ class Judge:
         place = self.engine.model.slices.get(AntennaPlace.name, slice(0, 0))
         return [i for i in self.all if not place.start <= i < place.stop]
 
-    def _standing_rivals(self, name: str, columns: Sequence[str]) -> tuple[Rival, ...]:
+    def _standing_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""
         choice, full = self.choice, self.choice.fitter.model.index
         target = Candidate(name, tuple(full[c] for c in columns), ())
@@ -260,7 +262,7 @@ class Judge:
         told = self.clock.told_on_stamp
         held = without(columns, full, self.full_point, choice.fitter.absent, told)
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
-        return tuple(rivals_of(choice.fitter, rest, target, others, held))
+        return tuple(confounders_of(choice.fitter, rest, target, others, held))
 
     def _effect(self, f: EffectColumns) -> Effect:
         index = [i for i in self.all if i in self.engine.indices(f)]
@@ -278,14 +280,14 @@ class Judge:
         held = self.engine.absent
         cure, parameters = f.advice(values)
         made = self._record(f.effect, quantities, index, held, parameters, cure)
-        made = replace(made, rivals=self._rivals(f))
+        made = replace(made, confounders=self._confounders(f))
         if isinstance(f, Product):
             made = replace(made, formula=f.written([q.value for q in quantities.values()]))
         if not isinstance(f, BiasStep):
             return made
-        span = ((f.at - self.origin.t0, self.engine.portions[-1].end - self.origin.t0),)
+        span = ((f.at - self.origin.t0, self.engine.blocks[-1].end - self.origin.t0),)
         axis = main_axis(self.solution.theta[index])
-        return replace(made, where=spans(self.engine.chunks, self.origin.t0, span, axis))
+        return replace(made, where=spans(self.engine.batches, self.origin.t0, span, axis))
 
     def _record(
         self,
@@ -315,8 +317,8 @@ class Judge:
             imprint=self.epochs.imprint(
                 index, theta[list(index)] - held[list(index)], theta, self.origin.t0
             ),
-            law=law_of(
-                name, quantities, self.engine.chunks, self.origin.t0, self.origin.temperature
+            response_curve=law_of(
+                name, quantities, self.engine.batches, self.origin.t0, self.origin.temperature
             ),
         )
 
@@ -324,8 +326,8 @@ class Judge:
         """Where the residual falls when the columns ``index`` are added."""
         series = self._series(before, after)
         return located(
-            self.fitter.portions,
-            self.engine.chunks,
+            self.fitter.blocks,
+            self.engine.batches,
             before,
             after,
             self.origin.t0,
@@ -367,7 +369,7 @@ class Judge:
         return Series(e.t - self.origin.t0, e.residual(before), e.residual(after), e.refused)
 
     def _held_velocity(self, free: Sequence[int], held: Array | None = None) -> float:
-        """Velocity residual, m/s, on portions that a fit of ``free`` has not seen."""
+        """Velocity residual, m/s, on blocks that a fit of ``free`` has not seen."""
         return self.epochs.held_out_rms(self.fitter.held_fits(free, held))
 
     def _verdict(
@@ -381,7 +383,7 @@ class Judge:
                 f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "
                 "flight, and of more than half that do not nothing tells which are false. " + note
             )
-        left = self.solution.inflation > CONTRADICTION
+        left = self.solution.variance_inflation > CONTRADICTION
         if any(e.name == "empirical" for e in effects):
             named = [e for e in effects if e.name != "empirical"]
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (
@@ -404,7 +406,7 @@ class Judge:
         by_name = {f.effect: f for f in self.families}
         out = []
         for e in effects:
-            close = [r.name for r in e.rivals if r.delta_bic < AMBIGUOUS and r.name != e.name]
+            close = [r.name for r in e.confounders if r.delta_bic < AMBIGUOUS and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
             if e.name == "gps_smoothing" and self._evidence(e.name, self.all)[0] < MARGIN:
@@ -416,10 +418,10 @@ class Judge:
         ]
         return tuple(out)
 
-    def _rivals(self, f: EffectColumns) -> tuple[Rival, ...]:
+    def _confounders(self, f: EffectColumns) -> tuple[Confounder, ...]:
         for c in self.choice.chosen:
             if c.effect == f.effect:
-                return tuple(self.choice.rivals(c))
+                return tuple(self.choice.confounders(c))
         return ()
 
     def _too_weak(self, effects: list[Effect]) -> list[NotTestable]:

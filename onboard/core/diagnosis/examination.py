@@ -18,24 +18,24 @@ from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass, PassResult
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import EffectColumns
 
 SAMPLE_S = 200.0
 """Flight on which noise levels are tried; more does not make them better known."""
-BLOCK = 4
-"""Neighbouring chunks of the sample: the filter needs ten seconds to settle in each."""
+NEIGHBOURS = 4
+"""Neighbouring batches of the sample: the filter needs ten seconds to settle in each."""
 NOISE_ROUNDS = 4
 WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
 """Moves of delay, squared window, attitude delay and heading that are worth another pass."""
 
 
 CONSISTENT = 1.25
-"""Inflation of the variance up to which portions of a flight agree."""
+"""Inflation of the variance up to which blocks of a flight agree."""
 LESS_BELIEVED = 3.0
 STILL_INCONSISTENT = 0.7
 HARDLY_BELIEVED = 0.1
@@ -52,7 +52,7 @@ class Examination(Engine):
         families: Sequence[Family],
         *,
         t0: float,
-        chunks: Sequence[Chunk] | None = None,
+        batches: Sequence[Batch] | None = None,
         start: Engine | None = None,
         point: Linearisation | None = None,
     ) -> None:
@@ -61,7 +61,7 @@ class Examination(Engine):
         Args:
             like: has the flight and the prior.
             families: physics to add to the calibration's own.
-            chunks: another flight than that of ``like``.
+            batches: another flight than that of ``like``.
             t0: when a clock that runs off was right, s.
             start: an examination whose linearisation and noise are taken over.
             point: another linearisation than that.
@@ -81,10 +81,10 @@ class Examination(Engine):
             origin.noise,
             more=tuple(families),
         )
-        self.chunks = list(like.chunks if chunks is None else chunks)
-        self.trusted_s = sum(c.trusted_s for c in self.chunks)
+        self.batches = list(like.batches if batches is None else batches)
+        self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
-        self._blocks = _blocks(self.chunks)
+        self._sample = _sampled(self.batches)
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
@@ -113,7 +113,7 @@ class Examination(Engine):
         blind = held is None
         for left in (2, 1, 0):
             self.once(held)
-            self._seed = found = solve(self.portions, self.model)
+            self._seed = found = solve(self.blocks, self.model)
             point = moved(self.point, self.model, found.theta)
             settled = point.near(self.point, WORTH_A_PASS)
             if not left or (settled and not blind):
@@ -123,7 +123,7 @@ class Examination(Engine):
         return self
 
     def doubting_attitude(self) -> Examination:
-        """Believe the recorded attitude less while portions of the flight contradict each other.
+        """Believe the recorded attitude less while blocks of the flight contradict each other.
 
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
         offset in flight (temperature, a jump) tilts the recorded attitude too, for as long as the
@@ -131,8 +131,8 @@ class Examination(Engine):
         follows from an attitude that is believed too much moves when it is believed less
         (Hausman, Econometrica 46, 1978), which ends when it moves no longer.
         """
-        while self.found().inflation > CONSISTENT or self.doubted:
-            kept = self.noise, self.portions, self.traces, self._seed, self._solution
+        while self.found().variance_inflation > CONSISTENT or self.doubted:
+            kept = self.noise, self.blocks, self.traces, self._seed, self._solution
             before = self.found()
             self.noise = self.noise.scaled("attitude", LESS_BELIEVED)
             if self.noise == kept[0]:
@@ -140,9 +140,13 @@ class Examination(Engine):
             self._seed = before
             self.once((before.theta, before.covariance))
             after = self.found()
-            worse = after.inflation > max(CONSISTENT, STILL_INCONSISTENT * before.inflation)
-            if worse or (before.inflation <= CONSISTENT and not self._moved(before, after)):
-                self.noise, self.portions, self.traces, self._seed, self._solution = kept
+            worse = after.variance_inflation > max(
+                CONSISTENT, STILL_INCONSISTENT * before.variance_inflation
+            )
+            if worse or (
+                before.variance_inflation <= CONSISTENT and not self._moved(before, after)
+            ):
+                self.noise, self.blocks, self.traces, self._seed, self._solution = kept
                 break
             self.doubted = True
         return self
@@ -169,22 +173,22 @@ class Examination(Engine):
             self._pass.hold(*held)
         self.refused.clear()
         self.states.clear()
-        self.portions = []
-        for chunk in self.chunks:
-            self._run(chunk)
+        self.blocks = []
+        for batch in self.batches:
+            self._run(batch)
 
-    def through(self, made: Pass, chunk: Chunk) -> PassResult:
-        """One chunk through a pass, its rows kept."""
-        result = super().through(made, chunk)
+    def through(self, made: Pass, batch: Batch) -> PassResult:
+        """One batch through a pass, its rows kept."""
+        result = super().through(made, batch)
         self.traces.extend(result.traces)
         return result
 
-    def _over_buffer(self, made: Pass) -> list[Portion]:
+    def _over_buffer(self, made: Pass) -> list[Block]:
         """The sample only: noise and timing are what is asked of these passes."""
         out = []
-        for block in self._blocks:
+        for part in self._sample:
             made.restart()
-            out += [self.through(made, chunk).portion for chunk in block]
+            out += [self.through(made, batch).block for batch in part]
         return out
 
     @property
@@ -215,11 +219,11 @@ class Examination(Engine):
         return [i for f in families for i in self.indices(f)]
 
 
-def _blocks(chunks: Sequence[Chunk]) -> list[list[Chunk]]:
-    """The whole flight, or blocks of it spread evenly."""
-    whole = sum(c.duration for c in chunks)
-    blocks = [list(chunks[i : i + BLOCK]) for i in range(0, len(chunks), BLOCK)]
+def _sampled(batches: Sequence[Batch]) -> list[list[Batch]]:
+    """The whole flight, or parts of it spread evenly."""
+    whole = sum(c.duration for c in batches)
+    parts = [list(batches[i : i + NEIGHBOURS]) for i in range(0, len(batches), NEIGHBOURS)]
     if whole <= 1.5 * SAMPLE_S:
-        return [list(chunks)]
-    count = max(1, round(len(blocks) * SAMPLE_S / whole))
-    return [blocks[i] for i in np.linspace(0, len(blocks) - 1, count).round().astype(int)]
+        return [list(batches)]
+    count = max(1, round(len(parts) * SAMPLE_S / whole))
+    return [parts[i] for i in np.linspace(0, len(parts) - 1, count).round().astype(int)]

@@ -11,7 +11,7 @@ import numpy as np
 from onboard.core.diagnosis.coasting import FEWEST_FIXES, MOST_SCATTER, Contradiction
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Effect, Quantity
 
@@ -27,7 +27,7 @@ NEIGHBOURS_S = 1.1
 def fault_effect(
     traces: Sequence[EpochTrace],
     theta: Array,
-    chunks: Sequence[Chunk],
+    batches: Sequence[Batch],
     t0: float,
     least: float,
     coast_s: float,
@@ -39,7 +39,7 @@ def fault_effect(
     Args:
         traces: of every epoch.
         theta: (m,) what their columns are multiplied with.
-        chunks: the flight.
+        batches: the flight.
         t0: s on the boot clock.
         least: m/s by which no honest receiver is off.
         coast_s: how long the filter goes on without a velocity, s.
@@ -63,7 +63,7 @@ def fault_effect(
         # A receiver that contradicts itself while the inertia is lost does not show its error.
         spread = float(np.hypot(least / 8.0, worst.spread))
         sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
-    t = np.unique(np.concatenate([c.fixes.t for c in chunks])) - t0
+    t = np.unique(np.concatenate([c.fixes.t for c in batches])) - t0
     inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
     return Effect(
         name="gps_fault",
@@ -74,7 +74,7 @@ def fault_effect(
         held_out_after=float("nan"),
         parameters={},
         cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
-        where=spans(chunks, t0, intervals, _earth_axis(spells)),
+        where=spans(batches, t0, intervals, _earth_axis(spells)),
         intervals=tuple(intervals),
     )
 

@@ -1,8 +1,8 @@
 """Which effects to accept: forward selection, with second thoughts, on sums alone.
 
 An effect is taken when the fall of the misfit pays for its unknowns (BIC) by a wide margin, when it
-holds on portions of the flight that were not fitted, when its size is sure and believable, and
-when it matters.  A jump of the offsets competes like the rest: at the starts of portions as long
+holds on blocks of the flight that were not fitted, when its size is sure and believable, and
+when it matters.  A jump of the offsets competes like the rest: at the starts of blocks as long
 as its moment is not known.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import EffectColumns
-from onboard.core.physics.finding import Rival
+from onboard.core.physics.finding import Confounder
 
 MARGIN = 25.0
 """Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
@@ -25,17 +25,17 @@ SECOND_ORDER = 5e-3
 """Share of the evidence of what was found that columns linear in it may have left over."""
 SIGNIFICANT = 5.0
 CONTRADICTING, RECONCILED = 3.0, 0.35
-"""Inflation of the variance from which portions contradict each other; what share is agreement."""
+"""Inflation of the variance from which blocks contradict each other; what share is agreement."""
 FAIR = 10.0
-"""Fall of BIC that is enough for an effect which makes portions agree."""
+"""Fall of BIC that is enough for an effect which makes blocks agree."""
 MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
 MOST_EFFECTS = 5
-LEAST_PORTIONS = 4
-"""Portions of a flight among which a jump can be looked for."""
+LEAST_BLOCKS = 4
+"""Blocks of a flight among which a jump can be looked for."""
 RIVAL_SHARE = 0.15
-"""Least share of an effect's evidence that makes another one its rival."""
+"""Least share of an effect's evidence that makes another one its confounder."""
 LEFT_BESIDE = 0.5
-"""A rival explains the same: beside the effect less than this share of its gain is left."""
+"""A confounder explains the same: beside the effect less than this share of its gain is left."""
 USED = 4.0
 """Sigmas from which an unknown of several counts as used."""
 CHANCE = 4.0
@@ -48,7 +48,7 @@ STEP_PLAUSIBLE = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Columns that stand for one effect; ``columns`` is None for a jump at a portion's start.
+    """Columns that stand for one effect; ``columns`` is None for a jump at a block's start.
 
     ``spent`` are unknowns that were chosen outside the fit (a jump's moment), ``unseen`` the share
     of the columns' own variance that happens between the samples they are made of.
@@ -112,26 +112,26 @@ class Choice:
         """Columns of the model that was chosen."""
         return self.base + [i for c in self.chosen for i in c.index]
 
-    def rivals(self, target: Candidate) -> list[Rival]:
+    def confounders(self, target: Candidate) -> list[Confounder]:
         """What else could stand in the place of a chosen effect, nearest first."""
         rest = self.base + [i for c in self.chosen if c is not target for i in c.index]
         others = [c for c in self.candidates if c not in self.chosen and c.effect != target.effect]
         step, boundary = _best_jump(self, rest)
         if step is None or boundary is None or target.columns is None:
-            return rivals_of(self.fitter, rest, target, others)
+            return confounders_of(self.fitter, rest, target, others)
         if not target.columns.tilts_ekf:
-            return rivals_of(self.fitter, rest, target, others)
+            return confounders_of(self.fitter, rest, target, others)
         # What wanders, on one flight, may have jumped.
-        return rivals_of(self.fitter.stepped(boundary), rest, target, [*others, step])
+        return confounders_of(self.fitter.stepped(boundary), rest, target, [*others, step])
 
 
-def rivals_of(
+def confounders_of(
     fitter: Fitter,
     rest: Sequence[int],
     target: Candidate,
     others: Sequence[Candidate],
     held: Array | None = None,
-) -> list[Rival]:
+) -> list[Confounder]:
     """Others that explain, instead of ``target``, a good part of what it explains.
 
     Args:
@@ -153,10 +153,10 @@ def rivals_of(
             continue
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if fitter.gain(with_it, both) < LEFT_BESIDE * gain:
-            out.append(Rival(other.effect, float(bic - other_bic)))
-    nearest: dict[str, Rival] = {}
-    for rival in sorted(out, key=lambda r: r.delta_bic):
-        nearest.setdefault(rival.name, rival)
+            out.append(Confounder(other.effect, float(bic - other_bic)))
+    nearest: dict[str, Confounder] = {}
+    for confounder in sorted(out, key=lambda r: r.delta_bic):
+        nearest.setdefault(confounder.name, confounder)
     return list(nearest.values())
 
 
@@ -258,7 +258,7 @@ def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> lis
 def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, int | None]:
     """The jump that would help most beside some columns, if there is none yet."""
     located = any(c.effect == STEP for c in choice.candidates)
-    if located or len(choice.fitter.portions) < LEAST_PORTIONS:
+    if located or len(choice.fitter.blocks) < LEAST_BLOCKS:
         return None, None
     jumps = choice.fitter.jumps(list(beside))
     if not jumps:
@@ -296,8 +296,8 @@ def _reconciling(
     before: Fit,
     scored: Sequence[tuple[float, Candidate, Fit]],
 ) -> Candidate | None:
-    """An effect of fair evidence with which portions agree that contradict each other without."""
-    if fitter.inflation(free) < CONTRADICTING:
+    """An effect of fair evidence with which blocks agree that contradict each other without."""
+    if fitter.variance_inflation_of(free) < CONTRADICTING:
         return None
     for bic, c, after in scored:
         fair = bic > FAIR and accepted(fitter, before, after, c, MARGIN)
@@ -307,9 +307,11 @@ def _reconciling(
 
 
 def reconciles(fitter: Fitter, rest: Sequence[int], index: Sequence[int]) -> bool:
-    """Whether portions contradict each other without the columns ``index``, and agree with them."""
-    apart = fitter.inflation(rest)
-    return apart > CONTRADICTING and fitter.inflation([*rest, *index]) < RECONCILED * apart
+    """Whether blocks contradict each other without the columns ``index``, and agree with them."""
+    apart = fitter.variance_inflation_of(rest)
+    return (
+        apart > CONTRADICTING and fitter.variance_inflation_of([*rest, *index]) < RECONCILED * apart
+    )
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) -> bool:

@@ -11,14 +11,14 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Candidate
 from onboard.core.diagnosis.selection import OFFSETS, SETTLED_S, Fitter
 from onboard.core.estimate.engine import Engine
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
 from onboard.core.physics.effect import EffectColumns
 from onboard.core.physics.offsets import BiasStep
 
 REACH_S = 16.0
-"""How far from the boundary of a portion a jump may have been that shows there."""
+"""How far from the boundary of a block a jump may have been that shows there."""
 SETTLING_S = 40.0
 """What a jump does to the filter's state is forgotten after that long."""
 FURTHEST = 3
@@ -47,7 +47,7 @@ def _best(
     width: float,
 ) -> BiasStep:
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
-    times = np.maximum(times, float(full.portions[0].start) + SETTLED_S)
+    times = np.maximum(times, float(full.blocks[0].start) + SETTLED_S)
     times = np.unique(times)
     scored = _scored(full, chosen, [BiasStep(float(t)) for t in times])
     return max(scored, key=lambda x: x[0])[1]
@@ -66,17 +66,17 @@ def _scored(
         replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
     )
     first, last = steps[0].at - SETTLING_S, steps[-1].at + SETTLING_S
-    far: list[Portion] = []
-    for chunk, portion in zip(full.chunks, full.portions, strict=True):
-        if chunk.fixes.t[-1] < first or chunk.fixes.t[0] > last:
-            after = bool(chunk.fixes.t[0] > last)
-            far.append(_with_jumps(portion, full, made.model, steps, after=after))
+    far: list[Block] = []
+    for batch, block in zip(full.batches, full.blocks, strict=True):
+        if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
+            after = bool(batch.fixes.t[0] > last)
+            far.append(_with_jumps(block, full, made.model, steps, after=after))
         else:
-            made.add(chunk)
+            made.add(batch)
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter([*far, *made.portions], made.model, 1.0, absent)
+    fitter = Fitter([*far, *made.blocks], made.model, 1.0, absent)
     slices = made.model.slices
     stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
     free = [i for i in range(made.model.size) if i not in stepped]
@@ -89,9 +89,9 @@ def _scored(
 
 
 def _with_jumps(
-    portion: Portion, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
-) -> Portion:
-    """Sums of ``model`` over a portion that lies before or after every jump."""
+    block: Block, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
+) -> Block:
+    """Sums of ``model`` over a block that lies before or after every jump."""
     source, sign = np.full(model.size, -1), np.ones(model.size)
     for i, unknown in enumerate(model.unknowns):
         source[i] = full.model.index.get(unknown.name, -1)
@@ -107,15 +107,15 @@ def _with_jumps(
     to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
     signs = np.outer(sign[mine], sign[mine])
     sums = NormalSums.zeros(model.size)
-    sums.N[to], sums.G[to] = signs * portion.sums.N[of], signs * portion.sums.G[of]
-    sums.b[mine] = sign[mine] * portion.sums.b[source[mine]]
-    sums.s, sums.rows, sums.log_det = portion.sums.s, portion.sums.rows, portion.sums.log_det
-    return Portion(portion.start, portion.end, sums)
+    sums.N[to], sums.G[to] = signs * block.sums.N[of], signs * block.sums.G[of]
+    sums.b[mine] = sign[mine] * block.sums.b[source[mine]]
+    sums.s, sums.rows, sums.log_det = block.sums.s, block.sums.rows, block.sums.log_det
+    return Block(block.start, block.end, sums)
 
 
-def boundary_of(fitter: Fitter, portion: int) -> float:
-    """When a portion starts, s on the boot clock."""
-    return float(fitter.portions[portion].start)
+def boundary_of(fitter: Fitter, block: int) -> float:
+    """When a block starts, s on the boot clock."""
+    return float(fitter.blocks[block].start)
 
 
 def candidate_of(made: Examination, family: EffectColumns) -> Candidate:

@@ -16,7 +16,7 @@ from onboard.core.diagnosis.records import Plain
 from onboard.core.estimate.calibration_record import six_covariance
 from onboard.core.estimate.engine import calibration_model
 from onboard.core.estimate.solution import solve
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.physics.effect import EffectColumns
 
 
@@ -42,7 +42,7 @@ def plain_six(final: Examination, families: Sequence[EffectColumns]) -> Plain:
     at = final.absent
     at[index] = 0.0
     solution = solve(
-        [Portion(p.start, p.end, p.sums.shifted(at).subset(index)) for p in final.all_portions],
+        [Block(p.start, p.end, p.sums.shifted(at).subset(index)) for p in final.all_blocks],
         model,
     )
     scale, beta = solution.theta[:3], solution.theta[3:6]

@@ -19,7 +19,7 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import (
     CONTRADICTING,
     FAIR,
-    LEAST_PORTIONS,
+    LEAST_BLOCKS,
     MARGIN,
     RECONCILED,
     STEP,
@@ -50,7 +50,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import moved
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import EffectColumns, Origin
@@ -62,7 +62,7 @@ from onboard.core.physics.receiver import LeverArm
 ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
 SUSPECT = 18.0
-"""Fall of chi-square by a jump at any portion's start that one flight of thirty shows by chance."""
+"""Fall of chi-square by a jump at any block's start that one flight of thirty shows by chance."""
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -83,8 +83,8 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         KeyError: that accelerometer has not been seen.
     """
     engine = calibrator.engine(imu)
-    flight = since_reboot(engine.chunks) if latest else list(engine.chunks)
-    first = float(flight[0].stretch.t[0]) if latest and flight else calibrator.first_sample
+    flight = since_reboot(engine.batches) if latest else list(engine.batches)
+    first = float(flight[0].segment.t[0]) if latest and flight else calibrator.first_sample
     antenna = calibrator.parameters.antenna
     origin = Origin(
         t0=first,
@@ -93,25 +93,25 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         imu=imu,
     )
     rail = saturation_effect(flight, origin.t0, imu)
-    chunks = flight
+    batches = flight
     if rail is not None:
-        chunks = unclipped(chunks, rail.intervals, origin.t0)
-        if sum(c.trusted_s for c in chunks) < ENOUGH * sum(c.trusted_s for c in flight):
+        batches = unclipped(batches, rail.intervals, origin.t0)
+        if sum(c.trusted_s for c in batches) < ENOUGH * sum(c.trusted_s for c in flight):
             # Clipped all the time: what is left would say less than what is spoiled.
-            chunks = flight
-    testable, absent = testable_of(catalogue(origin), chunks)
+            batches = flight
+    testable, absent = testable_of(catalogue(origin), batches)
     if rail is not None:
         # A low-pass hides the samples next to the clipped ones: what is left of them is a curve.
         testable = [f for f in testable if not isinstance(f, ScaleNonlinearity)]
         absent.append(NotTestable(ScaleNonlinearity.effect, "clipping bends the scale as well"))
-    full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
-    clipped = rail is not None and chunks is flight
+    full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+    clipped = rail is not None and batches is flight
     fault: Effect | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault, chunks = false_fixes(calibrator, engine, full, origin.t0)
+        fault, batches = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
-        full = Examination(engine, testable, t0=origin.t0, chunks=chunks).with_noise()
+        full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
     full.doubting_attitude()
     choice = _chosen(full, testable)
     jumped = _with_jump(full, testable, choice)
@@ -137,7 +137,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         # A jump may have passed for something slower, or the other way round.
         families = kept
         final = _again(full, families, final).with_rows().doubting_attitude()
-    wider = families if clipped else searched(final, families, choice.fitter.weaken)
+    wider = families if clipped else searched(final, families, choice.fitter.variance_inflation)
     if wider != families:
         families = wider
         final = _again(full, families, final).with_noise().doubting_attitude()
@@ -156,13 +156,13 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     )
 
 
-def since_reboot(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """The chunks at the end whose clock is one and the same."""
+def since_reboot(batches: Sequence[Batch]) -> list[Batch]:
+    """The batches at the end whose clock is one and the same."""
     first = 0
-    for i in range(1, len(chunks)):
-        if chunks[i].fixes.t[0] < chunks[i - 1].fixes.t[0]:
+    for i in range(1, len(batches)):
+        if batches[i].fixes.t[0] < batches[i - 1].fixes.t[0]:
             first = i
-    return list(chunks[first:])
+    return list(batches[first:])
 
 
 def _with_jump(
@@ -171,16 +171,16 @@ def _with_jump(
     """The same with a jump among the columns; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
-    for noise; a jump is no column until its moment is known, and at a portion's start, seconds
+    for noise; a jump is no column until its moment is known, and at a block's start, seconds
     away, it explains little of what it does.
     """
     steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
-    fitter = Fitter(full.all_portions, full.model, 1.0, full.absent)
+    fitter = Fitter(full.all_blocks, full.model, 1.0, full.absent)
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
-    if len(fitter.portions) < LEAST_PORTIONS or not jumps:
+    if len(fitter.blocks) < LEAST_BLOCKS or not jumps:
         return None
     boundary, gain = max(jumps, key=lambda x: x[1])
-    apart = full.found().inflation
+    apart = full.found().variance_inflation
     likely = _wanders(choice) or gain > SUSPECT
     if not likely and apart < CONTRADICTING:
         return None
@@ -188,7 +188,7 @@ def _with_jump(
     made = Examination(full, everything, t0=full.point.skew_from, start=full)
     if likely:
         return made.tuned(), everything
-    agrees = made.with_noise().found().inflation < RECONCILED * apart
+    agrees = made.with_noise().found().variance_inflation < RECONCILED * apart
     return (made, everything) if agrees else None
 
 
@@ -204,16 +204,18 @@ def _chosen(
 ) -> Choice:
     """Selection on the sums of the whole catalogue; ``kept`` are in it to begin with."""
     solution = full.found()
-    fitter = Fitter(full.all_portions, full.model, solution.inflation, full.absent)
+    fitter = Fitter(full.all_blocks, full.model, solution.variance_inflation, full.absent)
     located = any(isinstance(c, BiasStep) for c in testable)
     jumps = [] if located else fitter.jumps(list(range(full.model.size)))
-    if jumps and len(fitter.portions) >= LEAST_PORTIONS:
-        # Portions that contradict each other because of a jump are no reason to doubt the jump.
+    if jumps and len(fitter.blocks) >= LEAST_BLOCKS:
+        # Blocks that contradict each other because of a jump are no reason to doubt the jump.
         wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
-        fitter.weaken = min(fitter.weaken, solve(wide.portions, wide.model).inflation)
+        fitter.variance_inflation = min(
+            fitter.variance_inflation, solve(wide.blocks, wide.model).variance_inflation
+        )
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    unseen = {name: unseen_share(full.chunks, name) for c in testable for name in c.needs}
+    unseen = {name: unseen_share(full.batches, name) for c in testable for name in c.needs}
     candidates = [
         replace(candidate_of(full, c), unseen=max((unseen[name] for name in c.needs), default=0.0))
         for c in testable
@@ -234,14 +236,19 @@ def _second_thoughts(
     Returns:
         Those that are large enough; of them, those beside which another effect could stand.
     """
-    clock = fix_clock(calibrator.parameters, full.chunks)
+    clock = fix_clock(calibrator.parameters, full.batches)
     told = clock.told_on_stamp
     index = choice.fitter.model.index
     standing: Standing = {}
     for _ in range(len(STANDING)):
         fit = choice.fitter.fit(choice.free, held_out=False)
         solution = Solution(
-            fit.theta, fit.covariance, choice.fitter.sums.N, choice.fitter.weaken, 1.0, 1.0
+            fit.theta,
+            fit.covariance,
+            choice.fitter.sums.N,
+            choice.fitter.variance_inflation,
+            1.0,
+            1.0,
         )
         timing = timing_of(full, solution)
         standing = standing_effects(
@@ -311,13 +318,13 @@ def _again(full: Examination, families: Sequence[EffectColumns], final: Examinat
 
 def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[EffectColumns]:
     """Families that stay significant when all of them are in one model."""
-    fitter = Fitter(made.all_portions, made.model, made.found().inflation, made.absent)
+    fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
     kept = list(families)
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
     while kept:
         free = base + made.indices_of(kept)
         # What a needless jump makes of the offsets must not weaken what is said for the others.
-        fitter.weaken = fitter.inflation(free)
+        fitter.variance_inflation = fitter.variance_inflation_of(free)
         with_all = fitter.fit(free, held_out=False)
         worst, least = None, np.inf
         for family in kept:

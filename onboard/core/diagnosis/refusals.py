@@ -8,7 +8,7 @@ from typing import Final
 
 from onboard.core.diagnosis.records import Unused
 from onboard.core.gps.trust import Reason, Refusal
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.physics.finding import Effect
 
 OPINIONS: Final = frozenset(
@@ -25,7 +25,7 @@ OPINIONS: Final = frozenset(
 )
 """Reasons to refuse a receiver that has a fix and goes on reporting: the inertia can be asked."""
 SAME_FIX_S = 0.1
-"""Times in a chunk are even, those of the trust window are as stamped: jitter is between them."""
+"""Times in a batch are even, those of the trust window are as stamped: jitter is between them."""
 LONGEST_FIX_GAP_S = 2.5
 """Receivers report at 1 Hz or faster: longer without a fix is an outage."""
 
@@ -39,22 +39,22 @@ class Refused:
     reason: Reason
 
 
-def refused(chunks: Sequence[Chunk], refusals: Sequence[Refusal]) -> list[Refused]:
-    """Flight that was not used, in order of time, each stretch with one reason.
+def refused(batches: Sequence[Batch], refusals: Sequence[Refusal]) -> list[Refused]:
+    """Flight that was not used, in order of time, each segment with one reason.
 
-    A stretch goes from the first fix that was refused to the next one that was believed.
+    A segment goes from the first fix that was refused to the next one that was believed.
 
     Args:
-        chunks: the flight.
+        batches: the flight.
         refusals: of the trust window; where they do not reach (an earlier run), nothing is said.
     """
     out: list[Refused] = []
     opened, last = False, float("-inf")
-    for chunk in chunks:
-        for t, believed in zip(chunk.fixes.t.tolist(), chunk.trusted.tolist(), strict=True):
+    for batch in batches:
+        for t, believed in zip(batch.fixes.t.tolist(), batch.trusted.tolist(), strict=True):
             if t == last:
-                continue  # chunks share a fix
-            again = t > last and not chunk.fresh
+                continue  # batches share a fix
+            again = t > last and not batch.fresh
             if opened and again:
                 out[-1] = replace(out[-1], end=t)
             elif again and t - last > LONGEST_FIX_GAP_S:
@@ -66,18 +66,18 @@ def refused(chunks: Sequence[Chunk], refusals: Sequence[Refusal]) -> list[Refuse
     return out
 
 
-def believed(chunks: Sequence[Chunk]) -> int:
-    """How many fixes of a flight were to be used; chunks share their ends."""
+def believed(batches: Sequence[Batch]) -> int:
+    """How many fixes of a flight were to be used; batches share their ends."""
     count, last = 0, float("-inf")
-    for chunk in chunks:
-        fresh = chunk.fixes.t != last
-        count += int((chunk.trusted & fresh).sum())
-        last = float(chunk.fixes.t[-1])
+    for batch in batches:
+        fresh = batch.fixes.t != last
+        count += int((batch.trusted & fresh).sum())
+        last = float(batch.fixes.t[-1])
     return count
 
 
 def unused_flight(
-    chunks: Sequence[Chunk],
+    batches: Sequence[Batch],
     refusals: Sequence[Refusal],
     fault: Effect | None,
     t0: float,
@@ -86,7 +86,7 @@ def unused_flight(
 ) -> tuple[Unused, ...]:
     """What was not used, s since ``t0``, and what the inertia says of it, if it was ``asked``."""
     out = []
-    for r in refused(chunks, refusals):
+    for r in refused(batches, refusals):
         start, end = r.start - t0, r.end - t0
         intervals = fault.intervals if fault is not None else ()
         said = any(a < end and b > start for a, b in intervals)

@@ -9,9 +9,9 @@ import numpy as np
 
 from onboard.core.diagnosis.records import RegimeResidual
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.physics.finding import Where
 
@@ -19,14 +19,14 @@ MOST_PLACES = 5
 REGIMES = ("turning", "accelerating", "high load factor", "climbing", "high throttle", "steady")
 
 
-def regime_of(chunk: Chunk) -> str:
-    """The word for what a chunk of flight mostly was."""
-    s = chunk.stretch
+def regime_of(batch: Batch) -> str:
+    """The word for what a batch of flight mostly was."""
+    s = batch.segment
     turn = float(np.sqrt(np.mean(s.w_b[:, 2] ** 2)))
     load = float(np.percentile(-s.raw_s[:, 2], 90)) / STANDARD_GRAVITY
-    speed = np.linalg.norm(np.nan_to_num(chunk.fixes.v_n[:, :2]), axis=1)
+    speed = np.linalg.norm(np.nan_to_num(batch.fixes.v_n[:, :2]), axis=1)
     surge = float(np.std(speed))
-    climb = float(np.ptp(chunk.fixes.height)) / max(chunk.duration, 1e-3)
+    climb = float(np.ptp(batch.fixes.height)) / max(batch.duration, 1e-3)
     if load > 1.3:
         return "high load factor"
     if turn > 0.15:
@@ -48,28 +48,28 @@ class Residuals:
 
 
 def located(
-    portions: Sequence[Portion],
-    chunks: Sequence[Chunk],
+    blocks: Sequence[Block],
+    batches: Sequence[Batch],
     before: Array,
     after: Array,
     t0: float,
     axes: Mapping[int, str],
     residuals: Residuals,
 ) -> tuple[Where, ...]:
-    """Portions in which the misfit falls most from ``before`` to ``after``, neighbours joined.
+    """Blocks in which the misfit falls most from ``before`` to ``after``, neighbours joined.
 
     Args:
-        portions: sums of the flight.
-        chunks: the flight, one for each portion.
+        blocks: sums of the flight.
+        batches: the flight, one for each block.
         before: (m,) unknowns without what was found.
         after: (m,) with it.
         t0: first sample, s.
         axes: body axis on which each of the columns in question acts; others act on none.
         residuals: what these two leave of the velocity.
     """
-    if len(portions) != len(chunks):
+    if len(blocks) != len(batches):
         return ()
-    gain = np.array([p.sums.residual(before) - p.sums.residual(after) for p in portions])
+    gain = np.array([p.sums.residual(before) - p.sums.residual(after) for p in blocks])
     positive = np.clip(gain, 0.0, None)
     whole = float(positive.sum())
     if whole <= 0.0:
@@ -87,11 +87,11 @@ def located(
         inside = g[int(np.argmax(positive[g]))]
         out.append(
             Where(
-                portions[g[0]].start - t0,
-                portions[g[-1]].end - t0,
-                _axis(portions[inside], after - before, axes)
-                or _earth_axis(portions[inside], residuals),
-                regime_of(chunks[inside]),
+                blocks[g[0]].start - t0,
+                blocks[g[-1]].end - t0,
+                _axis(blocks[inside], after - before, axes)
+                or _earth_axis(blocks[inside], residuals),
+                regime_of(batches[inside]),
                 float(positive[g].sum() / whole),
             )
         )
@@ -100,15 +100,15 @@ def located(
 
 
 def spans(
-    chunks: Sequence[Chunk], t0: float, intervals: Sequence[tuple[float, float]], axis: str
+    batches: Sequence[Batch], t0: float, intervals: Sequence[tuple[float, float]], axis: str
 ) -> tuple[Where, ...]:
     """Places of something whose times are known (s since the first sample), longest first."""
     whole = sum(b - a for a, b in intervals)
     out = []
     for a, b in intervals:
         middle = t0 + 0.5 * (a + b)
-        chunk = min(chunks, key=lambda c: abs(0.5 * (c.fixes.t[0] + c.fixes.t[-1]) - middle))
-        out.append(Where(a, b, axis, regime_of(chunk), (b - a) / whole if whole else 1.0))
+        batch = min(batches, key=lambda c: abs(0.5 * (c.fixes.t[0] + c.fixes.t[-1]) - middle))
+        out.append(Where(a, b, axis, regime_of(batch), (b - a) / whole if whole else 1.0))
     out.sort(key=lambda w: -w.share)
     return tuple(out[:MOST_PLACES])
 
@@ -118,17 +118,17 @@ def main_axis(sizes: Array) -> str:
     return "body_" + "xyz"[int(np.argmax(np.abs(sizes)))]
 
 
-def _axis(portion: Portion, change: Array, axes: Mapping[int, str]) -> str:
+def _axis(block: Block, change: Array, axes: Mapping[int, str]) -> str:
     """Body axis along which the columns in question moved most; empty if they have none."""
     moved = dict.fromkeys(axes.values(), 0.0)
     for i, axis in axes.items():
-        moved[axis] += float(change[i] ** 2 * portion.sums.N[i, i])
+        moved[axis] += float(change[i] ** 2 * block.sums.N[i, i])
     return max(moved, key=lambda a: moved[a]) if any(moved.values()) else ""
 
 
-def _earth_axis(portion: Portion, residuals: Residuals) -> str:
+def _earth_axis(block: Block, residuals: Residuals) -> str:
     """Earth axis on which the velocity residual fell most."""
-    here = (residuals.t >= portion.start - 1e-6) & (residuals.t <= portion.end + 1e-6)
+    here = (residuals.t >= block.start - 1e-6) & (residuals.t <= block.end + 1e-6)
     if not here.any():
         return "earth_north"
     fall = np.nansum(residuals.before[here] ** 2 - residuals.after[here] ** 2, axis=0)
@@ -144,10 +144,10 @@ def axis_of(key: str) -> str | None:
 
 
 def regime_residuals(
-    traces: Sequence[EpochTrace], chunks: Sequence[Chunk], before: Array, after: Array
+    traces: Sequence[EpochTrace], batches: Sequence[Batch], before: Array, after: Array
 ) -> tuple[RegimeResidual, ...]:
     """Whitened residual by regime, before and after."""
-    edges = [(float(c.fixes.t[0]) - 0.5, float(c.fixes.t[-1]) + 0.5, regime_of(c)) for c in chunks]
+    edges = [(float(c.fixes.t[0]) - 0.5, float(c.fixes.t[-1]) + 0.5, regime_of(c)) for c in batches]
     squares: dict[str, Array] = {}
     for x in traces:
         regime = next((r for a, b, r in edges if a <= x.t <= b), None)
@@ -158,7 +158,7 @@ def regime_residuals(
         s = squares.setdefault(regime, np.zeros(6))
         sums = (one @ one, two @ two, len(one), v_one @ v_one, v_two @ v_two, len(v_one))
         s += np.array(sums)
-    seconds = {r: sum(c.duration for c in chunks if regime_of(c) == r) for r in squares}
+    seconds = {r: sum(c.duration for c in batches if regime_of(c) == r) for r in squares}
     out = []
     for r, s in sorted(squares.items()):
         whitened = np.sqrt(s[:2] / s[2])

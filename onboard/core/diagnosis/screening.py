@@ -23,7 +23,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.gps.trust import Reason
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Effect
 
@@ -39,19 +39,19 @@ FAR_OFF = 12.0
 
 
 def unclipped(
-    chunks: Sequence[Chunk], intervals: Sequence[tuple[float, float]], t0: float
-) -> list[Chunk]:
+    batches: Sequence[Batch], intervals: Sequence[tuple[float, float]], t0: float
+) -> list[Batch]:
     """The flight without the clipped parts; the filter begins anew after each.
 
     Args:
-        chunks: the flight.
+        batches: the flight.
         intervals: clipped, s since ``t0``.
         t0: s on the boot clock.
     """
-    out: list[Chunk] = []
+    out: list[Batch] = []
     torn = False
-    for chunk in chunks:
-        t = chunk.fixes.t - t0
+    for batch in batches:
+        t = batch.fixes.t - t0
         bad = np.zeros(len(t), dtype=bool)
         for a, b in intervals:
             bad |= (t >= a - MARGIN_S) & (t <= b + MARGIN_S)
@@ -68,11 +68,11 @@ def unclipped(
                 torn = True
                 continue
             out.append(
-                Chunk(
-                    chunk.stretch,
-                    chunk.fixes.between(first, last),
-                    chunk.trusted[first:last],
-                    chunk.fresh or torn or first > 0,
+                Batch(
+                    batch.segment,
+                    batch.fixes.between(first, last),
+                    batch.trusted[first:last],
+                    batch.fresh or torn or first > 0,
                 )
             )
             torn = last < len(t)
@@ -81,22 +81,22 @@ def unclipped(
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> tuple[Effect | None, list[Chunk]]:
+) -> tuple[Effect | None, list[Batch]]:
     """GPS velocities that cannot be true, and the flight with those not to be believed.
 
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
     """
-    doubted = [r for r in refused(full.chunks, calibrator.trust.refusals) if r.reason in OPINIONS]
+    doubted = [r for r in refused(full.batches, calibrator.trust.refusals) if r.reason in OPINIONS]
     levels, least, jumped = _robust(full, full.found().theta)
     rejected = max(full.refused["velocity"], like.refused["velocity"])
     if rejected < FEWEST_REFUSED and not jumped and not doubted:
-        return None, list(full.chunks)
+        return None, list(full.batches)
     contradicted = contradictions(full, levels, doubted)
     fault = fault_effect(
         _asked_again(full, levels, contradicted, again=bool(doubted)),
         full.found().theta,
-        full.chunks,
+        full.batches,
         t0,
         least,
         full.settings.coast_s,
@@ -104,12 +104,12 @@ def false_fixes(
         contradicted,
     )
     if fault is None:
-        return None, list(full.chunks)
+        return None, list(full.batches)
     out = []
-    for chunk in full.chunks:
-        t = full.point.true_time(chunk.fixes.t) - t0
+    for batch in full.batches:
+        t = full.point.true_time(batch.fixes.t) - t0
         bad = _inside(t, fault.intervals)
-        out.append(replace(chunk, trusted=chunk.trusted & ~bad))
+        out.append(replace(batch, trusted=batch.trusted & ~bad))
     return fault, out
 
 
@@ -131,12 +131,12 @@ def _asked_again(
         covariance=solution.covariance,
     )
     traces: list[EpochTrace] = []
-    for chunk in full.chunks:
-        asked = chunk
+    for batch in full.batches:
+        asked = batch
         if again:
-            heard = np.all(np.isfinite(chunk.fixes.v_n[:, :2]), axis=1)
-            t = full.point.true_time(chunk.fixes.t)
-            asked = replace(chunk, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
+            heard = np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
+            t = full.point.true_time(batch.fixes.t)
+            asked = replace(batch, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
         traces.extend(Engine.through(full, made, asked).traces)
     return traces
 
@@ -154,8 +154,8 @@ def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tu
 
     One contradiction closes the window for the recovery time: a hard landing makes one.
     """
-    t = np.concatenate([c.fixes.t for c in full.chunks])
-    bad = np.concatenate([~c.trusted for c in full.chunks])
+    t = np.concatenate([c.fixes.t for c in full.batches])
+    bad = np.concatenate([~c.trusted for c in full.batches])
     step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
     closed = step * calibrator.trust.rejected.get("gps_glitch", 0)
     if closed <= 2.0 * calibrator.settings.trust.recovery[Reason.GPS_GLITCH]:

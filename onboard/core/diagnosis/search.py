@@ -26,22 +26,22 @@ FAR_BETTER = 1.3
 
 
 def searched(
-    final: Examination, families: Sequence[EffectColumns], weaken: float
+    final: Examination, families: Sequence[EffectColumns], variance_inflation: float
 ) -> list[EffectColumns]:
     """The families, with a product added or put in the place of an impostor.
 
     Args:
         final: the model that was chosen.
         families: its physics.
-        weaken: factor by which evidence is weakened.
+        variance_inflation: factor by which evidence is weakened.
     """
     named = [f for f in families if not isinstance(f, BiasStep)]
-    if not named and final.found().inflation < SUSPICIOUS:
+    if not named and final.found().variance_inflation < SUSPICIOUS:
         return list(families)
-    terms = products(final.chunks)
+    terms = products(final.batches)
     made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
     made.once()
-    fitter = Fitter(made.all_portions, made.model, weaken, made.absent)
+    fitter = Fitter(made.all_blocks, made.model, variance_inflation, made.absent)
     ours = set(made.indices_of([*families, *terms]))
     base = [i for i in range(made.model.size) if i not in ours]
     spent = int(np.ceil(2.0 * np.log(len(terms)) / fitter.log_rows))
@@ -59,7 +59,7 @@ def searched(
             kept = [f for f in kept if f is not family]
             if best[1] not in kept:
                 kept.append(best[1])
-    if final.found().inflation >= SUSPICIOUS and kept == list(families):
+    if final.found().variance_inflation >= SUSPICIOUS and kept == list(families):
         best = _best(fitter, base + made.indices_of(kept), offered)
         if best is not None:
             kept.append(best[1])

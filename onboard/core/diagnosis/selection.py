@@ -1,7 +1,7 @@
 """Which effects to accept: forward selection on the sums, by what holds on data not fitted.
 
-Every question is answered by algebra on the sums of the portions of a flight, in which all
-columns were carried at once: gain in log-likelihood, gain on held-out portions, size against
+Every question is answered by algebra on the sums of the blocks of a flight, in which all
+columns were carried at once: gain in log-likelihood, gain on held-out blocks, size against
 sigma, plausibility.  Whitened rows have unit variance by the noise found *with every column in the
 model*; coloured residuals weaken all gains by a common factor.
 """
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from onboard.core.estimate.solution import FOLDS, solve, total
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model, Unknown
 
@@ -37,29 +37,29 @@ class Fit:
 
 
 class Fitter:
-    """Fits subsets of columns of one set of portions."""
+    """Fits subsets of columns of one set of blocks."""
 
     def __init__(
         self,
-        portions: Sequence[Portion],
+        blocks: Sequence[Block],
         model: Model,
-        weaken: float,
+        variance_inflation: float,
         absent: Array | None = None,
     ) -> None:
-        """Take the portions and the factor by which their information is weakened.
+        """Take the blocks and the factor by which their information is weakened.
 
         ``absent`` (m,) are the values that mean *not in the model*: zero, but for what the
         linearisation has taken in already.
         """
         self.absent = np.zeros(model.size) if absent is None else absent
-        self.portions = list(portions)
+        self.blocks = list(blocks)
         self.model = model
-        self.weaken = weaken
-        self.sums = total(self.portions)
+        self.variance_inflation = variance_inflation
+        self.sums = total(self.blocks)
         self._prior = 1.0 / model.prior_sigma**2
-        folds = np.array_split(np.arange(len(self.portions)), min(FOLDS, len(self.portions)))
+        folds = np.array_split(np.arange(len(self.blocks)), min(FOLDS, len(self.blocks)))
         self._members = [fold for fold in folds if len(fold) > 0]
-        self._folds = [total([self.portions[i] for i in fold]) for fold in self._members]
+        self._folds = [total([self.blocks[i] for i in fold]) for fold in self._members]
 
     @property
     def rows(self) -> float:
@@ -80,13 +80,13 @@ class Fitter:
                 other, _ = self._solve(self.sums - fold, free, at)
                 out += fold.residual(other)
         covariance = np.zeros_like(self.sums.N)
-        covariance[np.ix_(free, free)] = np.linalg.inv(A) * self.weaken
+        covariance[np.ix_(free, free)] = np.linalg.inv(A) * self.variance_inflation
         return Fit(theta, covariance, chi2, out)
 
     def held_fits(
         self, free: Sequence[int], held: Array | None = None
     ) -> list[tuple[NDArray[np.intp], Array]]:
-        """Portions of each fold, and the unknowns (m,) of a fit that has not seen them."""
+        """Blocks of each fold, and the unknowns (m,) of a fit that has not seen them."""
         at = (self.absent if held is None else held).copy()
         pairs = zip(self._members, self._folds, strict=True) if len(self._folds) > 1 else ()
         return [(members, self._solve(self.sums - fold, free, at)[0]) for members, fold in pairs]
@@ -107,10 +107,10 @@ class Fitter:
 
     def gain(self, before: Fit, after: Fit) -> float:
         """Fall of chi-square, weakened."""
-        return (before.chi2 - after.chi2) / self.weaken
+        return (before.chi2 - after.chi2) / self.variance_inflation
 
-    def inflation(self, free: Sequence[int]) -> float:
-        """How much portions contradict each other in a model of ``free``, whole families each."""
+    def variance_inflation_of(self, free: Sequence[int]) -> float:
+        """How much blocks contradict each other in a model of ``free``, whole families each."""
         within, slices = set(free), self.model.slices
         columns = {
             f.name: range(*slices[f.name].indices(self.model.size)) for f in self.model.families
@@ -119,21 +119,19 @@ class Fitter:
         index = [i for f in families for i in columns[f.name]]
         at = self.absent.copy()
         at[index] = 0.0
-        portions = [
-            Portion(p.start, p.end, p.sums.shifted(at).subset(index)) for p in self.portions
-        ]
-        return solve(portions, Model(families)).inflation
+        blocks = [Block(p.start, p.end, p.sums.shifted(at).subset(index)) for p in self.blocks]
+        return solve(blocks, Model(families)).variance_inflation
 
     def held_gain(self, before: Fit, after: Fit) -> float:
         """Fall of held-out chi-square, weakened."""
-        return (before.held_out - after.held_out) / self.weaken
+        return (before.held_out - after.held_out) / self.variance_inflation
 
     def rms(self, fit: Fit) -> float:
         """Whitened root mean square of a fit."""
         return float(np.sqrt(max(self.sums.residual(fit.theta), 0.0) / max(self.rows, 1.0)))
 
     def held_rms(self, fit: Fit) -> float:
-        """Whitened root mean square on held-out portions."""
+        """Whitened root mean square on held-out blocks."""
         return float(np.sqrt(max(fit.held_out, 0.0) / max(self.rows, 1.0)))
 
     @property
@@ -142,17 +140,17 @@ class Fitter:
         return float(np.log(max(self.rows, 2.0)))
 
     def stepped(self, boundary: int) -> Fitter:
-        """The same with three more columns at the end: offsets that jump at a portion's start.
+        """The same with three more columns at the end: offsets that jump at a block's start.
 
-        The jump is the offset's own columns in the portions from ``boundary`` on; the filter's
+        The jump is the offset's own columns in the blocks from ``boundary`` on; the filter's
         memory blurs that by some seconds, which is enough to know where to look closer.
         """
         m = self.model.size
         unknowns = tuple(Unknown(f"jump_{a}", "m/s^2", 0.0, JUMP_SIGMA) for a in "xyz")
         model = Model([*self.model.families, _Jump(unknowns)])
         after = [*range(m), *OFFSETS]
-        portions = []
-        for i, p in enumerate(self.portions):
+        blocks = []
+        for i, p in enumerate(self.blocks):
             sums = NormalSums.zeros(m + 3)
             sums.s, sums.rows, sums.log_det = p.sums.s, p.sums.rows, p.sums.log_det
             sums.G[:m, :m] = p.sums.G
@@ -161,11 +159,13 @@ class Fitter:
                 sums.b[:] = p.sums.b[after]
             else:
                 sums.N[:m, :m], sums.b[:m] = p.sums.N, p.sums.b
-            portions.append(Portion(p.start, p.end, sums))
-        return Fitter(portions, model, self.weaken, np.concatenate([self.absent, np.zeros(3)]))
+            blocks.append(Block(p.start, p.end, sums))
+        return Fitter(
+            blocks, model, self.variance_inflation, np.concatenate([self.absent, np.zeros(3)])
+        )
 
     def jumps(self, free: Sequence[int]) -> list[tuple[int, float]]:
-        """Portions at whose start a jump of the offsets would help: (portion, gain).
+        """Blocks at whose start a jump of the offsets would help: (block, gain).
 
         Not while an EKF that has just begun converges: its attitude jumps then.
         """
@@ -177,12 +177,12 @@ class Fitter:
         at[index] = 0.0
         base = self.fit(index, held_out=False)
         shifted, after = self.sums.shifted(at), None
-        settled = self.portions[0].start + SETTLED_S
+        settled = self.blocks[0].start + SETTLED_S
         out = []
-        for i in range(len(self.portions) - 1, 0, -1):
-            p = self.portions[i].sums.shifted(at)
+        for i in range(len(self.blocks) - 1, 0, -1):
+            p = self.blocks[i].sums.shifted(at)
             after = p if after is None else after + p
-            if self.portions[i].start < settled:
+            if self.blocks[i].start < settled:
                 continue
             N = np.block(
                 [
@@ -198,7 +198,7 @@ class Fitter:
             off = theta - mean
             N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
             chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
-            out.append((i, float(base.chi2 - chi2) / self.weaken))
+            out.append((i, float(base.chi2 - chi2) / self.variance_inflation))
         return out
 
 

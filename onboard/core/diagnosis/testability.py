@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.diagnosis.records import NotTestable
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import EffectColumns
 
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
@@ -20,12 +20,12 @@ BY_NATURE = (
 
 
 def testable_of(
-    everything: Sequence[EffectColumns], chunks: Sequence[Chunk]
+    everything: Sequence[EffectColumns], batches: Sequence[Batch]
 ) -> tuple[list[EffectColumns], list[NotTestable]]:
     """Effects whose signals are there and change, and why the others cannot be asked for."""
     present: list[EffectColumns] = []
     absent = list(BY_NATURE)
-    names = set.intersection(*(set(c.stretch.slow) for c in chunks)) if chunks else set()
+    names = set.intersection(*(set(c.segment.slow) for c in batches)) if batches else set()
     for effect in everything:
         missing = [n for n in effect.needs if n not in names]
         if missing:
@@ -33,7 +33,7 @@ def testable_of(
                 NotTestable(effect.effect, f"no {' and '.join(missing)} in the recording")
             )
             continue
-        still = [n for n in effect.needs if _spread(chunks, n) < LEAST_SPREAD.get(n, 0.0)]
+        still = [n for n in effect.needs if _spread(batches, n) < LEAST_SPREAD.get(n, 0.0)]
         if still:
             absent.append(NotTestable(effect.effect, f"{' and '.join(still)} did not change"))
             continue
@@ -41,21 +41,21 @@ def testable_of(
     return present, absent
 
 
-def _spread(chunks: Sequence[Chunk], name: str) -> float:
-    values = [np.atleast_2d(c.stretch.slow[name][1].T) for c in chunks]
+def _spread(batches: Sequence[Batch], name: str) -> float:
+    values = [np.atleast_2d(c.segment.slow[name][1].T) for c in batches]
     joined = np.concatenate(values, axis=1)
     return float(np.max(np.percentile(joined, 98, axis=1) - np.percentile(joined, 2, axis=1)))
 
 
-def unseen_share(chunks: Sequence[Chunk], name: str) -> float:
+def unseen_share(batches: Sequence[Batch], name: str) -> float:
     """Share of a slow signal's variance that straight lines between its samples may miss.
 
     Of a signal that wanders they miss a third of what lines between every other sample miss at
     those left out; never more than :data:`MOST_UNSEEN`.
     """
     missed, values = [], []
-    for chunk in chunks:
-        x = chunk.stretch.slow[name][1].T
+    for batch in batches:
+        x = batch.segment.slow[name][1].T
         values.append(np.atleast_2d(x))
         missed.append(np.atleast_2d(x[..., 1:-1] - (x[..., 2:] + x[..., :-2]) / 2.0))
     whole = np.var(np.concatenate(values, axis=1), axis=1).sum()

@@ -24,7 +24,7 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 
 CHI_SQUARE_6_999: Final = 22.46
 """Exceeded once in a thousand times by a chi-square of six degrees of freedom."""
@@ -42,12 +42,10 @@ def agrees(engine: Engine, saved: SavedEngine) -> bool | None:
     found = engine.solution()
     if found is None:
         return None
-    if {p.sums.size for p in saved.portions} != {engine.model.size}:
+    if {p.sums.size for p in saved.blocks} != {engine.model.size}:
         return False
     shift = engine.shift(saved.point, engine.point)
-    then = solve(
-        [Portion(p.start, p.end, p.sums.shifted(shift)) for p in saved.portions], engine.model
-    )
+    then = solve([Block(p.start, p.end, p.sums.shifted(shift)) for p in saved.blocks], engine.model)
     apart = found.theta[:6] - then.theta[:6]
     both = found.covariance[:6, :6] + then.covariance[:6, :6]
     if float(apart @ np.linalg.solve(both, apart)) > CHI_SQUARE_6_999:

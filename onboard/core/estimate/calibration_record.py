@@ -24,7 +24,7 @@ OFFSET_FLOOR = 1e-3
 """What the model does not know (filters, interpolation, clocks) limits every flight to this."""
 FEWEST_OBSERVED = 3
 CONTRADICTION = 6.0
-"""Inflation of the variance past which portions of one flight ask for different parameters."""
+"""Inflation of the variance past which blocks of one flight ask for different parameters."""
 
 
 def calibration_of(
@@ -57,7 +57,7 @@ def calibration_of(
     held_scale, held_offset = np.array(in_force.scale), np.array(in_force.offset)
     force_six = np.concatenate([held_scale, -held_scale * held_offset])
     fixed = {i: float(x) for i, x in enumerate(force_six)}
-    portions, model = engine.all_portions, engine.model
+    blocks, model = engine.all_blocks, engine.model
     sigma = np.sqrt(np.diag(covariance))
     long, short = _drifts(engine, force_six, solution.theta[:6])
     return Calibration(
@@ -76,10 +76,10 @@ def calibration_of(
         timing=timing_of(engine, solution),
         trusted_s=engine.trusted_s,
         rejected=refused,
-        whitened_rms_before=fitted_rms(portions, model, fixed),
-        whitened_rms_after=fitted_rms(portions, model),
-        held_out_before=held_out(portions, model, fixed),
-        held_out_after=held_out(portions, model),
+        whitened_rms_before=fitted_rms(blocks, model, fixed),
+        whitened_rms_after=fitted_rms(blocks, model),
+        held_out_before=held_out(blocks, model, fixed),
+        held_out_after=held_out(blocks, model),
         velocity_rms_before=float("nan") if short is None else float(short.rms[0]),
         velocity_rms_after=float("nan") if short is None else float(short.rms[1]),
         coverage=seen.coverage,
@@ -161,7 +161,7 @@ def _status(
     if not engine.moving:
         note = "hovering or standing: fly fast, brake hard, turn both ways. " + note
         return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
-    doubt = solution.inflation > CONTRADICTION
+    doubt = solution.variance_inflation > CONTRADICTION
     if doubt:
         note = (
             "the flight contradicts itself: something is missing from the model, "
@@ -189,7 +189,7 @@ def _certificate(engine: Engine) -> Certificate | None:
 
 def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, Drift | None]:
     """Free drift over 60 s and over 10 s, parameters in force against the estimate."""
-    chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
+    chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
     states = list(engine.states)
     return (
         free_drift(chain, states, (before, after), horizon_s=60.0),
@@ -198,7 +198,7 @@ def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, 
 
 
 def _temperature(engine: Engine) -> Estimate | None:
-    slow = [c.stretch.slow for c in engine.chunks]
+    slow = [c.segment.slow for c in engine.batches]
     values = [s["temperature"][1] for s in slow if "temperature" in s]
     if not values:
         return None

@@ -1,6 +1,6 @@
 """The door of the core: samples in, calibrations out.
 
-Live stream and recording go the same way: decoder, :meth:`Calibrator.feed`, chunks of about ten
+Live stream and recording go the same way: decoder, :meth:`Calibrator.feed`, batches of about ten
 seconds, one :class:`~onboard.core.estimate.engine.Engine` per accelerometer.  Nothing here depends
 on when a sample is handed in, only on the order of samples and on their own times, so the result of
 a stream and of its recording are the same numbers.
@@ -38,7 +38,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Seconds, merged
@@ -49,7 +49,7 @@ OTHER_CLOCK_S = 60.0
 AHEAD_OF_IMU_S = 5.0
 """Nor is one further ahead: taken in, a single such stamp would make all that follow late."""
 MOST_SAVED = 16
-"""Portions that are saved: enough for folds and clusters."""
+"""Blocks that are saved: enough for folds and clusters."""
 MOST_WAITING = 4
 """Sums of earlier starts that wait for a flight that agrees with them, the latest."""
 BACKWARDS_S = 1.0
@@ -66,7 +66,7 @@ class Restarted:
 
 @dataclass(frozen=True, slots=True)
 class Advanced:
-    """A chunk of flight was processed: calibrations have changed."""
+    """A batch of flight was processed: calibrations have changed."""
 
     t: float
 
@@ -237,8 +237,8 @@ class Calibrator:
         """Sums of every accelerometer, to go on with after a restart."""
         saved = []
         for imu, engine in sorted(self._engines.items()):
-            portions = merged(engine.all_portions, MOST_SAVED)
-            if portions:
+            blocks = merged(engine.all_blocks, MOST_SAVED)
+            if blocks:
                 prior = engine.model.prior[:6]
                 saved.append(
                     SavedEngine(
@@ -248,7 +248,7 @@ class Calibrator:
                         engine.point,
                         engine.noise,
                         Seconds(engine.trusted_s, engine.brisk_s),
-                        tuple(portions),
+                        tuple(blocks),
                     )
                 )
         # What waits for a flight that agrees with it is not lost by one that says too little.
@@ -312,7 +312,7 @@ class Calibrator:
             del waiting[:-MOST_WAITING]
         elif opinion:
             self._counts["restored"] += 1
-            engine.restore(saved.portions, saved.point, saved.seconds)
+            engine.restore(saved.blocks, saved.point, saved.seconds)
         else:
             self._counts["saved_contradicted"] += 1
 
@@ -383,18 +383,18 @@ class Calibrator:
         return (*events, FlightEnded(state.t))
 
     def _advance(self, *, everything: bool = False) -> tuple[Event, ...]:
-        made: dict[int, list[Chunk]] = self._assembly.take(
+        made: dict[int, list[Batch]] = self._assembly.take(
             self.parameters, everything=everything, grounded=self._ground.grounded
         )
         newest = -np.inf
-        for imu, chunks in made.items():
+        for imu, batches in made.items():
             if self._only and imu not in self._only:
                 continue
-            for chunk in chunks:
-                self._engine_of(imu).add(chunk)
-                newest = max(newest, float(chunk.fixes.t[-1]))
+            for batch in batches:
+                self._engine_of(imu).add(batch)
+                newest = max(newest, float(batch.fixes.t[-1]))
         self.flown_s += max(
-            (sum(c.trusted_s for c in chunks) for chunks in made.values()), default=0.0
+            (sum(c.trusted_s for c in batches) for batches in made.values()), default=0.0
         )
         return (Advanced(float(newest)),) if np.isfinite(newest) else ()
 

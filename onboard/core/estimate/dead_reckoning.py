@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.filter.traces import EpochState
-from onboard.core.inputs.segments import Fixes, Stretch
+from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
@@ -142,12 +142,12 @@ def free_errors(
     return FreeErrors(np.concatenate(times), np.concatenate(errors, axis=1))
 
 
-def intervals(pieces: Sequence[tuple[Stretch, Fixes]], point: Linearisation) -> list[Interval]:
-    """Integrals between the epochs of chunks of flight, each with its fixes, in order of time.
+def intervals(pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> list[Interval]:
+    """Integrals between the epochs of batches of flight, each with its fixes, in order of time.
 
     ``point`` is the linearisation (GPS latency, averaging span).
     """
-    return [x for stretch, fixes in pieces for x in Interval.of_piece(stretch, fixes, point)]
+    return [x for segment, fixes in pieces for x in Interval.of_piece(segment, fixes, point)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,13 +163,13 @@ class Interval:
     velocity: Array
 
     @staticmethod
-    def of_piece(stretch: Stretch, fixes: Fixes, point: Linearisation) -> list[Interval]:
-        """Those of one chunk."""
+    def of_piece(segment: Segment, fixes: Fixes, point: Linearisation) -> list[Interval]:
+        """Those of one batch."""
         t = point.true_time(fixes.t)
         if len(t) < 2:
             return []
-        nodes = NodeMaker(stretch, np.zeros(3), point.six).intervals(t[:-1], t[1:])
-        by_scale = nodes.integrals(stretch.R_bs * nodes.signals.raw_s[..., None, :])[0]
+        nodes = NodeMaker(segment, np.zeros(3), point.six).intervals(t[:-1], t[1:])
+        by_scale = nodes.integrals(segment.R_bs * nodes.signals.raw_s[..., None, :])[0]
         eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
         whole = nodes.integrals(eye)[0]
         return [
@@ -178,7 +178,7 @@ class Interval:
                 float(t[k + 1]),
                 nodes.P[k, -1],
                 by_scale[k],
-                whole[k] @ stretch.R_bs,
+                whole[k] @ segment.R_bs,
                 whole[k],
                 fixes.v_n[k + 1],
             )

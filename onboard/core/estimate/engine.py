@@ -1,4 +1,4 @@
-"""One accelerometer's estimator: buffered chunks of flight, passes over them, one solution.
+"""One accelerometer's estimator: buffered batches of flight, passes over them, one solution.
 
 Sums are only as good as the point about which latency, averaging span and noise were taken.  So
 the last minutes of flight are kept; after :attr:`EstimatorSettings.refine_at_s` of trusted
@@ -19,9 +19,9 @@ from onboard.core.filter.noise import NoiseLevels, distance, line, star, stepped
 from onboard.core.filter.passes import Pass, PassResult
 from onboard.core.filter.traces import EpochState
 from onboard.core.filter.whitening import Uses
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion, Seconds, merged
+from onboard.core.maths.blocks import Block, Seconds, merged
 from onboard.core.model.linearisation import MOVING, Linearisation
 from onboard.core.model.nuisances import (
     AntennaPlace,
@@ -132,9 +132,9 @@ class Engine:
         self.point = point or Linearisation()
         self.noise = noise or NoiseLevels()
         self.uses = uses or Uses()
-        self.chunks: list[Chunk] = []
-        self.aged: list[Portion] = []
-        self.portions: list[Portion] = []
+        self.batches: list[Batch] = []
+        self.aged: list[Block] = []
+        self.blocks: list[Block] = []
         self.refused: Counter[str] = Counter()
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
@@ -176,43 +176,43 @@ class Engine:
         """Trusted seconds since the last refinement."""
         return self.trusted_s - self._refined_s
 
-    def add(self, chunk: Chunk) -> None:
-        """Process a chunk; refine when it is time."""
-        self.chunks.append(chunk)
-        self._buffered_s += chunk.duration
-        before, self.trusted_s = self.trusted_s, self.trusted_s + chunk.trusted_s
-        self._run(chunk)
+    def add(self, batch: Batch) -> None:
+        """Process a batch; refine when it is time."""
+        self.batches.append(batch)
+        self._buffered_s += batch.duration
+        before, self.trusted_s = self.trusted_s, self.trusted_s + batch.trusted_s
+        self._run(batch)
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
             self.refine()
         self._age()
 
-    def _run(self, chunk: Chunk) -> None:
-        result = self.through(self._pass, chunk)
-        self.portions.append(result.portion)
+    def _run(self, batch: Batch) -> None:
+        result = self.through(self._pass, batch)
+        self.blocks.append(result.block)
         self.refused.update(result.refused)
         self.states.extend(result.states)
         self._solution = None
 
-    def through(self, made: Pass, chunk: Chunk) -> PassResult:
-        """One chunk through a pass; a filter that coasted too long begins anew."""
-        if chunk.fresh or chunk.fixes.t[0] - made.coasting_since > self.settings.coast_s:
+    def through(self, made: Pass, batch: Batch) -> PassResult:
+        """One batch through a pass; a filter that coasted too long begins anew."""
+        if batch.fresh or batch.fixes.t[0] - made.coasting_since > self.settings.coast_s:
             made.restart()
-        return made.process(chunk.stretch, chunk.fixes, chunk.trusted)
+        return made.process(batch.segment, batch.fixes, batch.trusted)
 
     def _age(self) -> None:
         """Let flight leave the buffer; forget slowly what has left it."""
-        while self._buffered_s > self.settings.buffer_s and len(self.chunks) > 1:
+        while self._buffered_s > self.settings.buffer_s and len(self.batches) > 1:
             if not self._frozen:
                 self.refine()
                 self._frozen = True
-            gone = self.chunks.pop(0)
+            gone = self.batches.pop(0)
             self._buffered_s -= gone.duration
             self.left_brisk_s += gone.seconds_above(self.settings.brisk_speed)
-            self.aged.append(self.portions.pop(0))
+            self.aged.append(self.blocks.pop(0))
             keep = float(np.exp(-gone.duration / self.settings.memory_s))
-            self.aged = [Portion(p.start, p.end, p.sums.scaled(keep)) for p in self.aged]
-            # A few dozen portions are enough for folds and clusters.
+            self.aged = [Block(p.start, p.end, p.sums.scaled(keep)) for p in self.aged]
+            # A few dozen blocks are enough for folds and clusters.
             if len(self.aged) > MOST_AGED:
                 self.aged = merged(self.aged, MOST_AGED)
 
@@ -223,15 +223,15 @@ class Engine:
             rounds: passes at the most.
             noise_rounds: how many of them try other noise levels too.
         """
-        if not self.chunks or self._frozen:
+        if not self.batches or self._frozen:
             return
         self.tune(rounds, noise_rounds)
         self._pass = self._new_pass()
         self.refused.clear()
         self.states.clear()
-        self.portions = []
-        for chunk in self.chunks:
-            self._run(chunk)
+        self.blocks = []
+        for batch in self.batches:
+            self._run(batch)
         self._pass.release()
         self._refined_s = self.trusted_s
 
@@ -256,18 +256,18 @@ class Engine:
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = self.shift(self.point, point)
-        self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
+        self.aged = [Block(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
         self.point, self.noise = point, levels
         self.model = self._model()
 
-    def _over_buffer(self, made: Pass) -> list[Portion]:
-        return [self.through(made, chunk).portion for chunk in self.chunks]
+    def _over_buffer(self, made: Pass) -> list[Block]:
+        return [self.through(made, batch).block for batch in self.batches]
 
     @property
     def brisk_s(self) -> float:
         """Trusted flight faster than :attr:`EstimatorSettings.brisk_speed`, s."""
         fast = self.settings.brisk_speed
-        return self.left_brisk_s + sum(c.seconds_above(fast) for c in self.chunks)
+        return self.left_brisk_s + sum(c.seconds_above(fast) for c in self.batches)
 
     @property
     def moving(self) -> bool:
@@ -282,7 +282,7 @@ class Engine:
             shift[self.model.index[name]] = to - origin
         return shift
 
-    def restore(self, earlier: Sequence[Portion], about: Linearisation, seconds: Seconds) -> None:
+    def restore(self, earlier: Sequence[Block], about: Linearisation, seconds: Seconds) -> None:
         """Take the sums of earlier flights.
 
         Args:
@@ -291,11 +291,11 @@ class Engine:
             seconds: how much flight is behind them.
         """
         shift = self.shift(about, self.point)
-        self.aged = [Portion(p.start, p.end, p.sums.shifted(shift)) for p in earlier] + self.aged
+        self.aged = [Block(p.start, p.end, p.sums.shifted(shift)) for p in earlier] + self.aged
         self.trusted_s += seconds.trusted
         self._refined_s += seconds.trusted
         self.left_brisk_s += seconds.brisk
-        self._seed = self._solution = solve(self.all_portions, self.model)
+        self._seed = self._solution = solve(self.all_blocks, self.model)
 
     def finish(self) -> None:
         """End of a recording or a flight: refine once more if there is something new."""
@@ -305,16 +305,16 @@ class Engine:
             self.refine()
 
     @property
-    def all_portions(self) -> list[Portion]:
-        """Aged and buffered portions, in order of time."""
-        return [*self.aged, *self.portions]
+    def all_blocks(self) -> list[Block]:
+        """Aged and buffered blocks, in order of time."""
+        return [*self.aged, *self.blocks]
 
     def solution(self) -> Solution | None:
-        """Solve the sums; None before the first chunk."""
-        if self._solution is None and self.all_portions:
-            self._solution = solve(self.all_portions, self.model)
+        """Solve the sums; None before the first batch."""
+        if self._solution is None and self.all_blocks:
+            self._solution = solve(self.all_blocks, self.model)
         return self._solution
 
     def total_rows(self) -> float:
         """Rows behind the solution."""
-        return total(self.all_portions).rows if self.all_portions else 0.0
+        return total(self.all_blocks).rows if self.all_blocks else 0.0

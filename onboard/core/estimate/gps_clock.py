@@ -28,7 +28,7 @@ from typing import Final
 import numpy as np
 
 from onboard.core.inputs.parameters import ParametersInForce
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 
 U_BLOX: Final = (0.12, 0.22)
 """Generation 7 and later, and older ones; which it is, telemetry does not say."""
@@ -81,10 +81,10 @@ class FixClock:
         return max(away, default=float("inf"))
 
 
-def fix_clock(parameters: ParametersInForce, chunks: Sequence[Chunk]) -> FixClock:
+def fix_clock(parameters: ParametersInForce, batches: Sequence[Batch]) -> FixClock:
     """The clock of the receiver in a flight."""
     told, values = parameters.gps_delay_told, parameters.values
-    late = [c.fixes.late[c.trusted] for c in chunks if len(c.fixes.late)]
+    late = [c.fixes.late[c.trusted] for c in batches if len(c.fixes.late)]
     every = np.concatenate(late) if late else np.zeros(0)
     kind = parameters.get("GPS1_TYPE", "GPS_TYPE", default=-1.0)
     assumed = DRIVERS.get(int(kind), OTHERS) if kind >= 0.0 else ()

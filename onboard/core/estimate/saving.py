@@ -15,7 +15,7 @@ from typing import Any
 
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.maths.arrays import Vector3
-from onboard.core.maths.blocks import Portion, Seconds
+from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.errors import StateError
@@ -38,7 +38,7 @@ class SavedEngine:
     point: Linearisation
     noise: NoiseLevels
     seconds: Seconds
-    portions: tuple[Portion, ...]
+    blocks: tuple[Block, ...]
 
 
 def dump(engines: list[SavedEngine]) -> bytes:
@@ -57,7 +57,7 @@ def dump(engines: list[SavedEngine]) -> bytes:
                     "end": p.end,
                     "sums": base64.b64encode(p.sums.to_bytes()).decode("ascii"),
                 }
-                for p in e.portions
+                for p in e.blocks
             ],
         }
         for e in engines
@@ -93,15 +93,15 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
     prior = tuple(_finite(x) for x in e["prior"])
     if len(prior) != 6:
         raise StateError("saved state is damaged: the prior is not six numbers")
-    portions = tuple(
-        Portion(
+    blocks = tuple(
+        Block(
             _finite(p["start"]),
             _finite(p["end"]),
             NormalSums.from_bytes(base64.b64decode(p["sums"], validate=True)),
         )
         for p in e["portions"]
     )
-    if not portions:
+    if not blocks:
         raise StateError("saved state is damaged: an accelerometer without sums")
     noise = NoiseLevels(**{k: _finite(v) for k, v in e["noise"].items()})
     if min(asdict(noise).values()) <= 0.0:
@@ -120,7 +120,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
         ),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
-        portions,
+        blocks,
     )
 
 

@@ -20,7 +20,7 @@ class EstimatorSettings:
         refine_at_s: trusted seconds after which timing and noise are estimated anew.
         refine: estimate timing and noise at all; False where a diagnosis will do it itself.
         minimum_s: trusted seconds below which nothing is called calibrated.
-        coast_s: longest stretch without an accepted fix that is bridged inertially, s.
+        coast_s: longest segment without an accepted fix that is bridged inertially, s.
         brisk_speed: m/s; a hover wanders slower.
         brisk_s: seconds faster than that which are enough however long the vehicle hovered.
         brisk_share: share of a shorter flight that is enough.

@@ -2,7 +2,7 @@
 
 The whitened rows are independent only as far as the noise model is right.  Residuals of real
 flights are coloured, so the inverse of the sums alone is optimistic; the scatter of the score
-(``b_i - N_i theta``) over portions of the flight says by how much (Huber 1967, White 1980;
+(``b_i - N_i theta``) over blocks of the flight says by how much (Huber 1967, White 1980;
 clustered by time), and the data are weakened against the prior by that factor.
 """
 
@@ -15,14 +15,14 @@ from functools import reduce
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model
 
 FOLDS = 8
 GRAM_DOUBT = 0.5
 """Relative uncertainty of the noise that was taken out of the columns: its spectrum is a guess."""
-FEWEST_PORTIONS = 6
+FEWEST_BLOCKS = 6
 ONE_IN_A_THOUSAND = 3.09
 """Standard normal deviate that is exceeded once in a thousand times."""
 MOST_NOISE = 0.9
@@ -37,7 +37,7 @@ class Solution:
         theta: (m,) estimate with the prior.
         covariance: (m, m) of it, inflated for coloured residuals.
         information: (m, m) of the data alone, deflated by the same factor.
-        inflation: factor on the variance, at least 1.
+        variance_inflation: factor on the variance, at least 1.
         chi2: mean square of the whitened residual.
         rows: number of rows behind it.
     """
@@ -45,14 +45,14 @@ class Solution:
     theta: Array
     covariance: Array
     information: Array
-    inflation: float
+    variance_inflation: float
     chi2: float
     rows: float
 
 
-def total(portions: Sequence[Portion]) -> NormalSums:
-    """Sum over portions (at least one)."""
-    return reduce(lambda a, b: a + b, (p.sums for p in portions))
+def total(blocks: Sequence[Block]) -> NormalSums:
+    """Sum over blocks (at least one)."""
+    return reduce(lambda a, b: a + b, (p.sums for p in blocks))
 
 
 def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
@@ -68,9 +68,9 @@ def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
     return G if share <= MOST_NOISE else G * (MOST_NOISE / share)
 
 
-def solve(portions: Sequence[Portion], model: Model) -> Solution:
+def solve(blocks: Sequence[Block], model: Model) -> Solution:
     """Maximum a posteriori estimate with a covariance that the residuals confirm."""
-    sums = total(portions)
+    sums = total(blocks)
     prior = np.diag(1.0 / model.prior_sigma**2)
     G = _limited_gram(sums, prior)
     share = np.divide(
@@ -79,42 +79,42 @@ def solve(portions: Sequence[Portion], model: Model) -> Solution:
     D = sums.N - G
     theta = np.linalg.solve(D + prior, sums.b + prior @ model.prior)
     chi2 = sums.residual(theta) / max(sums.rows, 1.0)
-    inflation = max(1.0, chi2, _cluster_factor(portions, share, theta, D + prior, model))
-    A = D / inflation + prior
-    theta = np.linalg.solve(A, sums.b / inflation + prior @ model.prior)
+    variance_inflation = max(1.0, chi2, _cluster_factor(blocks, share, theta, D + prior, model))
+    A = D / variance_inflation + prior
+    theta = np.linalg.solve(A, sums.b / variance_inflation + prior @ model.prior)
     inverse = np.linalg.inv(A)
     # Sandwich: the rows carry D + G of information, of which G is not signal.
-    doubt = (GRAM_DOUBT * G) / inflation
-    spread = (D + G) / inflation + prior + doubt @ np.diag(theta**2) @ doubt
+    doubt = (GRAM_DOUBT * G) / variance_inflation
+    spread = (D + G) / variance_inflation + prior + doubt @ np.diag(theta**2) @ doubt
     covariance = inverse @ spread @ inverse
     middle = np.linalg.pinv(spread - prior, hermitian=True)
-    information = (D / inflation) @ middle @ (D / inflation)
+    information = (D / variance_inflation) @ middle @ (D / variance_inflation)
     return Solution(
         theta,
         (covariance + covariance.T) / 2,
         (information + information.T) / 2,
-        inflation,
+        variance_inflation,
         chi2,
         sums.rows,
     )
 
 
 def _cluster_factor(
-    portions: Sequence[Portion], share: Array, theta: Array, A: Array, model: Model
+    blocks: Sequence[Block], share: Array, theta: Array, A: Array, model: Model
 ) -> float:
-    """How much wider the scatter of the portions' scores is than the sums say.
+    """How much wider the scatter of the blocks' scores is than the sums say.
 
     Ratio of clustered to expected variance of each of the six: their mean while all could be one
     noise, else the largest, for an offset that changes half-way shows in that offset alone.  What
-    is expected of a portion is less than its information, for the fit has followed it.  1 while
-    there are fewer than :data:`FEWEST_PORTIONS`.
+    is expected of a block is less than its information, for the fit has followed it.  1 while
+    there are fewer than :data:`FEWEST_BLOCKS`.
     """
-    if len(portions) < FEWEST_PORTIONS or "six" not in model.slices:
+    if len(blocks) < FEWEST_BLOCKS or "six" not in model.slices:
         return 1.0
     six = model.slices["six"]
     back = np.linalg.inv(A)[six]
-    found, expected = np.zeros((2, len(portions), len(back)))
-    for i, p in enumerate(portions):
+    found, expected = np.zeros((2, len(blocks), len(back)))
+    for i, p in enumerate(blocks):
         N = p.sums.N
         score = p.sums.b - (N - np.diag(share * np.diag(p.sums.G))) @ theta
         found[i] = (back @ score) ** 2
@@ -123,9 +123,9 @@ def _cluster_factor(
     expected = np.maximum(expected, 0.0)
     sum_expected = np.maximum(expected.sum(axis=0), 1e-30)
     ratio = found.sum(axis=0) / sum_expected
-    # Portions that say nothing of a number do not count for it (Satterthwaite 1946).
-    portions_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
-    beyond = ratio > _chance(portions_that_count)
+    # Blocks that say nothing of a number do not count for it (Satterthwaite 1946).
+    blocks_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
+    beyond = ratio > _chance(blocks_that_count)
     return float(ratio[beyond].max() if beyond.any() else ratio.mean())
 
 
@@ -139,30 +139,28 @@ def _chance(n: Array) -> Array:
     return out
 
 
-def held_out(
-    portions: Sequence[Portion], model: Model, fixed: dict[int, float] | None = None
-) -> float:
-    """Root mean square whitened residual on portions that the fit did not see.
+def held_out(blocks: Sequence[Block], model: Model, fixed: dict[int, float] | None = None) -> float:
+    """Root mean square whitened residual on blocks that the fit did not see.
 
     Args:
-        portions: in order of time.
+        blocks: in order of time.
         model: with its prior.
         fixed: unknowns held at a value instead of fitted (the parameters in force).
 
     Returns:
-        Dimensionless; NaN with fewer than two portions.
+        Dimensionless; NaN with fewer than two blocks.
     """
-    if len(portions) < 2:
+    if len(blocks) < 2:
         return float("nan")
-    everything = total(portions)
+    everything = total(blocks)
     prior = np.diag(1.0 / model.prior_sigma**2)
     free = [i for i in range(model.size) if not fixed or i not in fixed]
     held = np.zeros(model.size)
     for i, value in (fixed or {}).items():
         held[i] = value
     square, rows = 0.0, 0.0
-    for fold in np.array_split(np.arange(len(portions)), min(FOLDS, len(portions))):
-        out = total([portions[i] for i in fold])
+    for fold in np.array_split(np.arange(len(blocks)), min(FOLDS, len(blocks))):
+        out = total([blocks[i] for i in fold])
         rest = everything - out
         theta = held.copy()
         A = (rest.N - rest.G + prior)[np.ix_(free, free)]
@@ -174,10 +172,10 @@ def held_out(
 
 
 def fitted_rms(
-    portions: Sequence[Portion], model: Model, fixed: dict[int, float] | None = None
+    blocks: Sequence[Block], model: Model, fixed: dict[int, float] | None = None
 ) -> float:
     """Root mean square whitened residual of the fit itself, some unknowns held if wanted."""
-    sums = total(portions)
+    sums = total(blocks)
     prior = np.diag(1.0 / model.prior_sigma**2)
     free = [i for i in range(model.size) if not fixed or i not in fixed]
     theta = np.zeros(model.size)

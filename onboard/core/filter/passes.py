@@ -1,4 +1,4 @@
-"""One pass of the whitening filter over stretches of flight: columns in, sums out."""
+"""One pass of the whitening filter over segments of flight: columns in, sums out."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.regressor_noise import sample_noise_density
 from onboard.core.filter.traces import EpochState, EpochTrace
 from onboard.core.filter.whitening import Uses, WhiteningFilter
-from onboard.core.inputs.segments import Fixes, Stretch
+from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import Around, Intervals, NodeMaker
-from onboard.core.model.regressors import Model, StretchColumns
+from onboard.core.model.regressors import Model, SegmentColumns
 from onboard.core.model.smoothing import mean_weights
 
 LONGEST_STEP_S = 0.26
@@ -30,9 +30,9 @@ HEADING_START = 0.2
 
 @dataclass(slots=True)
 class PassResult:
-    """What :meth:`Pass.process` adds for one stretch."""
+    """What :meth:`Pass.process` adds for one segment."""
 
-    portion: Portion
+    block: Block
     states: list[EpochState] = field(default_factory=list)
     traces: list[EpochTrace] = field(default_factory=list)
     refused: dict[str, int] = field(default_factory=dict)
@@ -40,7 +40,7 @@ class PassResult:
 
 
 class Pass:
-    """Runs a filter through consecutive stretches; keeps its state between them."""
+    """Runs a filter through consecutive segments; keeps its state between them."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class Pass:
 
     @property
     def running(self) -> bool:
-        """True while the filter holds a state that the next stretch continues."""
+        """True while the filter holds a state that the next segment continues."""
         return self._running
 
     @property
@@ -98,7 +98,7 @@ class Pass:
         return self._last_velocity_t
 
     def restart(self) -> None:
-        """Forget the filter's state (a gap): the next stretch begins a new one.  Sums stay."""
+        """Forget the filter's state (a gap): the next segment begins a new one.  Sums stay."""
         self._running = False
 
     def hold(self, theta: Array, covariance: Array) -> None:
@@ -121,11 +121,11 @@ class Pass:
             out.append(-0.5 * (self.log_det[i] + chi2 + float(np.linalg.slogdet(A)[1])))
         return out
 
-    def process(self, stretch: Stretch, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
+    def process(self, segment: Segment, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
         """Go through the epochs ``fixes``; when running, the first is the last one of before.
 
         Args:
-            stretch: samples that cover the epochs and 0.3 s to either side.
+            segment: samples that cover the epochs and 0.3 s to either side.
             fixes: GPS epochs on the boot clock as stamped (delay not removed).
             trusted: (n,) whether the receiver is to be believed there.
         """
@@ -133,24 +133,24 @@ class Pass:
             first_good = _first_believed(fixes, trusted)
             if len(fixes) - first_good < 2:
                 at = float(fixes.t[-1])
-                return PassResult(Portion(at, at, NormalSums.zeros(self.model.size)))
+                return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
             fixes, trusted = fixes.between(first_good, len(fixes)), trusted[first_good:]
         epoch_t = self.point.true_time(fixes.t)
         maker = NodeMaker(
-            stretch, self.bias_b, self.point.six, recorded_attitude=self.uses.recorded_attitude
+            segment, self.bias_b, self.point.six, recorded_attitude=self.uses.recorded_attitude
         )
         start, end, measured = _subdivide(epoch_t)
         intervals = maker.intervals(start, end)
         around = maker.around(epoch_t, self.point.window)
         columns = self.model.columns(intervals, around)
-        epochs = self._epoch_list(stretch, fixes, trusted, around, columns)
-        result = PassResult(Portion(float(epoch_t[0]), float(epoch_t[-1]), NormalSums.zeros(0)))
+        epochs = self._epoch_list(segment, fixes, trusted, around, columns)
+        result = PassResult(Block(float(epoch_t[0]), float(epoch_t[-1]), NormalSums.zeros(0)))
         before = (self.N[0].copy(), self.b[0].copy(), self.s[0], self.log_det[0], self.rows)
         noise = self.filter.column_noise
         gram = None if noise is None else noise.gram.copy()
         if not self._running:
             first = epochs[0]
-            R0 = self.point.attitude(stretch, epoch_t[:1])[0][0]
+            R0 = self.point.attitude(segment, epoch_t[:1])[0][0]
             self.filter.start(first, R0, TILT_START, HEADING_START)
             self._running = True
             self._last_velocity_t = first.t
@@ -171,7 +171,7 @@ class Pass:
             if e < 0:
                 continue
             if self.uses.recorded_attitude:
-                self.filter.R_nb = self.point.attitude(stretch, epoch_t[e : e + 1])[0][0]
+                self.filter.R_nb = self.point.attitude(segment, epoch_t[e : e + 1])[0][0]
             rows = self.filter.update(epochs[e], self.theta, self.covariance)
             result.epochs += 1
             if rows is not None:
@@ -190,8 +190,8 @@ class Pass:
         sums.log_det = float(self.log_det[0] - before[3])
         sums.rows = float(self.rows - before[4])
         if noise is not None and gram is not None:
-            self._noise_in_columns(sums, stretch, noise.gram - gram)
-        result.portion.sums = sums
+            self._noise_in_columns(sums, segment, noise.gram - gram)
+        result.block.sums = sums
         return result
 
     def _state(self, rows: Rows) -> EpochState:
@@ -239,35 +239,35 @@ class Pass:
             self.covariance = np.linalg.inv(self.N[0] + self._information)
             self.theta = self.covariance @ (self.b[0] + self._prior_b)
 
-    def _noise_in_columns(self, sums: NormalSums, stretch: Stretch, gram: Array) -> None:
+    def _noise_in_columns(self, sums: NormalSums, segment: Segment, gram: Array) -> None:
         """Expected Gram of accelerometer noise in the scale columns (errors in variables)."""
         if "six" not in self.model.slices:
             return
         # What looks like noise sample by sample may be a tone that integrates to nothing; the
         # velocity's random walk, found from the residuals, is all that it can amount to.
         density = np.minimum(
-            sample_noise_density(stretch.t, stretch.raw_s), self.filter.bank[0].force_walk ** 2
+            sample_noise_density(segment.t, segment.raw_s), self.filter.bank[0].force_walk ** 2
         )
         at = self.model.slices["six"].start
         # Axis columns of the Gram are body axes; the sensor's are permuted or mixed by R_bs.
-        sensor = (stretch.R_bs**2).T @ gram
+        sensor = (segment.R_bs**2).T @ gram
         for j in range(3):
             sums.G[at + j, at + j] = density[j] * sensor[j]
 
     def _epoch_list(
         self,
-        stretch: Stretch,
+        segment: Segment,
         fixes: Fixes,
         trusted: NDArray[np.bool_],
         around: Around,
-        c: StretchColumns,
+        c: SegmentColumns,
     ) -> list[Epoch]:
-        R_att, near = self.point.attitude(stretch, around.now.t)
+        R_att, near = self.point.attitude(segment, around.now.t)
         kappa = mean_weights(around.offset, self.point.window)
         known = np.einsum("j,kja->ka", kappa, around.f_epoch)
-        known += around.swing @ stretch.lever_arm_b
+        known += around.swing @ segment.lever_arm_b
         a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
-        known_height = -a_down * self.point.window**2 / 24.0 - R_att[:, 2] @ stretch.lever_arm_b
+        known_height = -a_down * self.point.window**2 / 24.0 - R_att[:, 2] @ segment.lever_arm_b
         return [
             Epoch(
                 float(around.now.t[e]),

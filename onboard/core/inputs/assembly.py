@@ -1,4 +1,4 @@
-"""Assembles chunks of flight from the tracks of all streams."""
+"""Assembles batches of flight from the tracks of all streams."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from onboard.core.inputs.samples import (
     Throttle,
     Vibration,
 )
-from onboard.core.inputs.segments import Chunk, Fixes, Stretch
+from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import untrimmed_rotation, untrimmed_rotation_dcm
@@ -47,7 +47,7 @@ class AssemblySettings:
 
 
 class Assembly:
-    """Tracks of all streams, and the cutting of chunks out of them."""
+    """Tracks of all streams, and the cutting of batches out of them."""
 
     def __init__(self, settings: AssemblySettings) -> None:
         """Take the settings."""
@@ -130,12 +130,12 @@ class Assembly:
         *,
         everything: bool = False,
         grounded: bool | None = False,
-    ) -> dict[int, list[Chunk]]:
-        """Chunks of flight that are complete, by accelerometer; empty most of the time.
+    ) -> dict[int, list[Batch]]:
+        """Batches of flight that are complete, by accelerometer; empty most of the time.
 
         Args:
             parameters: in force.
-            everything: do not wait for a whole chunk.
+            everything: do not wait for a whole batch.
             grounded: whether the vehicle stands (then nothing is handed out); None: not told, the
                 motion decides.
         """
@@ -157,15 +157,15 @@ class Assembly:
             np.array([f.latitude for f in fixes]),
             t - np.array([f.t if f.t_message is None else f.t_message for f in fixes]),
         )
-        out: dict[int, list[Chunk]] = {}
+        out: dict[int, list[Batch]] = {}
         if grounded or (grounded is None and self._still(live, even)):
             self._fresh.clear()  # what flies after it begins anew
             self.standing_s += float(t[-1] - t[0])
         else:
             for imu in live:
-                chunks = self._cut(imu, live, even, trusted, parameters)
-                if chunks:
-                    out[imu] = chunks
+                batches = self._cut(imu, live, even, trusted, parameters)
+                if batches:
+                    out[imu] = batches
         keep = float(t[-1]) - REACH_S - 0.3
         for track in self._imus.values():
             track.drop_before(keep)
@@ -186,8 +186,8 @@ class Assembly:
         fixes: Fixes,
         trusted: NDArray[np.bool_],
         parameters: ParametersInForce,
-    ) -> list[Chunk]:
-        """Chunks of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
+    ) -> list[Batch]:
+        """Batches of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
         stamps, rows = live[imu].arrays()
         if len(stamps) < 8 or len(self._attitude) < 2:
             return []
@@ -196,7 +196,7 @@ class Assembly:
             return []
         t = stamps - parameters.imu_delay
         breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1
-        out: list[Chunk] = []
+        out: list[Batch] = []
         for piece in np.split(np.arange(len(t)), breaks):
             if len(piece) < 8:
                 continue
@@ -223,8 +223,8 @@ class Assembly:
                 continue
             chosen = fixes.between(first, last + 1)
             out.append(
-                Chunk(
-                    self._stretch(t[needed], turning, chosen, parameters, imu),
+                Batch(
+                    self._segment(t[needed], turning, chosen, parameters, imu),
                     chosen,
                     trusted[first : last + 1],
                     fresh,
@@ -248,9 +248,9 @@ class Assembly:
         w = rates_at(live[first], at, IMU_GAP_S)
         return (imu, rows) if w is None else (first, np.hstack([w, rows[:, 3:]]))
 
-    def _stretch(
+    def _segment(
         self, t: Array, rows: Array, fixes: Fixes, parameters: ParametersInForce, imu: int
-    ) -> Stretch:
+    ) -> Segment:
         cut = _needed(t, fixes.t)
         t, rows = t[cut], rows[cut]
         w_b = rows[:, :3]
@@ -266,7 +266,7 @@ class Assembly:
             flat["vibration"] = flat[own]
         if np.all(np.isfinite(rows[:, 6])):
             flat["temperature"] = (t[::10], rows[::10, 6])
-        return Stretch(
+        return Segment(
             t,
             w_b,
             rows[:, 3:6],

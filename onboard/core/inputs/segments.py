@@ -1,4 +1,4 @@
-"""A stretch of flight: the samples of one accelerometer between two moments, as arrays."""
+"""A segment of flight: the samples of one accelerometer between two moments, as arrays."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Fixes:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Segment:
     """Inertial samples, attitude and slow signals, all on the boot clock, delays removed.
 
     Attributes:
@@ -93,10 +93,10 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True)
-class Chunk:
+class Batch:
     """Some seconds of flight.  ``fresh`` if the filter must not continue from the one before."""
 
-    stretch: Stretch
+    segment: Segment
     fixes: Fixes
     trusted: NDArray[np.bool_]
     fresh: bool
@@ -112,7 +112,7 @@ class Chunk:
         step = np.diff(self.fixes.t)
         return float(step[self._between(step)].sum())
 
-    def __deepcopy__(self, memo: object) -> Chunk:
+    def __deepcopy__(self, memo: object) -> Batch:
         return self  # it never changes, and is most of what an engine keeps
 
     def seconds_above(self, speed: float) -> float:

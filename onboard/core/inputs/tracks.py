@@ -1,4 +1,4 @@
-"""Where samples wait until a chunk of flight is complete: one track per stream.
+"""Where samples wait until a batch of flight is complete: one track per stream.
 
 Tracks refuse what is late, repeated or not finite, count it by name, and hand out arrays.
 """
@@ -211,7 +211,7 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
     Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
     own time the stamps are its clock plus a straight line (offset and drift); without it the
     epoch numbers are recovered from the commonest interval.  A line is fitted robustly over the
-    chunk; stamps that are even already stay as they are.
+    batch; stamps that are even already stay as they are.
 
     Args:
         t: (n,) stamps, s, increasing.
@@ -230,7 +230,7 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
         if period <= 0.0:
             return t.copy()
         count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
-        # The median of jittered intervals is off by a millisecond, which adds up over a chunk:
+        # The median of jittered intervals is off by a millisecond, which adds up over a batch:
         # good enough to number the epochs, not to say when they were.
         period = float(np.polyfit(count, t - t[0], 1)[0])
         # Whole milliseconds: receivers run at 1, 2, 4, 5, 8, 10 ... Hz.
@@ -250,7 +250,7 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
     for _ in range(4):
         mean = float(np.average(offset, weights=weight))
         spread = float(weight @ (x * x))
-        # A crystal is good to 1e-4: over one chunk the slope is noise, unless it is long.
+        # A crystal is good to 1e-4: over one batch the slope is noise, unless it is long.
         slope = float(np.clip(weight @ (x * (offset - mean)) / spread, -2e-4, 2e-4))
         line = mean + slope * x
         residual = np.abs(offset - line)

@@ -1,4 +1,4 @@
-"""Sums of portions of a flight: enough of them for folds, clusters and forgetting."""
+"""Sums of blocks of a flight: enough of them for folds, clusters and forgetting."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from onboard.core.maths.sums import NormalSums
 
 
 @dataclass(slots=True)
-class Portion:
-    """Sums of one portion of flight."""
+class Block:
+    """Sums of one block of flight."""
 
     start: float
     end: float
@@ -24,12 +24,12 @@ class Seconds:
     brisk: float
 
 
-def merged(portions: list[Portion], most: int) -> list[Portion]:
-    """At most ``most`` portions, neighbours added up."""
-    while len(portions) > most:
+def merged(blocks: list[Block], most: int) -> list[Block]:
+    """At most ``most`` blocks, neighbours added up."""
+    while len(blocks) > most:
         pairs = [
-            Portion(a.start, b.end, a.sums + b.sums)
-            for a, b in zip(portions[::2], portions[1::2], strict=False)
+            Block(a.start, b.end, a.sums + b.sums)
+            for a, b in zip(blocks[::2], blocks[1::2], strict=False)
         ]
-        portions = pairs + ([portions[-1]] if len(portions) % 2 else [])
-    return portions
+        blocks = pairs + ([blocks[-1]] if len(blocks) % 2 else [])
+    return blocks

@@ -2,7 +2,7 @@
 
 A whitened row is ``e = y - h theta`` with unit variance.  ``N += h^T h``, ``b += h^T y``,
 ``s += y^2``, ``rows += 1`` keep all that least squares will ever ask of the rows, so sums of two
-stretches of flight (two flights, two days) add up to the sums of both.
+segments of flight (two flights, two days) add up to the sums of both.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class NormalSums:
         return self + other.scaled(-1.0)
 
     def scaled(self, weight: float) -> NormalSums:
-        """All sums times ``weight``: forgetting, or taking a stretch out again."""
+        """All sums times ``weight``: forgetting, or taking a segment out again."""
         return NormalSums(
             self.N * weight,
             self.b * weight,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import rotation_from_euler
 
@@ -54,9 +54,9 @@ class Linearisation:
         moves = np.abs(np.subtract(self.moving, other.moving))
         return bool(np.all(moves < np.array(within)))
 
-    def attitude(self, stretch: Stretch, t: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def attitude(self, segment: Segment, t: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
-        R, near = stretch.attitude_at(t + self.attitude_delay)
+        R, near = segment.attitude_at(t + self.attitude_delay)
         return rotation_from_euler(0.0, 0.0, -self.heading) @ R, near
 
     @property

@@ -2,7 +2,7 @@
 
 Everything that is integrated between two GPS epochs is needed at a few equidistant nodes, in the
 body axes *of the interval's start*: ``P(tau) = R_nb(start)^T R_nb(tau)`` follows from the
-gyroscope alone, so the integrals are done for a whole stretch of flight at once and turned into
+gyroscope alone, so the integrals are done for a whole segment of flight at once and turned into
 NED when the filter, going through the epochs, knows ``R_nb(start)``.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
 
@@ -30,23 +30,23 @@ class Signals:
         w_b: (*S, 3) angular rate less the bias estimate, rad/s.
         raw_s: (*S, 3) raw specific force, sensor axes, m/s^2.
         f_b: (*S, 3) specific force by the six of the linearisation, body axes, m/s^2.
-        stretch: where slow signals are looked up.
+        segment: where slow signals are looked up.
     """
 
     t: Array
     w_b: Array
     raw_s: Array
     f_b: Array
-    stretch: Stretch
+    segment: Segment
 
     def slow(self, name: str) -> Array | None:
         """Slow signal at these times, S or (*S, 3); None if the recording lacks it."""
-        return self.stretch.slow_at(name, self.t)
+        return self.segment.slow_at(name, self.t)
 
     @property
     def R_bs(self) -> Array:
         """(3, 3) board orientation."""
-        return self.stretch.R_bs
+        return self.segment.R_bs
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,32 +172,32 @@ def _chain(turns: Array) -> Array:
 
 
 class NodeMaker:
-    """Makes nodes from one stretch, for one gyroscope bias and one set of six."""
+    """Makes nodes from one segment, for one gyroscope bias and one set of six."""
 
     def __init__(
-        self, stretch: Stretch, bias_b: Array, six: Array, *, recorded_attitude: bool = False
+        self, segment: Segment, bias_b: Array, six: Array, *, recorded_attitude: bool = False
     ) -> None:
-        """Take the stretch and the linearisation.
+        """Take the segment and the linearisation.
 
         Args:
-            stretch: the samples.
+            segment: the samples.
             bias_b: (3,) gyroscope bias to subtract, rad/s.
             six: (6,) scale and ``beta = -scale * offset`` of the linearisation.
             recorded_attitude: relative attitude from the recorded one instead of the gyroscope.
         """
-        self._stretch = stretch
+        self._segment = segment
         self._bias = bias_b
         self._six = six
         self._recorded = recorded_attitude
-        self._at = stretch.interpolant()
-        self._rate = (len(stretch.t) - 1) / (stretch.t[-1] - stretch.t[0])
+        self._at = segment.interpolant()
+        self._rate = (len(segment.t) - 1) / (segment.t[-1] - segment.t[0])
 
     def signals(self, t: Array) -> Signals:
         """Signals at times ``t`` of any shape."""
         x = self._at(t)
         raw = x[..., 3:]
-        f_b = (raw * self._six[:3] + self._six[3:]) @ self._stretch.R_bs.T
-        return Signals(t, x[..., :3] - self._bias, raw, f_b, self._stretch)
+        f_b = (raw * self._six[:3] + self._six[3:]) @ self._segment.R_bs.T
+        return Signals(t, x[..., :3] - self._bias, raw, f_b, self._segment)
 
     def intervals(self, start: Array, end: Array) -> Intervals:
         """Nodes in the intervals ``start`` ... ``end`` (K,), as dense as the samples or denser."""
@@ -212,7 +212,7 @@ class NodeMaker:
             fine.w_b[:, ::2],
             fine.raw_s[:, ::2],
             fine.f_b[:, ::2],
-            self._stretch,
+            self._segment,
         )
         if self._recorded:
             R = self._attitude(coarse.t)
@@ -233,7 +233,7 @@ class NodeMaker:
             fine.w_b[:, ::2],
             fine.raw_s[:, ::2],
             fine.f_b[:, ::2],
-            self._stretch,
+            self._segment,
         )
         if self._recorded:
             R = self._attitude(nodes.t)
@@ -246,10 +246,10 @@ class NodeMaker:
             P = np.concatenate([back[:, :0:-1], after], axis=1)
         f_epoch = (P @ nodes.f_b[..., None])[..., 0]
         now = Signals(
-            nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._stretch
+            nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._segment
         )
         return Around(offset, nodes, f_epoch, now, _swing(offset, P, now.w_b, window))
 
     def _attitude(self, t: Array) -> Array:
-        flat = interpolate_rotation(t.ravel(), self._stretch.t_attitude, self._stretch.R_attitude)
+        flat = interpolate_rotation(t.ravel(), self._segment.t_attitude, self._segment.R_attitude)
         return flat.reshape(*t.shape, 3, 3)

@@ -91,7 +91,7 @@ class Family:
 
 
 @dataclass(frozen=True, slots=True)
-class StretchColumns:
+class SegmentColumns:
     """All columns of K intervals (index k: from epoch k to k + 1) and K + 1 epochs, m unknowns.
 
     Interval arrays are in body axes of the interval's start, epoch arrays as in :class:`Direct`.
@@ -126,8 +126,8 @@ class Model:
         self.prior = np.array([u.prior for u in self.unknowns])
         self.prior_sigma = np.array([u.prior_sigma for u in self.unknowns])
 
-    def columns(self, intervals: Intervals, around: Around) -> StretchColumns:
-        """Evaluate every family on one stretch."""
+    def columns(self, intervals: Intervals, around: Around) -> SegmentColumns:
+        """Evaluate every family on one segment."""
         K, M1 = intervals.signals.t.shape
         m, epochs = self.size, len(around.now.t)
         force = np.zeros((K, M1, 3, m))
@@ -159,7 +159,7 @@ class Model:
                     along[:, s] = d.along_velocity
         force1, force2 = intervals.integrals(force)
         turn = intervals.integrals(rate)[0] if turning else np.zeros((K, 3, m))
-        return StretchColumns(
+        return SegmentColumns(
             force1,
             force2,
             turn,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.quadrature import Signals
@@ -72,7 +72,7 @@ def _over_time(t: Array, x: Array) -> Callable[[Signals], Array]:
     return lambda nodes: np.interp(nodes.t, t, x)
 
 
-def products(chunks: Sequence[Chunk]) -> list[Product]:
+def products(batches: Sequence[Batch]) -> list[Product]:
     """Every product that this recording has the signals for."""
     out = [Product(f"w{a}", f"w_{a} / (rad/s)", _rate(i)) for i, a in enumerate(AXES)]
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 2), (1, 2)):
@@ -81,10 +81,10 @@ def products(chunks: Sequence[Chunk]) -> list[Product]:
     for i, j in ((0, 1), (0, 2), (1, 2)):
         pair = f"{AXES[i]}{AXES[j]}"
         out.append(Product(f"f{pair}", f"f_{AXES[i]} f_{AXES[j]} / g^2", _forces(i, j)))
-    t = np.concatenate([c.fixes.t for c in chunks])
+    t = np.concatenate([c.fixes.t for c in batches])
     t, first = np.unique(t, return_index=True)
-    v = np.concatenate([c.fixes.v_n for c in chunks])[first]
-    height = np.concatenate([c.fixes.height for c in chunks])[first]
+    v = np.concatenate([c.fixes.v_n for c in batches])[first]
+    height = np.concatenate([c.fixes.height for c in batches])[first]
     heard = np.all(np.isfinite(v[:, :2]), axis=1)
     if heard.sum() > 2:
         speed2 = np.sum(v[heard, :2] ** 2, axis=1) / 100.0
@@ -92,7 +92,7 @@ def products(chunks: Sequence[Chunk]) -> list[Product]:
     if len(t) > 20:
         rate = np.convolve(np.gradient(height, t), np.ones(9) / 9.0, mode="same")
         out.append(Product("climb", "climb rate / (m/s)", _over_time(t, rate)))
-    names = set.intersection(*(set(c.stretch.slow) for c in chunks))
+    names = set.intersection(*(set(c.segment.slow) for c in batches))
     if "airspeed" in names:
         out.append(Product("air2", "(airspeed / 10 m/s)^2", _slow("airspeed", 2, 10.0)))
     if "throttle" in names:

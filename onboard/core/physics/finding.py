@@ -34,7 +34,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Rival:
+class Confounder:
     """Another effect that could stand for this one, and how much worse it does."""
 
     name: str
@@ -46,7 +46,7 @@ class Imprint:
     """What an effect makes of the velocity, and what data say of it; m/s, (n,), NaN where unused.
 
     ``left`` is what the model leaves with this effect alone taken out, along the earth ``axis``;
-    ``made`` is what the effect says should be left.  ``t`` is a stretch where it does most.
+    ``made`` is what the effect says should be left.  ``t`` is a segment where it does most.
     """
 
     axis: str
@@ -56,7 +56,7 @@ class Imprint:
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
+class ResponseCurve:
     """How a quantity goes with a signal, over the range that was flown: ``x`` (n,).
 
     ``y`` and ``sigma`` have a curve (n,) for each unknown, by its name.
@@ -88,10 +88,10 @@ class Effect:
     parameters: dict[str, float]
     cure: str
     where: tuple[Where, ...] = ()
-    rivals: tuple[Rival, ...] = ()
+    confounders: tuple[Confounder, ...] = ()
     intervals: tuple[tuple[float, float], ...] = ()
     formula: str = ""
     held_out_velocity_before: float = NAN
     held_out_velocity_after: float = NAN
     imprint: Imprint | None = None
-    law: Law | None = None
+    response_curve: ResponseCurve | None = None

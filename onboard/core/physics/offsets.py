@@ -138,7 +138,7 @@ class Gravity(EffectColumns):
 
     def acceleration(self, nodes: Signals) -> Array:
         """Down, in body axes by the recorded attitude."""
-        flat, _ = nodes.stretch.attitude_at(nodes.t.ravel())
+        flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
         down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
         return down[..., None]
 

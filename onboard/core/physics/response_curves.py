@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.segments import Chunk
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.physics.effect import AXES
-from onboard.core.physics.finding import Law, Quantity
+from onboard.core.physics.finding import Quantity, ResponseCurve
 
 POINTS = 60
 DEGREES = 180.0 / np.pi
@@ -20,27 +20,27 @@ DEGREES = 180.0 / np.pi
 def law_of(
     name: str,
     unknowns: Mapping[str, Quantity],
-    chunks: Sequence[Chunk],
+    batches: Sequence[Batch],
     t0: float,
     reference_temperature: float,
-) -> Law | None:
+) -> ResponseCurve | None:
     """The curve of an effect; None for one that follows no single signal.
 
     Args:
         name: of the effect.
         unknowns: as found; each gives a curve, but for the moment of a jump.  A curve is NaN where
             its own axis has not been.
-        chunks: the flight.
+        batches: the flight.
         t0: first sample, s.
         reference_temperature: at which a temperature drift is nothing, degC.
     """
-    if not chunks:
+    if not batches:
         return None
     made = _LAWS.get(name)
     if made is None:
         return None
     signal, unit, quantity, quantity_unit, values, shape = made
-    seen = values(chunks, t0)
+    seen = values(batches, t0)
     if not np.any(np.isfinite(seen)):
         return None
     x = np.linspace(float(np.nanmin(seen)), float(np.nanmax(seen)), POINTS)
@@ -51,7 +51,7 @@ def law_of(
     per_unit = shape(x, about)
     sizes = {k: q for k, q in unknowns.items() if k != "time"}
     flown = {k: np.where(_within(x, seen, k), per_unit, np.nan) for k in sizes}
-    return Law(
+    return ResponseCurve(
         signal=signal,
         unit=unit,
         quantity=quantity,
@@ -71,36 +71,36 @@ def _within(x: Array, seen: Array, key: str) -> NDArray[np.bool_]:
     return inside
 
 
-def _slow(name: str, factor: float = 1.0) -> Callable[[Sequence[Chunk], float], Array]:
-    def values(chunks: Sequence[Chunk], t0: float) -> Array:
+def _slow(name: str, factor: float = 1.0) -> Callable[[Sequence[Batch], float], Array]:
+    def values(batches: Sequence[Batch], t0: float) -> Array:
         del t0
-        found = [c.stretch.slow[name][1] for c in chunks if name in c.stretch.slow]
+        found = [c.segment.slow[name][1] for c in batches if name in c.segment.slow]
         out: Array = factor * np.concatenate(found) if found else np.zeros(0)
         return out
 
     return values
 
 
-def _time(chunks: Sequence[Chunk], t0: float) -> Array:
-    return np.array([t - t0 for c in chunks for t in (c.fixes.t[0], c.fixes.t[-1])])
+def _time(batches: Sequence[Batch], t0: float) -> Array:
+    return np.array([t - t0 for c in batches for t in (c.fixes.t[0], c.fixes.t[-1])])
 
 
-def _force_g(chunks: Sequence[Chunk], t0: float) -> Array:
+def _force_g(batches: Sequence[Batch], t0: float) -> Array:
     del t0
-    bodies = [c.stretch.raw_s @ c.stretch.R_bs.T for c in chunks]
+    bodies = [c.segment.raw_s @ c.segment.R_bs.T for c in batches]
     extremes = [np.percentile(f_b, (1.0, 99.0), axis=0) for f_b in bodies]
     out: Array = np.concatenate(extremes) / STANDARD_GRAVITY
     return out
 
 
-def _load(chunks: Sequence[Chunk], t0: float) -> Array:
+def _load(batches: Sequence[Batch], t0: float) -> Array:
     del t0
-    extremes = [np.percentile(-c.stretch.raw_s[:, 2], (1.0, 99.0)) for c in chunks]
+    extremes = [np.percentile(-c.segment.raw_s[:, 2], (1.0, 99.0)) for c in batches]
     out: Array = np.concatenate(extremes) / STANDARD_GRAVITY
     return out
 
 
-_Values = Callable[[Sequence[Chunk], float], Array]
+_Values = Callable[[Sequence[Batch], float], Array]
 _Shape = Callable[[Array, float], Array]
 
 _LAWS: dict[str, tuple[str, str, str, str, _Values, _Shape]] = {

@@ -133,15 +133,15 @@ class Examiner:
         frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found))
 
     def _document(self, flight: Calibrator, found: Diagnosis) -> msgspec.Struct:
-        chunks = since_reboot(flight.engine(found.imu).chunks)
+        batches = since_reboot(flight.engine(found.imu).batches)
         return explain_document(
             found,
             files=(),
             autopilot=self.autopilot,
-            duration_s=sum(c.duration for c in chunks),
+            duration_s=sum(c.duration for c in batches),
             samples={
-                "imu": sum(len(c.stretch.t) for c in chunks),
-                "gps": sum(len(c.fixes) for c in chunks),
+                "imu": sum(len(c.segment.t) for c in batches),
+                "gps": sum(len(c.fixes) for c in batches),
             },
         )
 

@@ -7,7 +7,7 @@ import pytest
 
 from onboard.core.diagnosis.epochs import Epochs, rms
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.maths.blocks import Portion
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 
 SIZE = 4
@@ -15,12 +15,12 @@ SIZE = 4
 
 @pytest.fixture
 def flight():
-    """Two portions with the same times, as two recordings of one vehicle have."""
+    """Two blocks with the same times, as two recordings of one vehicle have."""
     rng = np.random.default_rng(5)
-    portions, traces = [], []
+    blocks, traces = [], []
     for _ in range(2):
         t = np.arange(0.0, 30.0, 0.2)
-        portions.append(Portion(t[0], t[-1], NormalSums.zeros(SIZE)))
+        blocks.append(Block(t[0], t[-1], NormalSums.zeros(SIZE)))
         for k, at in enumerate(t):
             n = 0 if k % 7 == 0 else 2
             traces.append(
@@ -36,12 +36,12 @@ def flight():
                     refused_by=np.zeros(0),
                 )
             )
-    return traces, portions
+    return traces, blocks
 
 
 def test_the_residual_is_that_of_each_epoch(flight):
-    traces, portions = flight
-    epochs = Epochs.of(traces, portions, SIZE)
+    traces, blocks = flight
+    epochs = Epochs.of(traces, blocks, SIZE)
     theta = np.array([0.3, -0.2, 0.5, 1.0])
     residual = epochs.residual(theta)
     for x, row in zip(traces, residual, strict=True):
@@ -50,15 +50,15 @@ def test_the_residual_is_that_of_each_epoch(flight):
     assert np.array_equal(epochs.refused, [not x.velocities for x in traces])
 
 
-def test_portions_are_told_apart_by_order_where_times_repeat(flight):
-    traces, portions = flight
-    epochs = Epochs.of(traces, portions, SIZE)
-    assert np.array_equal(np.bincount(epochs.portion), [len(traces) // 2] * 2)
+def test_blocks_are_told_apart_by_order_where_times_repeat(flight):
+    traces, blocks = flight
+    epochs = Epochs.of(traces, blocks, SIZE)
+    assert np.array_equal(np.bincount(epochs.block), [len(traces) // 2] * 2)
 
 
-def test_held_out_takes_each_portion_from_the_fit_that_has_not_seen_it(flight):
-    traces, portions = flight
-    epochs = Epochs.of(traces, portions, SIZE)
+def test_held_out_takes_each_block_from_the_fit_that_has_not_seen_it(flight):
+    traces, blocks = flight
+    epochs = Epochs.of(traces, blocks, SIZE)
     thetas = [np.ones(SIZE), -np.ones(SIZE)]
     folds = [(np.array([0]), thetas[0]), (np.array([1]), thetas[1])]
     half = len(traces) // 2
@@ -67,15 +67,15 @@ def test_held_out_takes_each_portion_from_the_fit_that_has_not_seen_it(flight):
 
 
 def test_an_imprint_that_is_all_there_is_leaves_nothing(flight):
-    traces, portions = flight
-    epochs = Epochs.of(traces[: len(traces) // 2], portions[:1], SIZE)
+    traces, blocks = flight
+    epochs = Epochs.of(traces[: len(traces) // 2], blocks[:1], SIZE)
     theta = np.array([0.0, 0.0, 2.0, 0.0])
     clean = Epochs(
         epochs.t,
         np.where(np.isnan(epochs.innovation), np.nan, epochs.columns @ theta),
         epochs.columns,
         epochs.refused,
-        epochs.portion,
+        epochs.block,
     )
     i = clean.imprint([2], theta[[2]], theta, 0.0)
     assert i.axis in ("earth_north", "earth_east")
@@ -84,7 +84,7 @@ def test_an_imprint_that_is_all_there_is_leaves_nothing(flight):
 
 
 def test_nothing_at_all_is_no_number_and_no_crash():
-    empty = Epochs.of([], [Portion(0.0, 1.0, NormalSums.zeros(SIZE))], SIZE)
+    empty = Epochs.of([], [Block(0.0, 1.0, NormalSums.zeros(SIZE))], SIZE)
     assert np.isnan(rms(empty.residual(np.zeros(SIZE))))
     assert np.isnan(empty.held_out_rms([]))
     assert len(empty.imprint([0], np.zeros(1), np.zeros(SIZE), 0.0).t) == 0

@@ -29,7 +29,7 @@ def full(request):
     calibrator = heard(spec)
     t0 = calibrator.first_sample
     engine = calibrator.engine(1)
-    return Examination(engine, catalogue(Origin(t0)), t0=t0, chunks=engine.chunks).with_noise()
+    return Examination(engine, catalogue(Origin(t0)), t0=t0, batches=engine.batches).with_noise()
 
 
 def gains(full, times):

@@ -121,7 +121,7 @@ def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
     assert effect.unknowns[axis].value == pytest.approx(size, rel=0.1)
 
 
-def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_rival():
+def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_confounder():
     # In a hover's force, 24 r / g of a squared window is an antenna r higher.
     averaging = replace(PROMPT, smoothing=0.3)
     said, _ = diagnosed("copter", 60, gps=averaging)

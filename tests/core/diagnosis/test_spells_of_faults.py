@@ -14,9 +14,9 @@ OFF = np.array([-0.6, 0.8])
 
 
 @pytest.fixture(scope="module")
-def chunks():
+def batches():
     spec = FlightSpec(vehicle="copter", seed=1, duration=60.0, imus=random_imus(1))
-    return heard(spec).engine(1).chunks
+    return heard(spec).engine(1).batches
 
 
 def trace(t, innovation, refused=()):
@@ -36,8 +36,8 @@ def flight(*stages):
     return out
 
 
-def interval(stages, chunks):
-    found = fault_effect(flight(*stages), np.zeros(1), chunks, 0.0, LEAST, COAST_S)
+def interval(stages, batches):
+    found = fault_effect(flight(*stages), np.zeros(1), batches, 0.0, LEAST, COAST_S)
     assert found is not None
     assert len(found.intervals) == 1
     return found.intervals[0]
@@ -47,13 +47,13 @@ V, R = ("velocity",), ("recovery",)
 NONE = (0.0, 0.0)
 
 
-def test_a_short_fault_ends_when_the_velocity_is_right_again(chunks):
+def test_a_short_fault_ends_when_the_velocity_is_right_again(batches):
     stages = [(20, NONE, ()), (22, OFF, V), (24, NONE, R), (60, NONE, ())]
-    assert interval(stages, chunks) == pytest.approx((20.0, 21.8), abs=0.01)
+    assert interval(stages, batches) == pytest.approx((20.0, 21.8), abs=0.01)
 
 
 @pytest.mark.parametrize("patience", [1.6, 8.0, 20.0])
-def test_one_that_the_filter_gave_in_to_ends_at_the_jump_back(chunks, patience):
+def test_one_that_the_filter_gave_in_to_ends_at_the_jump_back(batches, patience):
     gave_in = 20 + patience
     stages = [
         (20, NONE, ()),
@@ -64,10 +64,10 @@ def test_one_that_the_filter_gave_in_to_ends_at_the_jump_back(chunks, patience):
         (48, -OFF, R),
         (60, NONE, ()),
     ]
-    assert interval(stages, chunks) == pytest.approx((20.0, 45.0), abs=0.01)
+    assert interval(stages, batches) == pytest.approx((20.0, 45.0), abs=0.01)
 
 
-def test_a_filter_that_is_off_by_something_else_at_once_does_not_join_two_spells(chunks):
+def test_a_filter_that_is_off_by_something_else_at_once_does_not_join_two_spells(batches):
     stages = [
         (20, NONE, ()),
         (34, OFF, V),
@@ -76,10 +76,10 @@ def test_a_filter_that_is_off_by_something_else_at_once_does_not_join_two_spells
         (40, -0.2 * OFF, V),
         (60, -1.3 * OFF, V),
     ]
-    assert interval(stages, chunks) == pytest.approx((20.0, 40.0), abs=0.01)
+    assert interval(stages, batches) == pytest.approx((20.0, 40.0), abs=0.01)
 
 
-def test_what_the_filter_jumps_by_when_it_gives_in_is_not_the_end(chunks):
+def test_what_the_filter_jumps_by_when_it_gives_in_is_not_the_end(batches):
     stages = [
         (20, NONE, ()),
         (34, OFF, V),
@@ -89,11 +89,13 @@ def test_what_the_filter_jumps_by_when_it_gives_in_is_not_the_end(chunks):
         (44.6, np.array([0.1, -0.1]) - OFF, V),
         (60, NONE, ()),
     ]
-    assert interval(stages, chunks) == pytest.approx((20.0, 44.0), abs=0.01)
+    assert interval(stages, batches) == pytest.approx((20.0, 44.0), abs=0.01)
 
 
 @pytest.mark.parametrize("first", [0.1, 2.0])
-def test_drift_of_the_inertia_is_no_fault(chunks, first):
+def test_drift_of_the_inertia_is_no_fault(batches, first):
     growing = [(20 + k * STEP_S, (first * (1.0 + 0.1 * k), 0.0), V) for k in range(1, 60)]
-    found = fault_effect(flight((20, NONE, ()), *growing), np.zeros(1), chunks, 0.0, LEAST, COAST_S)
+    found = fault_effect(
+        flight((20, NONE, ()), *growing), np.zeros(1), batches, 0.0, LEAST, COAST_S
+    )
     assert found is None

@@ -8,11 +8,11 @@ import pytest
 from onboard.core.diagnosis.testability import MOST_UNSEEN, unseen_share
 
 
-def chunks(values, size=40):
+def batches(values, size=40):
     """Pieces of a signal as a flight has them."""
     pieces = np.split(values, range(size, len(values), size))
     return [
-        SimpleNamespace(stretch=SimpleNamespace(slow={"throttle": (np.arange(len(p)), p)}))
+        SimpleNamespace(segment=SimpleNamespace(slow={"throttle": (np.arange(len(p)), p)}))
         for p in pieces
     ]
 
@@ -33,15 +33,15 @@ def test_a_wandering_signal_loses_what_lines_between_its_samples_miss():
         wander[i] = keep * wander[i - 1] + steps[i]
     truth = missed_by_lines(wander, every)
     assert truth < MOST_UNSEEN
-    assert unseen_share(chunks(wander[::every]), "throttle") == pytest.approx(truth, rel=0.3)
+    assert unseen_share(batches(wander[::every]), "throttle") == pytest.approx(truth, rel=0.3)
 
 
 def test_a_slow_signal_loses_nothing_and_a_fast_one_no_more_than_the_bound():
     t = np.arange(1000)
-    assert unseen_share(chunks(np.sin(t / 100.0)), "throttle") < 1e-4
-    assert unseen_share(chunks(np.sin(2.5 * t)), "throttle") == MOST_UNSEEN
+    assert unseen_share(batches(np.sin(t / 100.0)), "throttle") < 1e-4
+    assert unseen_share(batches(np.sin(2.5 * t)), "throttle") == MOST_UNSEEN
 
 
 def test_too_few_samples_show_nothing():
-    assert unseen_share(chunks(np.array([0.2, 0.5]), size=2), "throttle") == MOST_UNSEEN
-    assert unseen_share(chunks(np.full(100, 0.3)), "throttle") == MOST_UNSEEN
+    assert unseen_share(batches(np.array([0.2, 0.5]), size=2), "throttle") == MOST_UNSEEN
+    assert unseen_share(batches(np.full(100, 0.3)), "throttle") == MOST_UNSEEN

@@ -31,7 +31,7 @@ def flight():
                 calibrator.feed(sample)
     calibrator.finish()
     engine = calibrator.engine(1)
-    chain = intervals([(c.stretch, c.fixes) for c in engine.chunks], engine.point)
+    chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
     held = calibrator.parameters.six(1)
     scale = np.array(held.scale)
     in_force = np.concatenate([scale, -scale * np.array(held.offset)])

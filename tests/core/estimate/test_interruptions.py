@@ -168,7 +168,7 @@ def test_an_outage_is_bridged_or_begun_anew_and_is_not_trusted(flight, plain, ou
     near_truth(got)
     lost = plain.calibration(1).trusted_s - got.calibration(1).trusted_s
     # What is on the ground before fixes are back was no trusted flight in the first place.
-    missing = min(seconds, plain.engine(1).chunks[-1].fixes.t[-1] - 50.0)
+    missing = min(seconds, plain.engine(1).batches[-1].fixes.t[-1] - 50.0)
     assert missing - 1.0 < lost < missing + 12.0
     # Less than half of the flight may be left: it says less, but far more than the prior.
     assert np.all(six(got)[1] < 3.0 * six(plain)[1])
@@ -312,7 +312,7 @@ def test_fixes_repeated_or_late_are_dropped_by_name():
     assert track.refused == Counter(gps_repeated=2, gps_late=1)
 
 
-def test_the_last_fix_of_a_chunk_is_the_first_of_the_next_at_the_same_time():
+def test_the_last_fix_of_a_batch_is_the_first_of_the_next_at_the_same_time():
     rng = np.random.default_rng(3)
     track, seen = FixTrack(), []
     for k in range(200):
@@ -348,7 +348,7 @@ def test_a_slow_track_refuses_what_is_late_and_keeps_two():
 
 
 def test_flight_that_left_the_buffer_stays_in_the_sums(flight):
-    every = replace(ONCE, chunk_s=2.0, memory_s=1e12)
+    every = replace(ONCE, batch_s=2.0, memory_s=1e12)
     short = fed(flight, replace(every, buffer_s=10.0))[0].engine(1)
     long = fed(flight, every)[0].engine(1)
     assert len(short.aged) > 12

@@ -7,7 +7,7 @@ from onboard.core.filter.innovations import Epoch, Step
 from onboard.core.filter.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
-from onboard.core.inputs.segments import Fixes, Stretch
+from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.model.linearisation import Linearisation
@@ -64,7 +64,7 @@ def literal_and_whitened(noise, gaps=()):
         (quiet(noise),),
         uses=PAPER,
     )
-    stretch = Stretch(t, np.zeros_like(raw), raw, t, R, np.eye(3))
+    segment = Segment(t, np.zeros_like(raw), raw, t, R, np.eye(3))
     pieces = np.split(np.arange(len(at)), gaps)
     for piece in pieces:
         literal.restart()
@@ -78,7 +78,7 @@ def literal_and_whitened(noise, gaps=()):
         n = len(piece)
         ways.restart()
         ways.process(
-            stretch,
+            segment,
             Fixes(t[at[piece]], v_gps[piece], np.zeros(n), np.zeros(n)),
             np.ones(n, dtype=bool),
         )
@@ -117,8 +117,8 @@ def test_what_a_fit_leaves_is_chi_square():
         uses=PAPER,
     )
     fixes = Fixes(t[at], v[at] + noise * rng.normal(size=(n, 3)), np.zeros(n), np.zeros(n))
-    stretch = Stretch(t, np.zeros_like(raw), raw, t, R, np.eye(3))
-    sums = made.process(stretch, fixes, np.ones(n, dtype=bool)).portion.sums
+    segment = Segment(t, np.zeros_like(raw), raw, t, R, np.eye(3))
+    sums = made.process(segment, fixes, np.ones(n, dtype=bool)).block.sums
     theta = np.linalg.solve(sums.N, sums.b)
     np.testing.assert_allclose(theta[:3], SCALE, atol=0.02)
     # n - 6 degrees of freedom: five sigma either way.
@@ -240,7 +240,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     t = np.arange(0.0, 61.0, 0.02)
     still = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (len(t), 1))
     R = np.broadcast_to(np.eye(3), (len(t), 3, 3))
-    stretch = Stretch(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
+    segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
         NoiseLevels(velocity, *(1e-12, 1.0, 1e-12), walk, *(1e-12,) * 4)
@@ -249,6 +249,6 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     made = Pass(
         Model([Six(scale_sigma=1e-6, beta_sigma=1e-6)]), Linearisation(delay=0.0), bank, uses=PAPER
     )
-    made.process(stretch, fixes, np.ones(n, dtype=bool))
+    made.process(segment, fixes, np.ones(n, dtype=bool))
     likelihoods = made.log_likelihoods()
     assert np.argmax(likelihoods) == 0

@@ -103,12 +103,12 @@ def test_the_frozen_flight_stays_while_the_live_one_goes_on(flight):
     for sample in flight:
         live.feed(sample)
     frozen = live.frozen()
-    then = frozen.calibration(1), len(frozen.engine(1).chunks)
+    then = frozen.calibration(1), len(frozen.engine(1).batches)
     again = [replace(s, t=s.t + 200.0) for s in flight if s.t is not None]
     for sample in again:
         live.feed(sample)
     assert live.engine(1).trusted_s > 1.5 * then[0].trusted_s
-    assert (frozen.calibration(1), len(frozen.engine(1).chunks)) == then
+    assert (frozen.calibration(1), len(frozen.engine(1).batches)) == then
 
 
 @pytest.mark.parametrize(

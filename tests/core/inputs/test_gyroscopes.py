@@ -70,7 +70,7 @@ def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_
 def test_a_gyroscope_of_the_same_chip_is_the_accelerometers_own(flight):
     ids = [("INS_ACC2_ID", ONE_CHIP | 22 << 16), ("INS_GYR2_ID", ONE_CHIP | 36 << 16)]
     made = calibrated(flight, second=True, ids=ids)
-    w = [made.engine(imu).chunks[2].stretch.w_b for imu in (1, 2)]
+    w = [made.engine(imu).batches[2].segment.w_b for imu in (1, 2)]
     # Both streams are cut to whole mrad/s, in axes of their own.
     np.testing.assert_allclose(w[1], w[0] @ CROOKED.T, rtol=0.0, atol=1.1e-3)
     assert np.abs(w[1] - w[0]).max() > 0.01

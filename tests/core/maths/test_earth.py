@@ -167,6 +167,6 @@ def test_displacement_is_the_integral_of_velocity():
     end = earth.displacement_n(lat[-1], lon[-1], h, (lat[0], lon[0], h))
     north = 300 * np.sin(t / 15)
     # A step east at another latitude than the middle one counts for more or fewer degrees.
-    stretch = 1 + np.tan(0.7) * (north - north[-1] / 2) / 6.38e6
+    segment = 1 + np.tan(0.7) * (north - north[-1] / 2) / 6.38e6
     assert end[0] == pytest.approx(north[-1], abs=0.01)
-    assert end[1] == pytest.approx(np.trapezoid(v_east * stretch, t), abs=0.01)
+    assert end[1] == pytest.approx(np.trapezoid(v_east * segment, t), abs=0.01)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.model.nuisances import (
     GyroScale,
     GyroTiming,
@@ -71,8 +71,8 @@ def gained(R, f, start=START, end=END):
 @pytest.fixture(scope="module")
 def made():
     t = np.arange(0.0, 3.0, 0.01)
-    stretch = Stretch(t, rate(t), raw(t), T[::20], TRUE[::20], np.eye(3))
-    maker = NodeMaker(stretch, np.zeros(3), SIX)
+    segment = Segment(t, rate(t), raw(t), T[::20], TRUE[::20], np.eye(3))
+    maker = NodeMaker(segment, np.zeros(3), SIX)
     intervals = maker.intervals(np.array([START]), np.array([END]))
     return intervals, maker.around(np.array([EPOCH]))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from onboard.core.estimate.engine import calibration_model, moved
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.core.model.linearisation import MOVING, Linearisation
 from onboard.core.physics.effect import Origin
@@ -20,7 +20,7 @@ def attitude(t):
 def recorded(delay, heading):
     R = rotation_from_euler(0.0, 0.0, heading) @ attitude(T - delay)
     still = np.zeros((len(T), 3))
-    return Stretch(T, still, still, T, R, np.eye(3))
+    return Segment(T, still, still, T, R, np.eye(3))
 
 
 @pytest.mark.parametrize(("delay", "heading"), [(0.08, 0.0), (0.0, -0.3), (-0.05, 0.25)])

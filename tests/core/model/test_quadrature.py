@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.inputs.tracks import even_times, untruncated
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
@@ -46,8 +46,8 @@ def jittered(rate, seconds=6.0):
 
 def maker(rate=50.0, *, recorded=False):
     t = jittered(rate)
-    stretch = Stretch(t, rates(t), force(t), t, attitude(t), np.eye(3))
-    return NodeMaker(stretch, np.zeros(3), NOMINAL, recorded_attitude=recorded)
+    segment = Segment(t, rates(t), force(t), t, attitude(t), np.eye(3))
+    return NodeMaker(segment, np.zeros(3), NOMINAL, recorded_attitude=recorded)
 
 
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.integers(0, 1000))
@@ -85,8 +85,8 @@ def test_a_constant_rate_turns_an_interval_by_its_angle():
     t = np.arange(0.0, 2.0, 0.02)
     w = np.tile([0.3, -0.5, 0.8], (len(t), 1))
     still = np.array([np.eye(3)] * 2)  # attitude is known at two moments only
-    stretch = Stretch(t, w, np.zeros_like(w), t[:2], still, np.eye(3))
-    made = NodeMaker(stretch, np.zeros(3), NOMINAL).intervals(np.array([0.5]), np.array([0.9]))
+    segment = Segment(t, w, np.zeros_like(w), t[:2], still, np.eye(3))
+    made = NodeMaker(segment, np.zeros(3), NOMINAL).intervals(np.array([0.5]), np.array([0.9]))
     np.testing.assert_allclose(made.P[0, -1], rotation_from_vector(0.4 * w[0]), atol=1e-9)
 
 
@@ -152,8 +152,8 @@ def test_bias_is_subtracted_and_the_six_applied():
     six = np.array([1.1, 0.9, 1.2, 0.3, -0.2, 0.1])
     R_bs = rotation_from_vector(np.array([0.0, 0.0, np.pi / 2]))
     bias = np.array([0.01, 0.02, -0.03])
-    stretch = Stretch(t, rates(t), force(t), t, attitude(t), R_bs)
-    got = NodeMaker(stretch, bias, six).signals(t[5:9])
+    segment = Segment(t, rates(t), force(t), t, attitude(t), R_bs)
+    got = NodeMaker(segment, bias, six).signals(t[5:9])
     np.testing.assert_allclose(got.w_b, rates(t[5:9]) - bias, atol=1e-12)
     np.testing.assert_allclose(got.f_b, (force(t[5:9]) * six[:3] + six[3:]) @ R_bs.T, atol=1e-12)
 

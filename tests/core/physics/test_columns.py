@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onboard.core.inputs.segments import Stretch
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.model.nuisances import (
@@ -61,8 +61,8 @@ TEMPERATURE, THROTTLE = 25.0 + 4.0 * T, 0.5 + 0.2 * np.sin(T)
 def nodes_of(f_read):
     slow = {"temperature": (T[::20], TEMPERATURE[::20]), "throttle": (T[::20], THROTTLE[::20])}
     step = slice(None, None, 10)  # 200 Hz
-    stretch = Stretch(T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow)
-    made = NodeMaker(stretch, np.zeros(3), NOMINAL)
+    segment = Segment(T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow)
+    made = NodeMaker(segment, np.zeros(3), NOMINAL)
     return made.intervals(EPOCHS[:-1], EPOCHS[1:]), made.around(EPOCHS)
 
 

@@ -1,4 +1,4 @@
-"""The law of an effect: the curve that its generator obeys, over the range that was flown."""
+"""Response curves: what a generator obeys is found, over the range that was flown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ G = 9.80665
 
 
 @dataclass
-class Stretch:
+class Segment:
     raw_s: np.ndarray
     slow: dict
     R_bs: np.ndarray
@@ -26,8 +26,8 @@ class Fixes:
 
 
 @dataclass
-class Chunk:
-    stretch: Stretch
+class Batch:
+    segment: Segment
     fixes: Fixes
 
 
@@ -40,23 +40,23 @@ def flight():
         "throttle": (t, np.linspace(0.2, 0.8, 500)),
         "vibration": (t, np.column_stack([t * 0 + 1.0, t * 0 + 2.0, np.linspace(0.0, 9.0, 500)])),
     }
-    return [Chunk(Stretch(force, slow, np.eye(3)), Fixes(t))]
+    return [Batch(Segment(force, slow, np.eye(3)), Fixes(t))]
 
 
-def law(name, flight, /, **values):
+def response_curve(name, flight, /, **values):
     unknowns = {k: Quantity(v, 0.1 * abs(v), "") for k, v in values.items()}
     return law_of(name, unknowns, flight, 100.0, 35.0)
 
 
 def test_a_drift_is_nothing_at_its_reference_and_covers_what_was_felt(flight):
-    found = law("temperature_drift", flight, x=0.01, y=-0.02, z=0.0)
+    found = response_curve("temperature_drift", flight, x=0.01, y=-0.02, z=0.0)
     assert found.x[[0, -1]] == pytest.approx([20.0, 50.0])
     np.testing.assert_allclose(found.y["x"], 0.01 * (found.x - 35.0))
     np.testing.assert_allclose(found.sigma["y"], 0.002 * np.abs(found.x - 35.0))
 
 
 def test_curvature_is_drawn_for_each_axis_where_it_has_been(flight):
-    found = law("scale_nonlinearity", flight, x=0.01, y=0.01, z=0.02)
+    found = response_curve("scale_nonlinearity", flight, x=0.01, y=0.01, z=0.02)
     seen = np.isfinite(found.y["z"])
     assert found.x[seen].max() < -0.9
     np.testing.assert_allclose(found.y["z"][seen], 0.02 * (G * found.x[seen]) ** 2 / G)
@@ -90,12 +90,12 @@ def test_a_jump_is_sharp(flight):
     ],
 )
 def test_one_unit_of_an_unknown_makes_what_the_catalogue_says(flight, name, unknown, at, value):
-    found = law(name, flight, **{unknown: 1.0})
+    found = response_curve(name, flight, **{unknown: 1.0})
     assert np.interp(at, found.x, found.y[unknown]) == pytest.approx(value, rel=2e-2)
 
 
 def test_what_follows_no_single_signal_has_no_law(flight):
-    assert law("gps_lever_arm", flight, x=1.0) is None
-    assert law("temperature_drift", [], x=1.0) is None
-    flight[0].stretch.slow = {}
-    assert law("temperature_drift", flight, x=1.0) is None
+    assert response_curve("gps_lever_arm", flight, x=1.0) is None
+    assert response_curve("temperature_drift", [], x=1.0) is None
+    flight[0].segment.slow = {}
+    assert response_curve("temperature_drift", flight, x=1.0) is None
