@@ -27,7 +27,7 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import EstimatorSettings
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages, truth_record
 
@@ -142,7 +142,7 @@ def _true_unknowns(record: dict[str, Any], truth: dict[str, Any]) -> dict[str, f
 
 
 def _measured(truth: dict[str, Any], said: Diagnosis) -> Iterable[Measured]:
-    by_name: dict[str, Effect] = {e.name: e for e in said.effects}
+    by_name: dict[str, Finding] = {e.name: e for e in said.effects}
     for record in truth["effects"]:
         effect = by_name.get(record["name"])
         if effect is None:

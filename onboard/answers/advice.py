@@ -17,7 +17,7 @@ from onboard.core.diagnosis.evidence import AMBIGUOUS
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.errors import PushError
 from onboard.push.physics import GEOMETRY
 from onboard.push.plan import PushPlan, propose
@@ -61,7 +61,7 @@ class Advice:
             first.setdefault(refusal.objection, refusal.sentence)
         return tuple(first.values())
 
-    def to_set(self, effects: Sequence[Effect] = ()) -> dict[str, float]:
+    def to_set(self, effects: Sequence[Finding] = ()) -> dict[str, float]:
         """Every parameter that may be set: the six that are seen, and the cures of ``effects``."""
         six = {}
         if self.plan is not None and self.settable:
@@ -76,7 +76,7 @@ class Advice:
         return cures | six
 
 
-def cure_parameters(effect: Effect) -> dict[str, float]:
+def cure_parameters(effect: Finding) -> dict[str, float]:
     """Parameters that cure an effect; none where they hold it already."""
     return {} if effect.cure.startswith("none") else effect.parameters
 
@@ -158,7 +158,7 @@ def _objections(
 
 
 def _against(
-    effect: Effect, diagnosis: Diagnosis, parameters: Mapping[str, float], settings: PolicySettings
+    effect: Finding, diagnosis: Diagnosis, parameters: Mapping[str, float], settings: PolicySettings
 ) -> str:
     """Why the parameters of a found effect should not be set; empty if they may be.
 

@@ -28,7 +28,7 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.push.physics import GEOMETRY, IN_EVERY_MODEL, NO_ONE_NUMBER, Diagnosed, words_of
 
 MOVED_SIGMAS = 2.0
@@ -171,7 +171,7 @@ def _noted(diagnosis: Diagnosis, said: str) -> Diagnosis:
     return replace(diagnosis, calibration=replace(c, note=note))
 
 
-def _cured(effects: Sequence[Effect]) -> str:
+def _cured(effects: Sequence[Finding]) -> str:
     """What is missing and what to do about it."""
     cures = [
         f"set {', '.join(f'{n} {v:.4g}' for n, v in e.parameters.items())}"

@@ -16,7 +16,7 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.core.maths.frames import board_rotation
 from onboard.core.physics.effect import AXES, REFERENCE_DEGC
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 
 
 def conditions(diagnosis: Diagnosis, parameters: Mapping[str, float]) -> dict[str, str]:
@@ -43,12 +43,12 @@ def conditions(diagnosis: Diagnosis, parameters: Mapping[str, float]) -> dict[st
     return out
 
 
-def _step(effect: Effect, offset: float, change: float) -> str:
+def _step(effect: Finding, offset: float, change: float) -> str:
     t = effect.unknowns["time"].value
     return f"{offset:.4f} until {t:.0f} s, {offset + change:.4f} from then on"
 
 
-def _drift(effect: Effect, offset: float, change: float) -> str:
+def _drift(effect: Finding, offset: float, change: float) -> str:
     said = f"{offset:.4f} at {REFERENCE_DEGC:.0f} degC, {change:+.4f} per degree"
     if effect.response_curve is None:
         return said
@@ -56,7 +56,7 @@ def _drift(effect: Effect, offset: float, change: float) -> str:
     return f"{said}, flown from {low:.0f} to {high:.0f} degC"
 
 
-def _ramp(effect: Effect, offset: float, change: float) -> str:
+def _ramp(effect: Finding, offset: float, change: float) -> str:
     said = f"{offset:.4f} at 0 s"
     if effect.response_curve is None:
         return f"{said}, {60.0 * change:+.4f} per minute"

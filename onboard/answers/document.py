@@ -14,7 +14,7 @@ import msgspec
 from onboard.answers.advice import Advice
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 
 REPLAY_SCHEMA = "onboard.replay/1"
 TIMING = ("gps_delay_s", "gps_smoothing_window_s", "imu_delay_s")
@@ -248,7 +248,9 @@ def imu_document(
     )
 
 
-def advice_document(advice: Advice | None, effects: Sequence[Effect] = ()) -> AdviceDocument | None:
+def advice_document(
+    advice: Advice | None, effects: Sequence[Finding] = ()
+) -> AdviceDocument | None:
     """The advice as other programs read it; None where there is none.
 
     Args:

@@ -23,7 +23,7 @@ from onboard.answers.document import (
 from onboard.answers.verdict import unused_in_words
 from onboard.answers.words import DISTRUST
 from onboard.core.diagnosis.records import Diagnosis
-from onboard.core.physics.finding import Effect, Where
+from onboard.core.physics.finding import Finding, Where
 from onboard.push.physics import headline, severity_of_effect
 
 EXPLAIN_SCHEMA = "onboard.explain/1"
@@ -235,7 +235,7 @@ def explain_document(
     )
 
 
-def _effect(e: Effect, autopilot: str) -> EffectDocument:
+def _effect(e: Finding, autopilot: str) -> EffectDocument:
     return EffectDocument(
         name=e.name,
         severity=severity_of_effect(e.name),

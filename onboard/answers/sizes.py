@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from onboard.answers.words import DEGREE, fixed, listed, unit_in_words
-from onboard.core.physics.finding import Effect, Quantity
+from onboard.core.physics.finding import Finding, Quantity
 
 SURE = 3.0
 """Sigmas from which one of several unknowns is worth a word."""
@@ -14,7 +14,7 @@ PARTS_PER_MILLION = 1e6
 SIDES = {"x": ("forward", "back"), "y": ("right", "left"), "z": ("down", "up")}
 
 
-def size_in_words(effect: Effect) -> str:
+def size_in_words(effect: Finding) -> str:
     """``by 259 ± 8 ms``; empty where there is nothing finite to say."""
     said = _SAID.get(effect.name, _plain)(effect)
     return "" if not math.isfinite(sum(q.value for q in effect.unknowns.values())) else said
@@ -55,48 +55,48 @@ def _axes(unknowns: Mapping[str, Quantity], factor: float = 1.0, unit: str | Non
     return f"{', '.join(each)}{unit if unit == '°' else f' {unit}'}".rstrip()
 
 
-def _plain(effect: Effect) -> str:
+def _plain(effect: Finding) -> str:
     return _axes(effect.unknowns)
 
 
-def _by(factor: float, unit: str) -> Callable[[Effect], str]:
-    def said(effect: Effect) -> str:
+def _by(factor: float, unit: str) -> Callable[[Finding], str]:
+    def said(effect: Finding) -> str:
         q = next(iter(effect.unknowns.values()))
         return f"by {_measured(q, factor, unit)}"
 
     return said
 
 
-def _percent(effect: Effect) -> str:
+def _percent(effect: Finding) -> str:
     return f"{_axes(effect.unknowns, 100.0, '%')} per g"
 
 
-def _over(effect: Effect) -> str:
+def _over(effect: Finding) -> str:
     return f"over {_measured(next(iter(effect.unknowns.values())), 1e3, 'ms')}"
 
 
-def _attitude(effect: Effect) -> str:
+def _attitude(effect: Finding) -> str:
     q = next(iter(effect.unknowns.values()))
     late = Quantity(abs(q.value), q.sigma, q.unit)
     return f"attitude {'late' if q.value > 0.0 else 'early'} by {_measured(late, 1e3, 'ms')}"
 
 
-def _degrees(effect: Effect) -> str:
+def _degrees(effect: Finding) -> str:
     return f"by {_axes(effect.unknowns, 1.0 / DEGREE, '°')}"
 
 
-def _degrees_per(what: str) -> Callable[[Effect], str]:
+def _degrees_per(what: str) -> Callable[[Finding], str]:
     return lambda effect: f"by {_axes(effect.unknowns, 1.0 / DEGREE, '°')} {what}"
 
 
-def _jump(effect: Effect) -> str:
+def _jump(effect: Finding) -> str:
     rest = {k: q for k, q in effect.unknowns.items() if k != "time"}
     at = effect.unknowns.get("time")
     when = f"at {at.value:.0f} s " if at else ""
     return f"{when}by {_axes(rest)}"
 
 
-def _arm(effect: Effect) -> str:
+def _arm(effect: Finding) -> str:
     sides = [
         f"{abs(q.value):.{min(_places(q.sigma), 2)}f} m {SIDES[k][q.value < 0.0]}"
         for k, q in _sure(effect.unknowns).items()
@@ -105,24 +105,24 @@ def _arm(effect: Effect) -> str:
     return listed(sides) if sides else _plain(effect)
 
 
-def _limit(effect: Effect) -> str:
+def _limit(effect: Finding) -> str:
     q = effect.unknowns.get("limit")
     return f"of {fixed(q.value, 1)} m/s²{_times(effect)}" if q else ""
 
 
-def _fault(effect: Effect) -> str:
+def _fault(effect: Finding) -> str:
     whole = sum(b - a for a, b in effect.intervals)
     said = f"{fixed(whole, 0)} s in all{_times(effect)}"
     off = effect.unknowns.get("offset")
     return said if off is None else f"by {fixed(off.value, 1)} m/s, {said}"
 
 
-def _times(effect: Effect) -> str:
+def _times(effect: Finding) -> str:
     n = len(effect.intervals)
     return f", {n} times" if n > 1 else ""
 
 
-_SAID: dict[str, Callable[[Effect], str]] = {
+_SAID: dict[str, Callable[[Finding], str]] = {
     "gps_latency": _by(1e3, "ms"),
     "gps_smoothing": _over,
     "gps_lever_arm": _arm,

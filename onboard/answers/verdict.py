@@ -17,7 +17,7 @@ from onboard.answers.words import (
     signed,
 )
 from onboard.core.diagnosis.records import Diagnosis, Verdict
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.push import physics
 
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
@@ -86,7 +86,7 @@ def missing(diagnosis: Diagnosis) -> list[str]:
     return ["The residual is not noise, but no effect of the catalogue fits it."]
 
 
-def sized(effect: Effect) -> str:
+def sized(effect: Finding) -> str:
     """An effect with its size: ``GPS is late by 259 ± 8 ms``."""
     if effect.name == "empirical":
         return f"{effect_title(effect.name)}: {effect.formula}"
@@ -168,7 +168,7 @@ def _without_cure(diagnosis: Diagnosis) -> list[str]:
     return ["Look at where the residual lives for a cause."]
 
 
-def _named(effect: Effect, advice: Advice) -> str:
+def _named(effect: Finding, advice: Advice) -> str:
     return ", ".join(
         f"{advice.names.get(n, n)} = {setting(v)}"
         for n, v in cure_parameters(effect).items()
@@ -232,7 +232,7 @@ def strength(delta_bic: float) -> str:
     return "weak evidence"
 
 
-def surely(effect: Effect, *, ambiguous: bool) -> str:
+def surely(effect: Finding, *, ambiguous: bool) -> str:
     """How sure one effect is, as a sentence."""
     if effect.name in EXCLUDED:
         return "Seen in the measurements themselves; they were left out of the fit."

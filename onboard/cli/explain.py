@@ -19,7 +19,7 @@ from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.errors import UsageError
 from onboard.report.parameters import is_qgc, parameter_text
 
@@ -123,7 +123,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     return table
 
 
-def named(effect: Effect) -> str:
+def named(effect: Finding) -> str:
     """The effect's name for other programs, when it acts, and how much of the mismatch it is."""
     spans = [f"{a:.0f}-{b:.0f} s" for a, b in effect.intervals[:MOST_SPANS]]
     if len(effect.intervals) > MOST_SPANS:

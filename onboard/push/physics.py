@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from onboard.core.estimate.result import Calibration
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 
 IN_EVERY_MODEL = frozenset(
     {"gps_latency", "gps_smoothing", "imu_delay", "heading_error", "gps_fault"}
@@ -96,7 +96,7 @@ class Diagnosed:
     resumed: bool = False
 
 
-def words_of(effect: Effect) -> str:
+def words_of(effect: Finding) -> str:
     """A found effect as part of a sentence, with its size and its name."""
     size = float(np.linalg.norm([q.value for q in effect.unknowns.values()]))
     text = WORDS.get(effect.name, "something is missing")

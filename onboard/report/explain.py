@@ -10,7 +10,7 @@ from onboard.answers import verdict, words
 from onboard.answers.advice import Advice, cure_parameters
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.physics.finding import Effect, Where
+from onboard.core.physics.finding import Finding, Where
 from onboard.report import residual_charts
 from onboard.report.chart import pair_bar
 from onboard.report.page import render
@@ -161,7 +161,7 @@ def _where(w: Where) -> str:
     return f"{span}: {w.regime}, mostly {axis}, {words.percent(w.share)} of the mismatch"
 
 
-def _card(e: Effect, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any]:
+def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any]:
     before, after = e.held_out_velocity_before, e.held_out_velocity_after
     known = math.isfinite(before) and math.isfinite(after)
     return {
@@ -192,7 +192,7 @@ def _card(e: Effect, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any
     }
 
 
-def _intervals(e: Effect) -> list[str]:
+def _intervals(e: Finding) -> list[str]:
     return [f"{words.fixed(a, 1)} to {words.fixed(b, 1)} s" for a, b in e.intervals[:MOST_SPANS]]
 
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from onboard.answers import words
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.records import Diagnosis, Verdict
-from onboard.core.physics.finding import Effect, Imprint, ResponseCurve
+from onboard.core.physics.finding import Finding, Imprint, ResponseCurve
 from onboard.report.chart import Band, Line, Ribbon, line_chart
 
 COMPONENTS = ("North", "East", "Down")
@@ -79,7 +79,7 @@ def _onsets(d: Diagnosis) -> list[float]:
     return [t for t in times if math.isfinite(t)]
 
 
-def of_effect(effect: Effect) -> list[Markup]:
+def of_effect(effect: Finding) -> list[Markup]:
     """How well the effect follows the data, and the response curve that it obeys."""
     out = []
     if effect.imprint is not None and len(effect.imprint.t) > 1:

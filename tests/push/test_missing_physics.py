@@ -8,7 +8,7 @@ import pytest
 from onboard.answers.answer import diagnosed, judged
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, Plain, Series, Verdict
 from onboard.core.estimate.result import Status
-from onboard.core.physics.finding import Effect, Quantity
+from onboard.core.physics.finding import Finding, Quantity
 from onboard.push.physics import headline
 from tests.push.calibrations import SIGMAS, calibration
 
@@ -16,7 +16,7 @@ NAN = float("nan")
 
 
 def effect(name, parameters=None, **unknowns):
-    return Effect(
+    return Finding(
         name=name,
         unknowns={key: Quantity(value, 0.01, "") for key, value in unknowns.items()},
         share_of_mismatch=0.5,

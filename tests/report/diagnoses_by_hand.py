@@ -19,7 +19,7 @@ from onboard.core.diagnosis.records import (
     Verdict,
 )
 from onboard.core.estimate.result import Calibration, Coverage, Estimate, Status
-from onboard.core.physics.finding import Confounder, Effect, Quantity, Where
+from onboard.core.physics.finding import Confounder, Finding, Quantity, Where
 
 NAN = float("nan")
 SIGMAS = (0.001, 0.001, 0.01, 0.01, 0.01, 0.2)
@@ -64,7 +64,7 @@ def calibration(**changed: object) -> Calibration:
     return Calibration(**(values | changed))  # type: ignore[arg-type]  # a table of fields
 
 
-def effect(name: str = "gps_latency", **changed: object) -> Effect:
+def effect(name: str = "gps_latency", **changed: object) -> Finding:
     values: dict[str, object] = {
         "name": name,
         "unknowns": {"delay": Quantity(0.21, 0.004, "s")},
@@ -80,7 +80,7 @@ def effect(name: str = "gps_latency", **changed: object) -> Effect:
         "confounders": (Confounder("gps_smoothing", 55.0),),
         "intervals": ((30.0, 40.0),),
     }
-    return Effect(**(values | changed))  # type: ignore[arg-type]  # a table of fields
+    return Finding(**(values | changed))  # type: ignore[arg-type]  # a table of fields
 
 
 def diagnosis(*, n: int = 20000, **changed: object) -> Diagnosis:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.inputs.segments import Batch
-from onboard.core.physics.finding import Effect, Quantity
+from onboard.core.physics.finding import Finding, Quantity
 
 RAIL_SAMPLES, RAIL_RUN = 12, 4
 FEWEST_CLIPPED = 5
@@ -18,7 +18,7 @@ LEAST_RAIL = 10.3
 """More than any accelerometer that is at rest reads, m/s^2."""
 
 
-def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Effect | None:
+def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:
     """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
 
     Args:
@@ -31,7 +31,7 @@ def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Effect |
     return _stuck(batches, t0) or _counted(batches, t0, imu)
 
 
-def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Effect | None:
+def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:
     """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
     names = [c.segment.slow["clipping"] for c in batches if "clipping" in c.segment.slow]
     if not names:
@@ -65,7 +65,7 @@ def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Effect | None:
     return _saturation(batches, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
 
 
-def _stuck(batches: Sequence[Batch], t0: float) -> Effect | None:
+def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
     """Accelerometer samples that stay at one extreme value: the rail of its range."""
     raw = np.concatenate([c.segment.raw_s for c in batches])
     t = np.concatenate([c.segment.t for c in batches])
@@ -97,11 +97,11 @@ def _saturation(
     sensor_axis: int,
     clipped: Sequence[tuple[float, float]],
     share: float,
-) -> Effect:
+) -> Finding:
     """The record of a clipping accelerometer; ``clipped`` s on the boot clock."""
     intervals = tuple((a - t0, b - t0) for a, b in clipped)
     axis = "body_" + "xyz"[int(np.argmax(np.abs(batches[0].segment.R_bs[:, sensor_axis])))]
-    return Effect(
+    return Finding(
         name="saturation",
         unknowns={"limit": Quantity(limit, sigma, "m/s^2")},
         share_of_mismatch=share,

@@ -51,7 +51,7 @@ from onboard.core.maths.chi_square import survival
 from onboard.core.model.nuisances import AntennaPlace
 from onboard.core.physics.effect import EffectColumns, Origin
 from onboard.core.physics.empirical import Product
-from onboard.core.physics.finding import Confounder, Effect, Quantity, Where
+from onboard.core.physics.finding import Confounder, Finding, Quantity, Where
 from onboard.core.physics.mount import trim_in_words
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
@@ -99,7 +99,7 @@ class Judge:
         evidence: Evidence,
         origin: Origin,
         absent: Sequence[NotTestable],
-        excluded: Sequence[Effect],
+        excluded: Sequence[Finding],
     ) -> None:
         """Take the flight, the models, what cannot be asked, and what was left out of the fit."""
         final = evidence.final
@@ -234,7 +234,7 @@ class Judge:
 
     def _standing(
         self, name: str, quantities: dict[str, Quantity], cure: str, parameters: dict[str, float]
-    ) -> Effect:
+    ) -> Finding:
         columns = STANDING[name]
         index = [self.index[c] for c in columns]
         held = self._held(columns)
@@ -264,7 +264,7 @@ class Judge:
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(confounders_of(choice.fitter, rest, target, others, held))
 
-    def _effect(self, f: EffectColumns) -> Effect:
+    def _effect(self, f: EffectColumns) -> Finding:
         index = [i for i in self.all if i in self.engine.indices(f)]
         sigma = np.sqrt(np.diag(self.solution.covariance))
         taken = {"clock_rate": self.engine.point.skew}
@@ -297,12 +297,12 @@ class Judge:
         held: Array,
         parameters: dict[str, float],
         cure: str,
-    ) -> Effect:
+    ) -> Finding:
         without, with_it = self._without(index, held)
         rest = [i for i in self.all if i not in index]
         theta = self.solution.theta
         bic = self.fitter.gain(without, with_it) - len(index) * np.log(max(self.fitter.rows, 2.0))
-        return Effect(
+        return Finding(
             name=name,
             unknowns=quantities,
             share_of_mismatch=self._share(without, with_it),
@@ -335,7 +335,7 @@ class Judge:
             Residuals(series.t + self.origin.t0, series.before, series.after),
         )
 
-    def _found(self, effects: Sequence[Effect]) -> list[int]:
+    def _found(self, effects: Sequence[Finding]) -> list[int]:
         """Columns of what was found; where nothing was, of the six."""
         names = {e.name for e in effects}
         out = [self.index[c] for name, cs in STANDING.items() if name in names for c in cs]
@@ -343,7 +343,7 @@ class Judge:
         return out or list(range(6))
 
     def _mismatch(
-        self, before: Fit, after: Fit, effects: Sequence[Effect], ladder: Sequence[Rung]
+        self, before: Fit, after: Fit, effects: Sequence[Finding], ladder: Sequence[Rung]
     ) -> Mismatch:
         gain = self.fitter.gain(before, after)
         added = len(NOT_AT_FIRST) + len(self.engine.indices_of(self.families))
@@ -373,7 +373,7 @@ class Judge:
         return self.epochs.held_out_rms(self.fitter.held_fits(free, held))
 
     def _verdict(
-        self, effects: list[Effect], mismatch: Mismatch, *, insufficient: bool
+        self, effects: list[Finding], mismatch: Mismatch, *, insufficient: bool
     ) -> tuple[Verdict, str]:
         note = self.calibration.note
         if insufficient:
@@ -402,7 +402,7 @@ class Judge:
             )
         return Verdict.CLEAN, note
 
-    def _ambiguous(self, effects: list[Effect]) -> tuple[Ambiguity, ...]:
+    def _ambiguous(self, effects: list[Finding]) -> tuple[Ambiguity, ...]:
         by_name = {f.effect: f for f in self.families}
         out = []
         for e in effects:
@@ -424,7 +424,7 @@ class Judge:
                 return tuple(self.choice.confounders(c))
         return ()
 
-    def _too_weak(self, effects: list[Effect]) -> list[NotTestable]:
+    def _too_weak(self, effects: list[Finding]) -> list[NotTestable]:
         """Effects that this flight could not have shown at any plausible size."""
         named = {e.name for e in effects}
         out: list[NotTestable] = []

@@ -13,7 +13,7 @@ from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import Effect, Quantity
+from onboard.core.physics.finding import Finding, Quantity
 
 FAULT_S = 1.0
 ONSET_FIXES = 3
@@ -33,7 +33,7 @@ def fault_effect(
     coast_s: float,
     distrusted: Sequence[tuple[float, float]] = (),
     contradicted: Sequence[Contradiction] = (),
-) -> Effect | None:
+) -> Finding | None:
     """GPS velocities that cannot be true: refused by the innovation gate for a while.
 
     Args:
@@ -65,7 +65,7 @@ def fault_effect(
         sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
     t = np.unique(np.concatenate([c.fixes.t for c in batches])) - t0
     inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
-    return Effect(
+    return Finding(
         name="gps_fault",
         unknowns=sizes,
         share_of_mismatch=float(np.mean(inside)),

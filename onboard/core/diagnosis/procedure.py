@@ -54,7 +54,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import EffectColumns, Origin
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 from onboard.core.physics.gains import Gain, ScaleNonlinearity
 from onboard.core.physics.offsets import BiasStep
 from onboard.core.physics.receiver import LeverArm
@@ -106,7 +106,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         absent.append(NotTestable(ScaleNonlinearity.effect, "clipping bends the scale as well"))
     full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
     clipped = rail is not None and batches is flight
-    fault: Effect | None = None
+    fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
         fault, batches = false_fixes(calibrator, engine, full, origin.t0)

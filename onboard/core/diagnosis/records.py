@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from onboard.core.estimate.result import Calibration, Estimate, Six
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import NAN, Effect, Where
+from onboard.core.physics.finding import NAN, Finding, Where
 
 
 class Verdict(Enum):
@@ -152,7 +152,7 @@ class Diagnosis:
     calibration: Calibration
     timing: dict[str, Estimate]
     mismatch: Mismatch
-    effects: tuple[Effect, ...]
+    effects: tuple[Finding, ...]
     ambiguous: tuple[Ambiguity, ...]
     not_testable: tuple[NotTestable, ...]
     ladder: tuple[Rung, ...]

@@ -9,7 +9,7 @@ from typing import Final
 from onboard.core.diagnosis.records import Unused
 from onboard.core.gps.trust import Reason, Refusal
 from onboard.core.inputs.segments import Batch
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 
 OPINIONS: Final = frozenset(
     {
@@ -79,7 +79,7 @@ def believed(batches: Sequence[Batch]) -> int:
 def unused_flight(
     batches: Sequence[Batch],
     refusals: Sequence[Refusal],
-    fault: Effect | None,
+    fault: Finding | None,
     t0: float,
     *,
     asked: bool,

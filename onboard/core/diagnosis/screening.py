@@ -25,7 +25,7 @@ from onboard.core.filter.traces import EpochTrace
 from onboard.core.gps.trust import Reason
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import Effect
+from onboard.core.physics.finding import Finding
 
 MARGIN_S = 0.4
 """Around clipped samples: the accelerometer's low-pass and the receiver's delay."""
@@ -81,7 +81,7 @@ def unclipped(
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> tuple[Effect | None, list[Batch]]:
+) -> tuple[Finding | None, list[Batch]]:
     """GPS velocities that cannot be true, and the flight with those not to be believed.
 
     Noise levels that were found with the false ones among the rest would let them pass: the

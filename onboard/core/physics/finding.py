@@ -72,7 +72,7 @@ class ResponseCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class Finding:
     """One accepted effect with its evidence.
 
     ``parameters`` are the autopilot parameters to set and their values; ``cure`` says in words what
