@@ -17,9 +17,10 @@ from onboard.core.diagnosis.evidence import AMBIGUOUS
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.effect import Bearing
 from onboard.core.physics.finding import Finding
 from onboard.errors import PushError
-from onboard.push.physics import GEOMETRY
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, Objection, PolicySettings, Refusal, objections
 
@@ -70,15 +71,10 @@ class Advice:
             self.names.get(name, name): value
             for e in effects
             if e.name not in self.against
-            for name, value in cure_parameters(e).items()
+            for name, value in e.parameters.items()
             if math.isfinite(value)
         }
         return cures | six
-
-
-def cure_parameters(effect: Finding) -> dict[str, float]:
-    """Parameters that cure an effect; none where they hold it already."""
-    return {} if effect.cure.startswith("none") else effect.parameters
 
 
 def advise(
@@ -122,7 +118,7 @@ def advise(
         against = {
             e.name: why
             for e in a.diagnosis.effects
-            if cure_parameters(e) and (why := _against(e, a.diagnosis, parameters, settings))
+            if e.parameters and (why := _against(e, a.diagnosis, parameters, settings))
         }
         names = {new: old for new, old in FORMER_NAMES.items() if _former(new, parameters)}
         out.append(Advice(plan, refusals, conditions(a.diagnosis, parameters), against, names))
@@ -171,7 +167,8 @@ def _against(
     confounders |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
     if confounders := confounders - {effect.name}:
         return f"not told apart from {', '.join(sorted(confounders))}"
-    if effect.name in GEOMETRY and diagnosis.calibration.status is not Status.CALIBRATED:
+    beside = bearing_of(effect.name) is Bearing.BESIDE
+    if beside and diagnosis.calibration.status is not Status.CALIBRATED:
         return "it is read off from the accelerometer, which this flight does not calibrate"
     before, after = effect.held_out_before, effect.held_out_after
     if not after <= settings.improvement * before:

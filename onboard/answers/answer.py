@@ -28,8 +28,10 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
+from onboard.core.physics.catalogue import bearing_of, phrase_of
+from onboard.core.physics.effect import Bearing
 from onboard.core.physics.finding import Finding
-from onboard.push.physics import GEOMETRY, IN_EVERY_MODEL, NO_ONE_NUMBER, Diagnosed, words_of
+from onboard.push.diagnosed import Diagnosed
 
 MOVED_SIGMAS = 2.0
 """Of what is claimed for a number: how far missing physics may move it (5 % move it by chance)."""
@@ -82,19 +84,19 @@ def judged(diagnosis: Diagnosis) -> Answer:
     Args:
         diagnosis: with the calibration as its engine gave it.
     """
-    suspects = [e for e in diagnosis.effects if e.name not in IN_EVERY_MODEL]
+    suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         return Answer(_refused(diagnosis))
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
-        found = ", ".join(words_of(e) for e in suspects)
+        found = ", ".join(phrase_of(e) for e in suspects)
         missing = "the residual is not noise, and " + (
             f"what was found ({found}) does not explain all of it"
             if found
             else "no known effect explains it"
         )
         return Answer(_withdrawn(diagnosis, missing), missing)
-    names = {e.name for e in suspects}
-    if names & NO_ONE_NUMBER:
+    bearings = {bearing_of(e.name) for e in suspects}
+    if Bearing.NO_ONE_NUMBER in bearings:
         missing = _cured(suspects)
         return Answer(_withdrawn(diagnosis, missing), missing)
     moved = moved_most(diagnosis) if suspects else None
@@ -102,7 +104,7 @@ def judged(diagnosis: Diagnosis) -> Answer:
         return Answer(diagnosis)
     name, by, sigmas = moved
     missing = f"{_cured(suspects)} (it moves the {name} by {by:+.2g}, {sigmas:.1f} sigma)"
-    if not names <= GEOMETRY:
+    if bearings != {Bearing.BESIDE}:
         return Answer(_withdrawn(diagnosis, missing), missing)
     noted = _noted(diagnosis, f"taken into account beside the six: {missing}")
     return Answer(noted, missing, diagnosis.calibration.status is Status.CALIBRATED)
@@ -180,5 +182,5 @@ def _cured(effects: Sequence[Finding]) -> str:
         for e in effects
     ]
     todo = "; ".join(dict.fromkeys(c for c in cures if c))
-    found = ", ".join(words_of(e) for e in effects)
+    found = ", ".join(phrase_of(e) for e in effects)
     return f"{found}: {todo}; then fly again" if todo else found

@@ -24,7 +24,7 @@ from onboard.answers.verdict import unused_in_words
 from onboard.answers.words import DISTRUST
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.physics.finding import Finding, Where
-from onboard.push.physics import headline, severity_of_effect
+from onboard.push.diagnosed import headline, severity_of_effect
 
 EXPLAIN_SCHEMA = "onboard.explain/1"
 

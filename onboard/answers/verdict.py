@@ -5,25 +5,22 @@ from __future__ import annotations
 import math
 import re
 
-from onboard.answers.advice import Advice, cure_parameters
-from onboard.answers.sizes import size_in_words
+from onboard.answers.advice import Advice
 from onboard.answers.words import (
     DISTRUST,
     capital,
-    effect_title,
     fixed,
     number,
     setting,
     signed,
 )
 from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.physics.catalogue import is_excluded, is_named, size_of, title_of
 from onboard.core.physics.finding import Finding
-from onboard.push import physics
+from onboard.push import diagnosed
 
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 """For terminals, by severity."""
-EXCLUDED = ("gps_fault", "saturation")
-"""Effects that are seen in the data themselves, which are then left out of the fit."""
 MOST_NAMED = 2
 NOISE = 1.3
 """Held-out residual, in units of the noise, up to which it may be called noise."""
@@ -45,10 +42,10 @@ def headline(diagnosis: Diagnosis) -> str:
         return "This flight cannot tell"
     if diagnosis.verdict is Verdict.CLEAN:
         return "Nothing is missing" + (WHERE_BELIEVED if diagnosis.unused else "")
-    named = [e for e in diagnosis.effects if e.name != "empirical"]
+    named = [e for e in diagnosis.effects if is_named(e.name)]
     if not named:
         return "Something is missing, and nothing known explains it"
-    titles = [effect_title(e.name) for e in named[:MOST_NAMED]]
+    titles = [title_of(e.name) for e in named[:MOST_NAMED]]
     # A name that begins with capitals keeps them in the middle of a sentence.
     found = [t if t[:2].isupper() or not k else t[:1].lower() + t[1:] for k, t in enumerate(titles)]
     more = len(named) - len(titles)
@@ -61,7 +58,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def severity(diagnosis: Diagnosis) -> str:
     """``good``, ``info``, ``warning`` or ``error``."""
-    return physics.headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])[1]
+    return diagnosed.headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])[1]
 
 
 def missing(diagnosis: Diagnosis) -> list[str]:
@@ -88,13 +85,13 @@ def missing(diagnosis: Diagnosis) -> list[str]:
 
 def sized(effect: Finding) -> str:
     """An effect with its size: ``GPS is late by 259 ± 8 ms``."""
-    if effect.name == "empirical":
-        return f"{effect_title(effect.name)}: {effect.formula}"
-    size = size_in_words(effect)
+    if not is_named(effect.name):
+        return f"{title_of(effect.name)}: {effect.formula}"
+    size = size_of(effect)
     if not size:
-        return effect_title(effect.name)
+        return title_of(effect.name)
     joint = " " if size.startswith(("by ", "at ", "over ", "of ")) else ": "
-    return f"{effect_title(effect.name)}{joint}{size}"
+    return f"{title_of(effect.name)}{joint}{size}"
 
 
 def proof(diagnosis: Diagnosis) -> str:
@@ -171,7 +168,7 @@ def _without_cure(diagnosis: Diagnosis) -> list[str]:
 def _named(effect: Finding, advice: Advice) -> str:
     return ", ".join(
         f"{advice.names.get(n, n)} = {setting(v)}"
-        for n, v in cure_parameters(effect).items()
+        for n, v in effect.parameters.items()
         if math.isfinite(v)
     )
 
@@ -234,7 +231,7 @@ def strength(delta_bic: float) -> str:
 
 def surely(effect: Finding, *, ambiguous: bool) -> str:
     """How sure one effect is, as a sentence."""
-    if effect.name in EXCLUDED:
+    if is_excluded(effect.name):
         return "Seen in the measurements themselves; they were left out of the fit."
     text = strength(effect.delta_bic).capitalize()
     before, after = effect.held_out_velocity_before, effect.held_out_velocity_after

@@ -1,38 +1,28 @@
-"""Plain words and readable numbers for the controlled vocabulary of effects."""
+"""Readable numbers, and the words of timing and of distrusted GPS."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from onboard.core.physics.finding import Quantity
+from onboard.core.physics.wording import DEGREE, UNKNOWN, fixed, listed, unit_in_words
 
-UNKNOWN = "not known"
-DEGREE = math.pi / 180.0
-
-EFFECTS = {
-    "gps_latency": "GPS is late",
-    "gps_smoothing": "GPS averages its velocity",
-    "gps_lever_arm": "The GPS antenna is away from the IMU",
-    "imu_delay": "Attitude and accelerometer are not simultaneous",
-    "cross_axis": "The accelerometer's axes are not square",
-    "mount_tilt": "The accelerometer is tilted against the attitude",
-    "heading_error": "The heading is off",
-    "heading_by_throttle": "The motors pull the compass",
-    "temperature_drift": "The offset follows the temperature",
-    "bias_ramp": "The offset grows with time",
-    "bias_step": "The offset jumped",
-    "scale_nonlinearity": "The scale changes with the load",
-    "vibration_rectification": "Vibration shifts the offset",
-    "throttle_coupling": "The throttle shifts the offset",
-    "saturation": "The accelerometer hit its limit",
-    "gps_fault": "GPS velocity was false for a while",
-    "clock_skew": "The GPS and IMU clocks run at different rates",
-    "gravity": "Gravity differs from the expected value",
-    "load_flex": "The mount bends under load",
-    "rotor_drag": "The rotors drag in the wind",
-    "empirical": "An unnamed dependence on a measured signal",
-}
+__all__ = [
+    "DISTRUST",
+    "TIMING",
+    "UNKNOWN",
+    "capital",
+    "fixed",
+    "listed",
+    "number",
+    "percent",
+    "quantity",
+    "seconds",
+    "setting",
+    "signed",
+    "unit_in_words",
+    "with_sigma",
+]
 
 
 TIMING = {
@@ -60,11 +50,6 @@ DISTRUST = {
 """Why GPS is not trusted."""
 
 
-def effect_title(name: str) -> str:
-    """The effect as a short sentence; unknown names read as words."""
-    return EFFECTS.get(name, name.replace("_", " "))
-
-
 def number(value: float, digits: int = 3) -> str:
     """``value`` with ``digits`` significant digits; words where it is not finite."""
     if not math.isfinite(value):
@@ -77,14 +62,6 @@ def number(value: float, digits: int = 3) -> str:
     if places < 0 or abs(value) < 1e-4:
         return f"{value:.{digits}g}".replace("-", "−")
     return f"{value:.{min(places, 7)}f}".replace("-", "−")
-
-
-def fixed(value: float, places: int) -> str:
-    """``value`` with ``places`` decimals; words where it is not finite."""
-    if not math.isfinite(value):
-        return UNKNOWN
-    rounded = round(value, places) + 0.0  # no minus before a zero
-    return f"{rounded:.{places}f}".replace("-", "−")
 
 
 def signed(value: float, places: int) -> str:
@@ -126,17 +103,6 @@ def quantity(q: Quantity) -> str:
         scale, unit = 1.0 / DEGREE, "°" + q.unit[3:]
     text = with_sigma(q.value * scale, q.sigma * scale)
     return f"{text} {unit_in_words(unit)}".rstrip(" -")
-
-
-def unit_in_words(unit: str) -> str:
-    """A unit with raised digits; nothing for a plain number."""
-    return "" if unit in ("1", "-") else unit.replace("^2", "²").replace("^3", "³")
-
-
-def listed(parts: Sequence[str]) -> str:
-    """``a``; ``a and b``; ``a, b and c``."""
-    *most, last = parts
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def capital(sentence: str) -> str:

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from onboard.answers import verdict, words
-from onboard.answers.advice import Advice, cure_parameters
+from onboard.answers.advice import Advice
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
 from onboard.core.physics.finding import Finding, Where
 from onboard.report import residual_charts
 from onboard.report.chart import pair_bar
@@ -73,10 +74,8 @@ def explain_html(
             for name, e in diagnosis.timing.items()
         ],
         parameters=() if advice is None else _parameters(diagnosis, advice),
-        ambiguous=[
-            ([words.effect_title(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous
-        ],
-        not_testable=[(words.effect_title(n.name), n.why) for n in diagnosis.not_testable],
+        ambiguous=[([title_of(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous],
+        not_testable=[(title_of(n.name), n.why) for n in diagnosis.not_testable],
     )
 
 
@@ -149,8 +148,8 @@ def _ladder(d: Diagnosis) -> list[dict[str, Any]]:
 def _step(name: str) -> tuple[str, str]:
     """A step in words, and the effect's name if it is one."""
     effect = name.removeprefix("+ ")
-    if effect in words.EFFECTS:
-        title = words.effect_title(effect)
+    if kind_of(effect) is not None:
+        title = title_of(effect)
         return "+ " + (title if title[:2].isupper() else title[:1].lower() + title[1:]), effect
     return name, ""
 
@@ -171,19 +170,19 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         "formula": e.formula,
         "share": words.percent(e.share_of_mismatch),
         "sure": verdict.surely(e, ambiguous=ambiguous),
-        "bic": words.number(e.delta_bic) if e.name not in verdict.EXCLUDED else "",
+        "bic": words.number(e.delta_bic) if not is_excluded(e.name) else "",
         "fit": _pair("Not used in the fit", "m/s", before, after, _longest((before, after)))
         if known
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
         "charts": residual_charts.of_effect(e),
-        "rivals": [(words.effect_title(r.name), words.number(r.delta_bic)) for r in e.confounders],
+        "rivals": [(title_of(r.name), words.number(r.delta_bic)) for r in e.confounders],
         "cure": e.cure,
         "parameters": []
         if advice is None
         else [
             (advice.names.get(n, n), words.setting(v))
-            for n, v in cure_parameters(e).items()
+            for n, v in e.parameters.items()
             if e.name not in advice.against
         ],
         "intervals": _intervals(e),

@@ -12,11 +12,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from onboard.answers.advice import Advice, cure_parameters
+from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
-from onboard.answers.words import effect_title
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES, Calibration
+from onboard.core.physics.catalogue import title_of
 
 REAL32 = 9
 INTEGERS = {
@@ -138,8 +138,8 @@ def _six(advice: Advice) -> Iterator[Change]:
 def _cures(diagnosis: Diagnosis, advice: Advice) -> Iterator[Change]:
     for effect in diagnosis.effects:
         withheld = advice.against.get(effect.name, "")
-        for name, value in cure_parameters(effect).items():
-            reason = f"{effect.name}: {effect_title(effect.name)}"
+        for name, value in effect.parameters.items():
+            reason = f"{effect.name}: {title_of(effect.name)}"
             yield Change(advice.names.get(name, name), value, reason, withheld)
 
 

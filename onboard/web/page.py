@@ -10,6 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from onboard.answers.words import DISTRUST
+from onboard.core.physics.catalogue import kinds
+
 if TYPE_CHECKING:
     from aiohttp import web
 
@@ -29,6 +32,11 @@ def look() -> str:
     return (STATIC / "look.css").read_text(encoding="utf-8")
 
 
+def vocabulary() -> dict[str, dict[str, str]]:
+    """Names of the snapshot in words: effects from the catalogue, reasons to distrust GPS."""
+    return {"effects": {kind.effect: kind.title for kind in kinds()}, "reasons": dict(DISTRUST)}
+
+
 def status_page(application: web.Application) -> None:
     """Serve the page at ``/`` and its files under ``/static/``.
 
@@ -39,6 +47,9 @@ def status_page(application: web.Application) -> None:
     async def index(_request: web.Request) -> web.StreamResponse:
         return web.FileResponse(STATIC / "index.html")
 
+    async def words(_request: web.Request) -> web.StreamResponse:
+        return web.json_response(vocabulary())
+
     async def complete(_request: web.Request, response: web.StreamResponse) -> None:
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
@@ -46,5 +57,6 @@ def status_page(application: web.Application) -> None:
         response.headers.setdefault("Cache-Control", "no-cache")
 
     application.router.add_get("/", index)
+    application.router.add_get("/words.json", words)
     application.router.add_static("/static/", STATIC)
     application.on_response_prepare.append(complete)

@@ -10,8 +10,8 @@ from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
-from onboard.push.physics import Diagnosed
 
 
 @asynccontextmanager

@@ -10,8 +10,8 @@ import pytest
 
 from onboard.answers import explain_document
 from onboard.answers.explain_document import EXPLAIN_SCHEMA
-from onboard.answers.words import EFFECTS
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.physics.catalogue import kinds
 
 MANUAL = (Path(__file__).resolve().parents[2] / "docs" / "explaining.md").read_text("utf-8")
 DOCUMENTS = [
@@ -43,4 +43,6 @@ def test_it_has_every_verdict_and_the_schema():
 
 
 def test_it_names_every_effect_as_the_program_does():
-    assert {row[0].strip("`"): row[1] for row in table("Effects")} == EFFECTS
+    assert [row[:3] for row in table("Effects")] == [
+        [f"`{kind.effect}`", kind.title, kind.meaning] for kind in kinds()
+    ]

@@ -9,7 +9,7 @@ from onboard.answers.answer import diagnosed, judged
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, Plain, Series, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding, Quantity
-from onboard.push.physics import headline
+from onboard.push.diagnosed import headline
 from tests.push.calibrations import SIGMAS, calibration
 
 NAN = float("nan")

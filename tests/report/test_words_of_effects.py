@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from onboard.answers.sizes import size_in_words
 from onboard.answers.verdict import cures, headline, missing, proof, remarks, sized, to_fly
-from onboard.answers.words import EFFECTS
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.physics.catalogue import kinds, size_of, title_of
 from onboard.core.physics.finding import Quantity
-from onboard.report.parameters import changes
 from tests.report.diagnoses_by_hand import NAN, advice_on, diagnosis, effect
 
 
@@ -38,13 +36,13 @@ def of(name: str, unit: str, /, intervals=(), **values: float):
     ],
 )  # fmt: skip
 def test_sizes_are_said_as_people_say_them(made, said):
-    assert size_in_words(made) == said
+    assert size_of(made) == said
 
 
-@pytest.mark.parametrize("name", sorted(EFFECTS))
+@pytest.mark.parametrize("name", sorted(k.effect for k in kinds()))
 def test_every_effect_can_be_said_with_and_without_a_known_size(name):
     known = of(name, "m/s^2", ((1.0, 2.0),), x=0.3, y=0.1)
-    assert sized(known).startswith(EFFECTS[name])
+    assert sized(known).startswith(title_of(name))
     unknown = effect(name, unknowns={"x": Quantity(NAN, NAN, "m/s^2")})
     assert "nan" not in sized(unknown)
 
@@ -95,11 +93,9 @@ def test_parameters_are_left_out_where_they_are_not_the_autopilots():
     assert cures(other) == ["Tell it the delay."]
 
 
-def test_what_the_parameters_hold_already_is_not_set_again():
-    held = effect("mount_tilt", cure="none: AHRS_TRIM holds it", parameters={"AHRS_TRIM_X": 0.02})
-    d = diagnosis(effects=(held,))
-    assert cures(d) == ["Nothing: AHRS_TRIM holds it."]
-    assert all(c.name != "AHRS_TRIM_X" for c in changes(d, advice_on(d)))
+def test_what_needs_no_cure_says_so():
+    held = effect("gps_latency", cure="none: the driver takes it", parameters={})
+    assert cures(diagnosis(effects=(held,))) == ["Nothing: the driver takes it."]
 
 
 def test_what_is_not_all_is_never_called_noise():

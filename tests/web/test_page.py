@@ -1,14 +1,13 @@
 """The status page in a real browser, against the daemon's HTTP server and a told story."""
 
 import re
-from importlib import resources
 
 import msgspec
 import pytest
 
-from onboard.answers.words import EFFECTS
+from onboard.core.physics.catalogue import kinds
 from onboard.daemon.view.snapshot import WrittenValue, WrittenView
-from onboard.push.physics import headline
+from onboard.push.diagnosed import headline
 from tests.web.browsing import LAPTOP, PHONE
 from tests.web.page_server import PageServer
 from tests.web.story import T0, story
@@ -305,10 +304,13 @@ def test_the_diagnosis_says_what_it_holds_back(browser, served):
     browser.until_says("#diagnosis-body", "held back for IMU 1, IMU 2")
 
 
-def test_page_and_reports_say_the_same_of_every_effect():
-    words = resources.files("onboard.web").joinpath("static", "words.js").read_text("utf-8")
-    for name, title in EFFECTS.items():
-        assert f'{name}: "{title}",' in words
+def test_the_page_says_of_every_effect_what_the_catalogue_states(browser, served):
+    effects = [DIAGNOSIS["effects"][0] | {"name": kind.effect} for kind in kinds()]
+    served.tell(story(160), diagnosis=DIAGNOSIS | {"effects": effects})
+    browser.open(served.url)
+    browser.until_says("#diagnosis-body", kinds()[-1].title)
+    said = browser.text("#diagnosis-body")
+    assert [kind.title for kind in kinds() if kind.title not in said] == []
 
 
 def test_text_from_outside_is_text(browser, served):

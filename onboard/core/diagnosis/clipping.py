@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.inputs.segments import Batch
+from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
 
 RAIL_SAMPLES, RAIL_RUN = 12, 4
@@ -102,14 +103,14 @@ def _saturation(
     intervals = tuple((a - t0, b - t0) for a, b in clipped)
     axis = "body_" + "xyz"[int(np.argmax(np.abs(batches[0].segment.R_bs[:, sensor_axis])))]
     return Finding(
-        name="saturation",
+        name=Saturation.effect,
         unknowns={"limit": Quantity(limit, sigma, "m/s^2")},
         share_of_mismatch=share,
         delta_bic=0.0,
         held_out_before=float("nan"),
         held_out_after=float("nan"),
         parameters={},
-        cure="damp the mount; use a sensor with a wider range",
+        cure=Saturation.cure,
         where=spans(batches, t0, intervals, axis),
         intervals=intervals,
     )

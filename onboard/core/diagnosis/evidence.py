@@ -37,9 +37,11 @@ from onboard.core.diagnosis.regimes import (
     spans,
 )
 from onboard.core.diagnosis.selection import Fit, Fitter
-from onboard.core.diagnosis.timing_effects import (
-    STANDING,
+from onboard.core.diagnosis.standing import (
+    constant_unknowns,
     standing_effects,
+    standing_kinds,
+    timing_unknowns,
     without,
 )
 from onboard.core.estimate.calibration_record import CONTRADICTION, timing_of
@@ -49,27 +51,15 @@ from onboard.core.estimate.result import Calibration
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.model.nuisances import AntennaPlace
-from onboard.core.physics.effect import EffectColumns, Origin
-from onboard.core.physics.empirical import Product
+from onboard.core.physics.catalogue import kind_of, kinds, response_of
+from onboard.core.physics.effect import Cure, Effect, Origin, Standing
+from onboard.core.physics.effects.mount_tilt import trim_in_words
 from onboard.core.physics.finding import Confounder, Finding, Quantity, Where
-from onboard.core.physics.mount import trim_in_words
-from onboard.core.physics.offsets import BiasStep
-from onboard.core.physics.receiver import LeverArm
-from onboard.core.physics.response_curves import law_of
 
-APART = {
-    "gps_latency": "accelerate and brake hard, straight ahead",
-    "gps_smoothing": "accelerate and brake hard and often; a lever arm needs turns instead",
-    "imu_delay": "roll and pitch quickly while accelerating",
-}
-"""Manoeuvres that tell a timing error from what looks alike."""
+ONSET_S = 0.5
+"""Sigma of a moment that is searched at half seconds, s."""
 AMBIGUOUS = 10.0
 """Confounders within this difference of BIC cannot be told apart."""
-NOT_AT_FIRST = (
-    *("gps_delay", "window_squared", "attitude_delay"),
-    *("tilt_roll", "tilt_pitch", "heading"),
-)
-"""Unknowns of every model that the six numbers alone do without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +73,7 @@ class Evidence:
     full: Examination
     choice: Choice
     final: Examination
-    families: tuple[EffectColumns, ...]
+    families: tuple[Effect, ...]
     doubts: Mapping[str, Sequence[str]]
     believed: int = 0
     unused: tuple[Unused, ...] = ()
@@ -133,21 +123,24 @@ class Judge:
         """Everything that is said about the recording."""
         timing = timing_of(self.engine, self.solution)
         standing = standing_effects(
-            timing,
-            self.solution,
-            self.index,
-            self.engine.point,
-            self.calibrator.parameters,
-            self.imu,
-            self.clock,
+            Standing(
+                timing=timing,
+                theta=self.solution.theta,
+                sigma=np.sqrt(np.diag(self.solution.covariance)),
+                index=self.index,
+                point=self.engine.point,
+                parameters=self.calibrator.parameters,
+                imu=self.imu,
+                clock=self.clock,
+            )
         )
         # A name has one effect: what stands beside columns of its own is their consequence.
         named = {f.effect for f in self.families}
         ladder, fits = self._ladder()
         before, after = fits[0], fits[-1]
         effects = [
-            self._standing(n, q, cure, p)
-            for n, (q, cure, p) in standing.items()
+            self._standing(n, q, cure)
+            for n, (q, cure) in standing.items()
             if n not in self.doubts and n not in named and self._holds(n)
         ]
         effects += [self._effect(f) for f in self.families]
@@ -186,7 +179,7 @@ class Judge:
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
         """Six numbers only, + timing, + constant attitude errors, + each effect."""
-        timing, constant = NOT_AT_FIRST[:3], NOT_AT_FIRST[3:]
+        timing, constant = timing_unknowns(), constant_unknowns()
         late, turned = ([self.index[n] for n in names] for names in (timing, constant))
         mine = self.engine.indices_of(self.families)
         free = [i for i in self.all if i not in (*late, *turned, *mine)]
@@ -222,7 +215,7 @@ class Judge:
 
     def _evidence(self, name: str, among: Sequence[int]) -> tuple[float, float]:
         """Fall of BIC, and of held-out chi-square, by timing or a constant attitude error."""
-        columns = STANDING[name]
+        columns = standing_kinds()[name].in_every_model
         target = Candidate(name, tuple(self.index[c] for c in columns), ())
         rest = [i for i in among if i not in target.index]
         absent, with_it = self.fitter.fit(rest, self._held(columns)), self.fitter.fit(among)
@@ -232,13 +225,11 @@ class Judge:
         left = max(without.chi2, 1e-12)
         return float(np.clip((without.chi2 - with_it.chi2) / left, 0.0, 1.0))
 
-    def _standing(
-        self, name: str, quantities: dict[str, Quantity], cure: str, parameters: dict[str, float]
-    ) -> Finding:
-        columns = STANDING[name]
+    def _standing(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
+        columns = standing_kinds()[name].in_every_model
         index = [self.index[c] for c in columns]
         held = self._held(columns)
-        made = self._record(name, quantities, index, held, parameters, cure)
+        made = self._record(name, quantities, index, held, cure)
         return replace(made, confounders=self._standing_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
@@ -264,7 +255,7 @@ class Judge:
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(confounders_of(choice.fitter, rest, target, others, held))
 
-    def _effect(self, f: EffectColumns) -> Finding:
+    def _effect(self, f: Effect) -> Finding:
         index = [i for i in self.all if i in self.engine.indices(f)]
         sigma = np.sqrt(np.diag(self.solution.covariance))
         taken = {"clock_rate": self.engine.point.skew}
@@ -274,18 +265,19 @@ class Judge:
             )
             for key, i, u in zip(f.keys, index, f.unknowns, strict=True)
         }
-        if isinstance(f, BiasStep):
-            quantities = {"time": Quantity(f.at - self.origin.t0, 0.5, "s"), **quantities}
+        if f.onset is not None:
+            quantities = {"time": Quantity(f.onset - self.origin.t0, ONSET_S, "s"), **quantities}
         values = {k: q.value for k, q in quantities.items()}
         held = self.engine.absent
-        cure, parameters = f.advice(values)
-        made = self._record(f.effect, quantities, index, held, parameters, cure)
-        made = replace(made, confounders=self._confounders(f))
-        if isinstance(f, Product):
-            made = replace(made, formula=f.written([q.value for q in quantities.values()]))
-        if not isinstance(f, BiasStep):
+        made = self._record(f.effect, quantities, index, held, f.cured(values))
+        made = replace(
+            made,
+            confounders=self._confounders(f),
+            formula=f.formula([quantities[k].value for k in f.keys]),
+        )
+        if f.onset is None:
             return made
-        span = ((f.at - self.origin.t0, self.engine.blocks[-1].end - self.origin.t0),)
+        span = ((f.onset - self.origin.t0, self.engine.blocks[-1].end - self.origin.t0),)
         axis = main_axis(self.solution.theta[index])
         return replace(made, where=spans(self.engine.batches, self.origin.t0, span, axis))
 
@@ -295,8 +287,7 @@ class Judge:
         quantities: dict[str, Quantity],
         index: Sequence[int],
         held: Array,
-        parameters: dict[str, float],
-        cure: str,
+        cure: Cure,
     ) -> Finding:
         without, with_it = self._without(index, held)
         rest = [i for i in self.all if i not in index]
@@ -309,15 +300,15 @@ class Judge:
             delta_bic=-float(bic),
             held_out_before=self.fitter.held_rms(without),
             held_out_after=self.fitter.held_rms(with_it),
-            parameters=parameters,
-            cure=cure,
+            parameters=dict(cure.parameters),
+            cure=cure.words,
             where=self._where(index, without.theta, with_it.theta),
             held_out_velocity_before=self._held_velocity(rest, held),
             held_out_velocity_after=self._held_velocity(self.all),
             imprint=self.epochs.imprint(
                 index, theta[list(index)] - held[list(index)], theta, self.origin.t0
             ),
-            response_curve=law_of(
+            response_curve=response_of(
                 name, quantities, self.engine.batches, self.origin.t0, self.origin.temperature
             ),
         )
@@ -338,7 +329,8 @@ class Judge:
     def _found(self, effects: Sequence[Finding]) -> list[int]:
         """Columns of what was found; where nothing was, of the six."""
         names = {e.name for e in effects}
-        out = [self.index[c] for name, cs in STANDING.items() if name in names for c in cs]
+        standing = standing_kinds().items()
+        out = [self.index[u] for n, k in standing if n in names for u in k.in_every_model]
         out += self.engine.indices_of([f for f in self.families if f.effect in names])
         return out or list(range(6))
 
@@ -346,7 +338,11 @@ class Judge:
         self, before: Fit, after: Fit, effects: Sequence[Finding], ladder: Sequence[Rung]
     ) -> Mismatch:
         gain = self.fitter.gain(before, after)
-        added = len(NOT_AT_FIRST) + len(self.engine.indices_of(self.families))
+        added = (
+            len(timing_unknowns())
+            + len(constant_unknowns())
+            + len(self.engine.indices_of(self.families))
+        )
         series = self._series(before.theta, after.theta)
         return Mismatch(
             detected=bool(gain > added * self.fitter.log_rows + MARGIN),
@@ -384,8 +380,8 @@ class Judge:
                 "flight, and of more than half that do not nothing tells which are false. " + note
             )
         left = self.solution.variance_inflation > CONTRADICTION
-        if any(e.name == "empirical" for e in effects):
-            named = [e for e in effects if e.name != "empirical"]
+        named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
+        if len(named) < len(effects):
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (
                 "a formula of measured signals describes what no effect of the catalogue explains. "
                 + note
@@ -409,16 +405,20 @@ class Judge:
             close = [r.name for r in e.confounders if r.delta_bic < AMBIGUOUS and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
-            if e.name == "gps_smoothing" and self._evidence(e.name, self.all)[0] < MARGIN:
-                # Below a hover's force, an antenna some centimetres off looks the same.
-                out.append(Ambiguity((e.name, LeverArm.effect), LeverArm.apart))
+            if e.name in standing_kinds() and self._evidence(e.name, self.all)[0] < MARGIN:
+                # It holds only with the antenna where it was told to be.
+                out += [
+                    Ambiguity((e.name, k.effect), k.apart)
+                    for k in kinds()
+                    if k.instead_of == AntennaPlace.name
+                ]
         out += [
-            Ambiguity((name, *others), APART.get(name, "fly harder: turns, climbs, accelerations"))
+            Ambiguity((name, *others), standing_kinds()[name].apart)
             for name, others in self.doubts.items()
         ]
         return tuple(out)
 
-    def _confounders(self, f: EffectColumns) -> tuple[Confounder, ...]:
+    def _confounders(self, f: Effect) -> tuple[Confounder, ...]:
         for c in self.choice.chosen:
             if c.effect == f.effect:
                 return tuple(self.choice.confounders(c))

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.diagnosis.timing_effects import ATTITUDE_ERRORS, STANDING
+from onboard.core.diagnosis.standing import attitude_unknowns
 from onboard.core.estimate.engine import Engine, moved
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.noise import NoiseLevels
@@ -23,7 +23,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
-from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.effect import Effect
 
 SAMPLE_S = 200.0
 """Flight on which noise levels are tried; more does not make them better known."""
@@ -161,7 +161,7 @@ class Examination(Engine):
 
     def _moved(self, before: Solution, after: Solution) -> bool:
         """Whether the accelerometer's unknowns are others than before, beyond their sigmas."""
-        attitude = {c for name in ATTITUDE_ERRORS for c in STANDING[name]}
+        attitude = set(attitude_unknowns())
         mine = [i for i, u in enumerate(self.model.unknowns) if u.name not in attitude]
         sigma = np.sqrt(np.diag(after.covariance))[mine]
         return bool(np.max(np.abs(after.theta - before.theta)[mine] / sigma) > AGREE)
@@ -214,7 +214,7 @@ class Examination(Engine):
         """Columns of one family."""
         return list(range(*self.model.slices[family.name].indices(self.model.size)))
 
-    def indices_of(self, families: Sequence[EffectColumns]) -> list[int]:
+    def indices_of(self, families: Sequence[Effect]) -> list[int]:
         """Columns of some families."""
         return [i for f in families for i in self.indices(f)]
 

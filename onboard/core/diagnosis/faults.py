@@ -13,6 +13,7 @@ from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.physics.finding import Finding, Quantity
 
 FAULT_S = 1.0
@@ -66,14 +67,14 @@ def fault_effect(
     t = np.unique(np.concatenate([c.fixes.t for c in batches])) - t0
     inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
     return Finding(
-        name="gps_fault",
+        name=GpsFault.effect,
         unknowns=sizes,
         share_of_mismatch=float(np.mean(inside)),
         delta_bic=0.0,
         held_out_before=float("nan"),
         held_out_after=float("nan"),
         parameters={},
-        cure="look at the antenna's view of the sky, at jamming, at the receiver's power",
+        cure=GpsFault.cure,
         where=spans(batches, t0, intervals, _earth_axis(spells)),
         intervals=tuple(intervals),
     )

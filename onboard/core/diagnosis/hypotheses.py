@@ -15,7 +15,8 @@ import numpy as np
 
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.effect import Effect
+from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
 from onboard.core.physics.finding import Confounder
 
 MARGIN = 25.0
@@ -42,8 +43,6 @@ CHANCE = 4.0
 """What an unknown that is not used gains by chance, 19 times of 20."""
 STILL = 0.8
 """Share of its least size that a timing error must keep whatever else is in the model."""
-STEP = "bias_step"
-STEP_PLAUSIBLE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +50,17 @@ class Candidate:
     """Columns that stand for one effect; ``columns`` is None for a jump at a block's start.
 
     ``spent`` are unknowns that were chosen outside the fit (a jump's moment), ``unseen`` the share
-    of the columns' own variance that happens between the samples they are made of.
+    of the columns' own variance that happens between the samples they are made of.  ``jump`` is
+    True for a jump of the offsets at one moment.
     """
 
     effect: str
     index: tuple[int, ...]
     plausible: tuple[float, ...]
-    columns: EffectColumns | None = None
+    columns: Effect | None = None
     spent: int = 0
     unseen: float = 0.0
+    jump: bool = False
 
     def bic(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """Fall of BIC from ``before`` to ``after``, the fit with the effect in.
@@ -257,7 +258,7 @@ def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> lis
 
 def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, int | None]:
     """The jump that would help most beside some columns, if there is none yet."""
-    located = any(c.effect == STEP for c in choice.candidates)
+    located = any(c.jump for c in choice.candidates)
     if located or len(choice.fitter.blocks) < LEAST_BLOCKS:
         return None, None
     jumps = choice.fitter.jumps(list(beside))
@@ -265,7 +266,8 @@ def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None,
         return None, None
     boundary = max(jumps, key=lambda x: x[1])[0]
     m = choice.fitter.model.size
-    return Candidate(STEP, (m, m + 1, m + 2), (STEP_PLAUSIBLE,) * 3, spent=1), boundary
+    index = (m, m + 1, m + 2)
+    return Candidate(BiasStep.effect, index, (LARGEST,) * 3, spent=1, jump=True), boundary
 
 
 def _reconsider(choice: Choice) -> None:
@@ -325,7 +327,7 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) 
         return False
     if np.any(np.abs(value) - sigma > np.array(c.plausible)):
         return False
-    if c.effect == STEP and np.max(np.abs(value)) > MATTERS_OFFSET:
+    if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
         # What is learned over the whole flight lies in between, and nearer to both.
         return True
     return _matters(fitter, before, after)

@@ -14,8 +14,8 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
-from onboard.core.physics.effect import EffectColumns
-from onboard.core.physics.offsets import BiasStep
+from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 
 REACH_S = 16.0
 """How far from the boundary of a block a jump may have been that shows there."""
@@ -25,15 +25,15 @@ FURTHEST = 3
 SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
 
 
-def jump_near(full: Examination, chosen: Sequence[EffectColumns], centre: float) -> BiasStep:
+def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:
     """The jump near ``centre`` (s) that explains most beside ``chosen``.
 
     One that is found at the edge of where it was looked for is looked for further there.
     """
     for _ in range(FURTHEST):
         best = _best(full, chosen, centre, *SPACINGS[0])
-        at_edge = abs(best.at - centre) > REACH_S - 2.0 * SPACINGS[0][0]
-        centre = best.at
+        at_edge = abs(best.moment - centre) > REACH_S - 2.0 * SPACINGS[0][0]
+        centre = best.moment
         if not at_edge:
             break
     return _best(full, chosen, centre, *SPACINGS[1])
@@ -41,20 +41,21 @@ def jump_near(full: Examination, chosen: Sequence[EffectColumns], centre: float)
 
 def _best(
     full: Examination,
-    chosen: Sequence[EffectColumns],
+    chosen: Sequence[Effect],
     centre: float,
     spacing: float,
     width: float,
 ) -> BiasStep:
+    jump = BiasStep(Origin(full.point.skew_from))
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
     times = np.maximum(times, float(full.blocks[0].start) + SETTLED_S)
     times = np.unique(times)
-    scored = _scored(full, chosen, [BiasStep(float(t)) for t in times])
+    scored = _scored(full, chosen, [jump.at(float(t)) for t in times])
     return max(scored, key=lambda x: x[0])[1]
 
 
 def _scored(
-    full: Examination, chosen: Sequence[EffectColumns], steps: Sequence[BiasStep]
+    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep]
 ) -> list[tuple[float, BiasStep]]:
     """Gain of each jump alone beside the chosen effects, from one pass with all of them.
 
@@ -65,7 +66,8 @@ def _scored(
     made = Engine(
         replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
     )
-    first, last = steps[0].at - SETTLING_S, steps[-1].at + SETTLING_S
+    moments = [s.moment for s in steps]
+    first, last = moments[0] - SETTLING_S, moments[-1] + SETTLING_S
     far: list[Block] = []
     for batch, block in zip(full.batches, full.blocks, strict=True):
         if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
@@ -118,9 +120,14 @@ def boundary_of(fitter: Fitter, block: int) -> float:
     return float(fitter.blocks[block].start)
 
 
-def candidate_of(made: Examination, family: EffectColumns) -> Candidate:
+def candidate_of(made: Examination, family: Effect) -> Candidate:
     """A family of an examination as a candidate."""
-    spent = 1 if isinstance(family, BiasStep) else 0
+    jump = family.onset is not None
     return Candidate(
-        family.effect, tuple(made.indices(family)), family.plausible, family, spent=spent
+        family.effect,
+        tuple(made.indices(family)),
+        family.plausible,
+        family,
+        spent=int(jump),
+        jump=jump,
     )

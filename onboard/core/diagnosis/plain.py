@@ -17,10 +17,10 @@ from onboard.core.estimate.calibration_record import six_covariance
 from onboard.core.estimate.engine import calibration_model
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
-from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.effect import Effect
 
 
-def plain_six(final: Examination, families: Sequence[EffectColumns]) -> Plain:
+def plain_six(final: Examination, families: Sequence[Effect]) -> Plain:
     """What the six would be, and be claimed to be, had ``families`` not been found.
 
     A nuisance that one of them displaced (the antenna some centimetres off, for the antenna

@@ -22,7 +22,6 @@ from onboard.core.diagnosis.hypotheses import (
     LEAST_BLOCKS,
     MARGIN,
     RECONCILED,
-    STEP,
     Candidate,
     Choice,
     choose,
@@ -36,15 +35,15 @@ from onboard.core.diagnosis.refusals import believed, unused_flight
 from onboard.core.diagnosis.screening import false_fixes, unclipped
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.diagnosis.testability import testable_of, unseen_share
-from onboard.core.diagnosis.timing_effects import (
-    ATTITUDE_ERRORS,
-    LEAST,
-    STANDING,
-    Standing,
+from onboard.core.diagnosis.standing import (
+    Measured,
+    attitude_unknowns,
+    reduced,
     standing_effects,
+    standing_kinds,
     without,
 )
+from onboard.core.diagnosis.testability import testable_of, unseen_share
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import moved
@@ -53,11 +52,8 @@ from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.catalogue import catalogue
-from onboard.core.physics.effect import EffectColumns, Origin
+from onboard.core.physics.effect import Effect, Origin, Standing
 from onboard.core.physics.finding import Finding
-from onboard.core.physics.gains import Gain, ScaleNonlinearity
-from onboard.core.physics.offsets import BiasStep
-from onboard.core.physics.receiver import LeverArm
 
 ENOUGH = 0.3
 """Share of a flight that has to be left without what is clipped."""
@@ -101,9 +97,8 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
             batches = flight
     testable, absent = testable_of(catalogue(origin), batches)
     if rail is not None:
-        # A low-pass hides the samples next to the clipped ones: what is left of them is a curve.
-        testable = [f for f in testable if not isinstance(f, ScaleNonlinearity)]
-        absent.append(NotTestable(ScaleNonlinearity.effect, "clipping bends the scale as well"))
+        absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
+        testable = [f for f in testable if not f.bent_by_clipping]
     full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
     clipped = rail is not None and batches is flight
     fault: Finding | None = None
@@ -124,11 +119,9 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     standing, doubts = _second_thoughts(choice, full, calibrator, imu)
     families = _families(choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
-        families = [f.averaged() if isinstance(f, LeverArm) else f for f in families]
+        families = [f.averaged() for f in families]
     final = _final(full, choice, families).doubting_attitude()
-    if any(isinstance(f, BiasStep) for f in families) and any(
-        isinstance(f, Gain) for f in families
-    ):
+    if any(f.onset is not None for f in families) and any(f.in_proportion for f in families):
         found = final.found().theta
         families = _about_sizes([(f, found[final.indices(f)]) for f in families])
         final = _again(full, families, final).with_rows().doubting_attitude()
@@ -166,8 +159,8 @@ def since_reboot(batches: Sequence[Batch]) -> list[Batch]:
 
 
 def _with_jump(
-    full: Examination, testable: Sequence[EffectColumns], choice: Choice
-) -> tuple[Examination, list[EffectColumns]] | None:
+    full: Examination, testable: Sequence[Effect], choice: Choice
+) -> tuple[Examination, list[Effect]] | None:
     """The same with a jump among the columns; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
@@ -194,18 +187,18 @@ def _with_jump(
 
 def _wanders(choice: Choice) -> bool:
     """Whether the offset changes in flight."""
-    return any(c.effect == STEP or (c.columns and c.columns.tilts_ekf) for c in choice.chosen)
+    return any(c.jump or (c.columns and c.columns.tilts_ekf) for c in choice.chosen)
 
 
 def _chosen(
     full: Examination,
-    testable: Sequence[EffectColumns],
-    kept: Sequence[EffectColumns] = (),
+    testable: Sequence[Effect],
+    kept: Sequence[Effect] = (),
 ) -> Choice:
     """Selection on the sums of the whole catalogue; ``kept`` are in it to begin with."""
     solution = full.found()
     fitter = Fitter(full.all_blocks, full.model, solution.variance_inflation, full.absent)
-    located = any(isinstance(c, BiasStep) for c in testable)
+    located = any(c.onset is not None for c in testable)
     jumps = [] if located else fitter.jumps(list(range(full.model.size)))
     if jumps and len(fitter.blocks) >= LEAST_BLOCKS:
         # Blocks that contradict each other because of a jump are no reason to doubt the jump.
@@ -221,7 +214,7 @@ def _chosen(
         for c in testable
     ]
     index = full.model.index
-    errors = [c for name in ATTITUDE_ERRORS for c in STANDING[name]]
+    errors = attitude_unknowns()
     held = without(errors, index, full.point, full.absent, told=0.0)
     gone = {index[c] for c in errors}
     nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
@@ -239,8 +232,9 @@ def _second_thoughts(
     clock = fix_clock(calibrator.parameters, full.batches)
     told = clock.told_on_stamp
     index = choice.fitter.model.index
-    standing: Standing = {}
-    for _ in range(len(STANDING)):
+    standing: Measured = {}
+    unknowns = {name: kind.in_every_model for name, kind in standing_kinds().items()}
+    for _ in range(len(unknowns)):
         fit = choice.fitter.fit(choice.free, held_out=False)
         solution = Solution(
             fit.theta,
@@ -250,49 +244,53 @@ def _second_thoughts(
             1.0,
             1.0,
         )
-        timing = timing_of(full, solution)
         standing = standing_effects(
-            timing, solution, index, full.point, calibrator.parameters, imu, clock
+            Standing(
+                timing=timing_of(full, solution),
+                theta=solution.theta,
+                sigma=np.sqrt(np.diag(solution.covariance)),
+                index=index,
+                point=full.point,
+                parameters=calibrator.parameters,
+                imu=imu,
+                clock=clock,
+            )
         )
         taken = False
         for name in standing:
-            target = Candidate(name, tuple(index[c] for c in STANDING[name]), ())
-            held = without(STANDING[name], index, full.point, choice.fitter.absent, told)
+            target = Candidate(name, tuple(index[c] for c in unknowns[name]), ())
+            held = without(unknowns[name], index, full.point, choice.fitter.absent, told)
             taken = taken or reconsider_standing(choice, target, held)
         if not taken:
             break
-    timed = [name for name in standing if name in LEAST]
+    timed = [name for name in standing if standing_kinds()[name].least is not None]
     return set(standing), {n: d for n in timed if (d := _doubts(choice, full, n, told))}
 
 
 def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
     """Other effects beside which one of timing would be too small to mention."""
-    column = choice.fitter.model.index[STANDING[name][0]]
-    taken = {"gps_latency": full.point.delay - told, "gps_smoothing": full.point.window**2}
-    least = LEAST[name] ** 2 if name == "gps_smoothing" else LEAST[name]
-    start = taken.get(name, full.point.attitude_delay)
+    column = choice.fitter.model.index[standing_kinds()[name].in_every_model[0]]
+    start, least = reduced(name, full.point, told)
     return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
 
 
-def _families(choice: Choice) -> list[EffectColumns]:
+def _families(choice: Choice) -> list[Effect]:
     """Columns of what was chosen; those of a gain about its size."""
     theta = choice.fitter.fit(choice.free, held_out=False).theta
     sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
     return _about_sizes(sized)
 
 
-def _about_sizes(sized: Sequence[tuple[EffectColumns, Array]]) -> list[EffectColumns]:
+def _about_sizes(sized: Sequence[tuple[Effect, Array]]) -> list[Effect]:
     """Effects of which those in proportion to the force act on the force without the others."""
-    alone = [(f.about(size) if isinstance(f, Gain) else f, size) for f, size in sized]
-    acting = [isinstance(f, Gain) or f.tilts_ekf for f, _ in sized]
-    out: list[EffectColumns] = []
-    for i, (f, size) in enumerate(alone):
-        beside = tuple(a for j, a in enumerate(alone) if j != i and acting[j])
-        out.append(f.about(size, beside) if isinstance(f, Gain) else f)
-    return out
+    alone = [(f.about(size, ()), size) for f, size in sized]
+    return [
+        f.about(size, [a for j, a in enumerate(alone) if j != i and a[0].changes_force])
+        for i, (f, size) in enumerate(alone)
+    ]
 
 
-def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns]) -> Examination:
+def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Examination:
     """The model that was chosen, about what the sums of everything say of it."""
     model = choice.fitter.model
     fit = choice.fitter.fit(choice.free, held_out=False)
@@ -311,12 +309,12 @@ def _final(full: Examination, choice: Choice, families: Sequence[EffectColumns])
     return final.with_rows(theta, covariance)
 
 
-def _again(full: Examination, families: Sequence[EffectColumns], final: Examination) -> Examination:
+def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:
     """Another model than the final one, from where that one has come to."""
     return Examination(full, families, t0=full.point.skew_from, start=final)
 
 
-def _needed(made: Examination, families: Sequence[EffectColumns]) -> list[EffectColumns]:
+def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
     """Families that stay significant when all of them are in one model."""
     fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
     kept = list(families)

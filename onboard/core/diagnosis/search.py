@@ -15,9 +15,8 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import MARGIN, Candidate, accepted
 from onboard.core.diagnosis.jumps import candidate_of
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.physics.effect import EffectColumns
-from onboard.core.physics.empirical import products
-from onboard.core.physics.offsets import BiasStep
+from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.effects.empirical import products
 
 SUSPICIOUS = 3.0
 """Inflation of the variance from which a residual is searched."""
@@ -26,8 +25,8 @@ FAR_BETTER = 1.3
 
 
 def searched(
-    final: Examination, families: Sequence[EffectColumns], variance_inflation: float
-) -> list[EffectColumns]:
+    final: Examination, families: Sequence[Effect], variance_inflation: float
+) -> list[Effect]:
     """The families, with a product added or put in the place of an impostor.
 
     Args:
@@ -35,10 +34,10 @@ def searched(
         families: its physics.
         variance_inflation: factor by which evidence is weakened.
     """
-    named = [f for f in families if not isinstance(f, BiasStep)]
+    named = [f for f in families if f.onset is None]
     if not named and final.found().variance_inflation < SUSPICIOUS:
         return list(families)
-    terms = products(final.batches)
+    terms = products(final.batches, Origin(final.point.skew_from))
     made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
     made.once()
     fitter = Fitter(made.all_blocks, made.model, variance_inflation, made.absent)
@@ -68,10 +67,10 @@ def searched(
 
 def _best(
     fitter: Fitter, rest: Sequence[int], offered: Sequence[Candidate]
-) -> tuple[float, EffectColumns] | None:
+) -> tuple[float, Effect] | None:
     """The acceptable product with the most evidence: that, and its columns."""
     before = fitter.fit(rest)
-    best: tuple[float, EffectColumns] | None = None
+    best: tuple[float, Effect] | None = None
     for c in offered:
         if c.columns is None or set(c.index) & set(rest):
             continue

@@ -8,25 +8,24 @@ import numpy as np
 
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.inputs.segments import Batch
-from onboard.core.physics.effect import EffectColumns
+from onboard.core.physics.effect import Effect
 
 LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals below which what follows them is not to be seen."""
 MOST_UNSEEN = 0.02
 """What changes faster than its samples come averages out in an integral, but for so much."""
-BY_NATURE = (
-    NotTestable("rotor_drag", "needs a model of the vehicle; sensors alone do not show it"),
-)
 
 
 def testable_of(
-    everything: Sequence[EffectColumns], batches: Sequence[Batch]
-) -> tuple[list[EffectColumns], list[NotTestable]]:
+    everything: Sequence[Effect], batches: Sequence[Batch]
+) -> tuple[list[Effect], list[NotTestable]]:
     """Effects whose signals are there and change, and why the others cannot be asked for."""
-    present: list[EffectColumns] = []
-    absent = list(BY_NATURE)
+    present: list[Effect] = []
+    absent = [NotTestable(e.effect, e.untestable) for e in everything if e.untestable]
     names = set.intersection(*(set(c.segment.slow) for c in batches)) if batches else set()
     for effect in everything:
+        if not effect.unknowns:
+            continue  # in every model, in the data themselves, or not placed yet
         missing = [n for n in effect.needs if n not in names]
         if missing:
             absent.append(

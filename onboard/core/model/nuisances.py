@@ -11,6 +11,8 @@ from onboard.core.model.regressors import Direct, Family, Unknown
 from onboard.core.model.smoothing import mean_slope, second_difference
 
 AXIS = "xyz"
+ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
+"""Unknowns of the recorded attitude."""
 THIRD_MOMENT = 1e-3
 """Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
 ANTENNA_SIGMA = 0.05

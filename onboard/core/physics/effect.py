@@ -1,24 +1,74 @@
-"""What every effect states about itself, beside its columns."""
+"""What every effect states about itself, and the ways in which one can be looked for.
+
+An effect is a class in a file of its own in :mod:`onboard.core.physics.effects`; the catalogue
+finds it there.  Everything that is said or decided about it anywhere (terminal, page, messages,
+policy, manuals) is read from its statements, none of which has a default: a class that leaves one
+out cannot be imported.
+
+It is looked for in one of three ways, or in two at once:
+
+with regressors of its own
+    ``unknowns`` and how they enter what is measured (:class:`Family`); selected by evidence;
+as unknowns that are in every model
+    :attr:`Effect.in_every_model`; estimated anyway, and an effect from a size on;
+in the data themselves
+    :attr:`Effect.excluded`; what it has spoiled is left out of the fit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import ClassVar, Self
 
 import numpy as np
 
+from onboard.core.estimate.gps_clock import FixClock
+from onboard.core.estimate.result import Estimate
+from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
-from onboard.core.model.quadrature import Signals
+from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family, Unknown
+from onboard.core.physics.finding import Finding, Quantity
+from onboard.core.physics.response_curves import Response
+from onboard.core.physics.wording import each
 
 AXES = "xyz"
 REFERENCE_DEGC = 35.0
 """Temperature at which a drift with it is nothing: ArduPilot's."""
+SURE = 4.0
+"""Sigmas from which an unknown of every model is reported: 6e-5 come so far by chance."""
+STATEMENTS = (
+    *("effect", "code", "title", "sentence", "meaning"),
+    *("bearing", "source", "cure", "apart"),
+)
+
+
+class Bearing(Enum):
+    """What a found effect means for the calibration that was found beside it."""
+
+    HARMLESS = "harmless"
+    """In every calibration, or taken out of it: worth knowing, forbids nothing."""
+    BESIDE = "beside"
+    """Geometry, modelled beside the calibration: where it moves a number, a person decides."""
+    WITHIN = "within"
+    """Part of what the sensor reads: where it moves a number, the calibration is withdrawn."""
+    NO_ONE_NUMBER = "no_one_number"
+    """The calibration is not the same for all of the flight: it is withdrawn."""
 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What effects count from: times, temperatures; places and trim as the autopilot has them."""
+    """What effects count from: times, temperatures; places and trim as the autopilot has them.
+
+    Attributes:
+        t0: first sample, s on the boot clock.
+        temperature: degC.
+        antenna: from the IMU, body axes, m.
+        trim: AHRS_TRIM, rad.
+        imu: which accelerometer, from 1.
+    """
 
     t0: float
     temperature: float = REFERENCE_DEGC
@@ -27,57 +77,181 @@ class Origin:
     imu: int = 1
 
 
-class EffectColumns(Family):
-    """An effect of the catalogue.
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """What to do about an effect: in words, and the autopilot's parameters to set by name."""
+
+    words: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """The unknowns of every model as one fit has them.
 
     Attributes:
-        effect: name in the controlled vocabulary; several column sets may stand for one effect.
-        plausible: (k,) sizes beyond which the explanation is not believed.
-        needs: slow signals that the columns use.
+        timing: delays and averaging in all, s, by the names of the report.
+        theta: (m,) unknowns, ``sigma`` (m,) theirs, ``index`` their places by name.
+        point: what they are counted from.
+        parameters: the autopilot's, in force.
+        imu: which accelerometer.
+        clock: what the recording's fixes are stamped with.
+    """
+
+    timing: Mapping[str, Estimate]
+    theta: Array
+    sigma: Array
+    index: Mapping[str, int]
+    point: Linearisation
+    parameters: ParametersInForce
+    imu: int
+    clock: FixClock
+
+
+class Effect(Family):
+    """An effect of the catalogue: statements first, then how it is looked for, then its words.
+
+    Attributes:
+        effect: name in the controlled vocabulary.
+        code: number in ``OBC_FINDING``; never given to another effect.
+        title: a short sentence, as a heading.
+        sentence: the same as part of one, ``{size}`` and ``{degrees}`` filled in.
+        meaning: what its unknowns are, for the manual.
+        bearing: what it means for the calibration.
         source: where the formula is from.
         cure: what a user does about it.
         apart: the manoeuvre that tells it from what looks alike.
-        tilts_ekf: whether it changes the offset in flight, which an EKF takes for tilt at first.
-        of_attitude: whether it is the recorded attitude that is wrong.
+        needs: slow signals of the recording that it follows.
+        keys: names of the unknowns in a finding, in their order.
+        plausible: sizes beyond which the explanation is not believed, in the order of ``keys``.
+        response: how it goes with one signal; None if with no single one.
+        tilts_ekf: it changes the offset in flight, which an EKF takes for tilt at first.
+        in_proportion: its regressors are those of the force that was measured without it.
+        changes_force: what others in proportion to the force act on is without it.
+        of_attitude: it is the recorded attitude that is wrong.
+        in_every_model: its unknowns that are estimated anyway.
+        least: size of a timing unknown from which it counts, s; None for what is no timing.
+        excluded: it is seen in the data themselves; what it spoils is left out of the fit.
+        named: False for a description without a physical name.
+        untestable: why no recording can show it; empty if one can.
+        bent_by_clipping: why it cannot be asked for beside clipping; empty if it can.
+        onset: when it began, s on the boot clock; None if it was always there.
     """
 
-    effect: str = ""
-    plausible: tuple[float, ...] = ()
-    needs: tuple[str, ...] = ()
-    source: str = ""
-    cure: str = ""
-    apart: str = "fly banked turns both ways, climbs, and hard accelerations"
+    effect: ClassVar[str]
+    code: ClassVar[int]
+    title: ClassVar[str]
+    sentence: ClassVar[str]
+    meaning: ClassVar[str]
+    bearing: ClassVar[Bearing]
+    source: ClassVar[str]
+    cure: ClassVar[str]
+    apart: ClassVar[str]
+
+    needs: ClassVar[tuple[str, ...]] = ()
+    response: ClassVar[Response | None] = None
+    tilts_ekf: ClassVar[bool] = False
+    in_proportion: ClassVar[bool] = False
+    changes_force: ClassVar[bool] = False
+    of_attitude: ClassVar[bool] = False
+    in_every_model: ClassVar[tuple[str, ...]] = ()
+    least: ClassVar[float | None] = None
+    excluded: ClassVar[bool] = False
+    named: ClassVar[bool] = True
+    untestable: ClassVar[str] = ""
+    bent_by_clipping: ClassVar[str] = ""
+
     keys: tuple[str, ...] = ()
-    tilts_ekf: bool = False
-    of_attitude: bool = False
+    plausible: tuple[float, ...] = ()
+    onset: float | None = None
 
-    def available(self, nodes: Signals) -> bool:
-        """True if every signal it needs is in the recording."""
-        return all(nodes.slow(name) is not None for name in self.needs)
+    def __init_subclass__(cls, *, abstract: bool = False) -> None:
+        """Refuse an effect that leaves a statement out: none of them has a safe default."""
+        super().__init_subclass__()
+        cls.abstract = abstract
+        left_out = [s for s in STATEMENTS if s not in cls.__dict__]
+        if left_out and not abstract:
+            raise TypeError(f"{cls.__name__} does not state its {', '.join(left_out)}")
+        if not abstract and "name" not in cls.__dict__:
+            cls.name = cls.effect
 
-    def parameters(self, values: Mapping[str, float]) -> dict[str, float]:  # noqa: ARG002
-        """ArduPilot parameters that cure it, by the values of its unknowns."""
-        return {}
+    abstract: ClassVar[bool] = True
 
-    def advice(self, values: Mapping[str, float]) -> tuple[str, dict[str, float]]:
-        """What to do about it, in words and in parameters, by the values of its unknowns."""
-        return self.cure, self.parameters(values)
+    def __init__(self, origin: Origin) -> None:
+        """Take what it counts from."""
+        self.origin = origin
 
-    def _three(self, unit: str, bound: float) -> None:
-        """Unknowns x, y, z of one unit, bounded alike."""
+    def take_axes(self, unit: str, bound: float) -> None:
+        """Take unknowns x, y, z of one unit; ``bound`` is plausible and the prior's sigma."""
         self.keys = tuple(AXES)
         self.plausible = (bound,) * 3
         self.unknowns = tuple(Unknown(f"{self.name}_{a}", unit, 0.0, bound) for a in AXES)
 
+    # -- how it is looked for -------------------------------------------------------------------
+
+    def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
+        """The effect for a next linearisation, about its own size and those of others.
+
+        Args:
+            size: (k,) its unknowns.
+            beside: others that change the force, with theirs.
+        """
+        return self
+
+    def averaged(self) -> Self:
+        """The effect as a receiver sees it whose averaging is known for sure."""
+        return self
+
+    def formula(self, sizes: Sequence[float]) -> str:  # noqa: ARG002 - only nameless ones have one
+        """What is written where there is no name; empty otherwise."""
+        return ""
+
+    @classmethod
+    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:  # noqa: ARG003
+        """Its size and cure by the unknowns of every model; None while too small or not sure."""
+        return None
+
+    @classmethod
+    def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
+        """Values of :attr:`in_every_model` that mean: it is not there.
+
+        Args:
+            point: what the unknowns are counted from.
+            told: latency that the autopilot was told, s.
+        """
+        return dict.fromkeys(cls.in_every_model, 0.0)
+
+    def cured(self, values: Mapping[str, float]) -> Cure:  # noqa: ARG002 - most need no sizes
+        """What to do about it, by the values of its unknowns."""
+        return Cure(self.cure)
+
+    # -- its words ------------------------------------------------------------------------------
+
+    @classmethod
+    def size(cls, found: Finding) -> str:
+        """The size in a few words: ``by 259 ± 8 ms``."""
+        return each(found.unknowns)
+
+    @classmethod
+    def condition(cls, found: Finding, offset: float, change: float) -> str:  # noqa: ARG003
+        """When an offset holds that was found beside it; empty if always.
+
+        Args:
+            found: the effect.
+            offset: of one axis, as the autopilot would be told, m/s^2.
+            change: of that offset by one unit of the effect.
+        """
+        return ""
+
 
 def on_axes(amount: Array) -> Array:
-    """Columns ``-amount_i e_i``: what each axis reads too much, taken off.
+    """Regressors ``-amount_i e_i``: what each axis reads too much, taken off.
 
     Args:
         amount: (..., 3).
 
     Returns:
-        (..., 3, 3) with column i along axis i.
+        (..., 3, 3) with regressor i along axis i.
     """
     out: Array = -amount[..., None, :] * np.eye(3)
     return out

@@ -8,8 +8,8 @@ from typing import Any
 
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.view import diagnosis_in_words
+from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Entry, Found
-from onboard.push.physics import Diagnosed
 
 
 class Diagnoses:

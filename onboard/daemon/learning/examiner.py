@@ -28,8 +28,8 @@ from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.daemon.learning.flight import Judged, JudgedFlight, in_force
 from onboard.push.conditioning import CHI_SQUARE_999
+from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
-from onboard.push.physics import Diagnosed
 from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)

@@ -17,8 +17,8 @@ from onboard.core.estimate.result import Calibration, Six
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
-from onboard.push.physics import Diagnosed
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,8 @@ from collections import Counter
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
+from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.effect import Bearing
 from onboard.daemon.outlets.announcer import Announcer
 from onboard.daemon.outlets.parameter_view import (
     POLICIES,
@@ -26,7 +28,6 @@ from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import OnboardError, RefusedError
 from onboard.mavlink.autopilot import Participant
 from onboard.mavlink.parameter_server import ParameterServer, Writable
-from onboard.push.physics import IN_EVERY_MODEL
 from onboard.push.policy import Mode
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ class Outlets:
             return
         self._finding = (number, name)
         what = name.replace("_", " ")
-        if name in IN_EVERY_MODEL:
+        if bearing_of(name) is Bearing.HARMLESS:
             self._notices.post("worth_knowing", f"worth knowing: {what}")
         elif name:
             self._notices.post("physics_missing", f"physics missing: {what}", warning=True)

@@ -36,9 +36,10 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from onboard.core.maths.accelerometer import AXES
+from onboard.core.physics.catalogue import bearing_of, kinds
+from onboard.core.physics.effect import Bearing
 from onboard.daemon.view import state
 from onboard.daemon.view.snapshot import ImuView, Number, Snapshot, Three
-from onboard.push.physics import IN_EVERY_MODEL
 
 STATES: Final[Mapping[str, int]] = MappingProxyType(
     {
@@ -78,33 +79,9 @@ REASONS: Final[Mapping[str, int]] = MappingProxyType(
 )
 
 NO_DIAGNOSIS, CLEAN, INSUFFICIENT, UNEXPLAINED, UNKNOWN_EFFECT = -1, 0, 90, 99, 98
-FINDINGS: Final[Mapping[str, int]] = MappingProxyType(
-    {
-        "gps_latency": 1,
-        "gps_smoothing": 2,
-        "gps_lever_arm": 3,
-        "imu_delay": 4,
-        "cross_axis": 5,
-        "mount_tilt": 6,
-        "heading_error": 7,
-        "heading_by_throttle": 8,
-        "temperature_drift": 9,
-        "bias_ramp": 10,
-        "bias_step": 11,
-        "scale_nonlinearity": 12,
-        "vibration_rectification": 13,
-        "throttle_coupling": 14,
-        "saturation": 15,
-        "gps_fault": 16,
-        "clock_skew": 17,
-        "gravity": 18,
-        "load_flex": 19,
-        "rotor_drag": 20,
-        "empirical": 21,
-    }
-)
+FINDINGS: Final[Mapping[str, int]] = MappingProxyType({k.effect: k.code for k in kinds()})
 """Numbers of the effects; -1 no diagnosis yet, 0 nothing is missing, 90 too little flown to say,
-98 an effect that this table does not have, 99 something is missing and no effect explains it."""
+98 an effect that this version does not know, 99 something is missing and no effect explains it."""
 
 
 def parameter_values(snapshot: Snapshot, *, imus: int, approving: bool = False) -> dict[str, float]:
@@ -147,7 +124,10 @@ def top_effect(diagnosis: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
     effects = (diagnosis or {}).get("effects") or ()
     return max(
         effects,
-        key=lambda e: (e.get("name") not in IN_EVERY_MODEL, e.get("share_of_mismatch") or 0.0),
+        key=lambda e: (
+            bearing_of(str(e.get("name"))) is not Bearing.HARMLESS,
+            e.get("share_of_mismatch") or 0.0,
+        ),
         default=None,
     )
 

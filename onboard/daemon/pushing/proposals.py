@@ -1,7 +1,7 @@
 """Proposals: what would be written for each accelerometer, and every reason why it is not yet.
 
 The policy's reasons come from :mod:`onboard.push.policy`; added here are those of the diagnosis
-(:mod:`onboard.push.physics`), of people (approval, refusal), of past failures, and of what kind
+(:mod:`onboard.push.diagnosed`), of people (approval, refusal), of past failures, and of what kind
 of autopilot it is.
 
 What is proposed is what was diagnosed.  Where physics was missing, or nobody could look for it, a
@@ -28,7 +28,7 @@ from onboard.daemon.learning.learner import Learned
 from onboard.daemon.view.snapshot import ChangeView, ProposalView
 from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
-from onboard.push.physics import Diagnosed
+from onboard.push.diagnosed import Diagnosed
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, Mode, PolicySettings, VehicleCondition, judge
 

@@ -1,45 +1,10 @@
 // Names of the snapshot in words, numbers in the digits that their sigma supports.
 
-const REASONS = {
-  spoofed: "the receiver reports spoofing",
-  jammed: "the receiver reports jamming",
-  no_fix: "no 3D fix",
-  few_satellites: "too few satellites",
-  hdop: "satellites badly spread (HDOP)",
-  speed_accuracy: "speed too inaccurate",
-  gps_glitch: "velocity jumped (glitch)",
-  ekf_gps_glitch: "the autopilot reports a GPS glitch",
-  ekf_unhealthy: "the autopilot's state estimate is unhealthy",
-  stale: "no fresh GPS",
-  gps_gap: "a gap in GPS",
-  restarted: "the recording or the autopilot began anew",
-  configured_end: "the configured time is over",
-  end_of_data: "no more data",
-};
+// Effects and reasons are the service's own words; without them their names are read as words.
+const { effects: EFFECTS, reasons: REASONS } = await fetch("words.json")
+  .then((answer) => answer.json())
+  .catch(() => ({ effects: {}, reasons: {} }));
 const TONES = { good: "good", info: "", warning: "warn", error: "bad" };
-const EFFECTS = {
-  gps_latency: "GPS is late",
-  gps_smoothing: "GPS averages its velocity",
-  gps_lever_arm: "The GPS antenna is away from the IMU",
-  imu_delay: "Attitude and accelerometer are not simultaneous",
-  cross_axis: "The accelerometer's axes are not square",
-  mount_tilt: "The accelerometer is tilted against the attitude",
-  heading_error: "The heading is off",
-  heading_by_throttle: "The motors pull the compass",
-  temperature_drift: "The offset follows the temperature",
-  bias_ramp: "The offset grows with time",
-  bias_step: "The offset jumped",
-  scale_nonlinearity: "The scale changes with the load",
-  vibration_rectification: "Vibration shifts the offset",
-  throttle_coupling: "The throttle shifts the offset",
-  saturation: "The accelerometer hit its limit",
-  gps_fault: "GPS velocity was false for a while",
-  clock_skew: "The GPS and IMU clocks run at different rates",
-  gravity: "Gravity differs from the expected value",
-  load_flex: "The mount bends under load",
-  rotor_drag: "The rotors drag in the wind",
-  empirical: "An unnamed dependence on a measured signal",
-};
 const POLICIES = {
   never: "nothing is ever written",
   landed: "written when landed and disarmed",

@@ -8,7 +8,7 @@ from onboard.core.diagnosis import jumps
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.offsets import BiasStep
+from onboard.core.physics.effects.bias_step import BiasStep
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
@@ -33,7 +33,7 @@ def full(request):
 
 
 def gains(full, times):
-    scored = jumps._scored(full, (), [BiasStep(float(t)) for t in times])
+    scored = jumps._scored(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times])
     return np.array([g for g, _ in scored])
 
 

@@ -8,7 +8,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.mount import TRIM_RAD, ForceTilt, attitude_advice, levelled
+from onboard.core.physics.effects.mount_tilt import TRIM_RAD, MountTilt, attitude_cure, levelled
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as fx
 from sitl.builtin import rotation
@@ -128,14 +128,17 @@ def told(**values):
 
 
 def test_a_trim_of_another_size_is_the_boards_unless_it_was_levelled():
-    made = ForceTilt(Origin(0.0, trim=(0.05, 0.02, 0.0)))
-    cure, parameters = made.advice({"roll": -0.03, "pitch": 0.0})
-    assert parameters == {}
-    assert "X 0.020, Y 0.020" in cure
-    near = ForceTilt(Origin(0.0, trim=(0.03 + 0.5 * TRIM_RAD, 0.0, 0.0)))
-    assert near.advice({"roll": -0.03, "pitch": 0.0})[1] == {"AHRS_TRIM_X": 0.0, "AHRS_TRIM_Y": 0.0}
-    second = ForceTilt(Origin(0.0, trim=(0.03, 0.0, 0.0), imu=2))  # not what was levelled with
-    assert second.advice({"roll": -0.03, "pitch": 0.0})[1] == {}
+    made = MountTilt(Origin(0.0, trim=(0.05, 0.02, 0.0)))
+    cure = made.cured({"roll": -0.03, "pitch": 0.0})
+    assert cure.parameters == {}
+    assert "X 0.020, Y 0.020" in cure.words
+    near = MountTilt(Origin(0.0, trim=(0.03 + 0.5 * TRIM_RAD, 0.0, 0.0)))
+    assert near.cured({"roll": -0.03, "pitch": 0.0}).parameters == {
+        "AHRS_TRIM_X": 0.0,
+        "AHRS_TRIM_Y": 0.0,
+    }
+    second = MountTilt(Origin(0.0, trim=(0.03, 0.0, 0.0), imu=2))  # not what was levelled with
+    assert second.cured({"roll": -0.03, "pitch": 0.0}).parameters == {}
 
 
 def test_what_arducopter_levels_to_is_what_levelled_says():
@@ -152,9 +155,9 @@ def test_what_arducopter_levels_to_is_what_levelled_says():
 def test_an_attitude_levelled_with_a_wrong_offset_wants_the_calibration_not_a_trim():
     six = STRAIGHT.copy()
     six[3] = -0.3
-    cure, parameters = attitude_advice(np.array([0.0, 0.03]), six, told(), 1)
-    assert "set the calibration" in cure
-    assert parameters == {}
+    cure = attitude_cure(np.array([0.0, 0.03]), six, told(), 1)
+    assert "set the calibration" in cure.words
+    assert cure.parameters == {}
 
 
 @pytest.mark.parametrize(
@@ -167,6 +170,6 @@ def test_an_attitude_levelled_with_a_wrong_offset_wants_the_calibration_not_a_tr
     ids=["another board", "no parameters", "a trim already"],
 )
 def test_what_is_conditional_is_said_and_not_set(parameters, imu, words):
-    cure, setting = attitude_advice(np.array([0.03, 0.0]), STRAIGHT, parameters, imu)
-    assert words in cure
-    assert setting == {}
+    cure = attitude_cure(np.array([0.03, 0.0]), STRAIGHT, parameters, imu)
+    assert words in cure.words
+    assert cure.parameters == {}

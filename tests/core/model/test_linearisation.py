@@ -8,7 +8,7 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.core.model.linearisation import MOVING, Linearisation
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.receiver import LeverArm
+from onboard.core.physics.effects.gps_lever_arm import GpsLeverArm
 
 T = np.linspace(0.0, 4.0, 201)
 
@@ -34,7 +34,7 @@ def test_delay_and_heading_are_taken_out_exactly(delay, heading):
 
 
 def test_a_nuisance_gives_way_to_the_effect_with_its_columns():
-    arm = LeverArm(Origin(t0=0.0))
+    arm = GpsLeverArm(Origin(t0=0.0))
     without, with_it = (calibration_model(Linearisation(), more=more) for more in ((), (arm,)))
     assert [u.name for u in without.unknowns if "antenna" in u.name] == [
         "antenna_x",

@@ -24,10 +24,16 @@ from onboard.core.model.nuisances import (
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.model.regressors import Model
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
-from onboard.core.physics.mount import ForceTilt
-from onboard.core.physics.offsets import BiasRamp, Gravity, TemperatureDrift, ThrottleCoupling
-from onboard.core.physics.receiver import ClockSkew, LeverArm
+from onboard.core.physics.effects.bias_ramp import BiasRamp
+from onboard.core.physics.effects.clock_skew import ClockSkew
+from onboard.core.physics.effects.cross_axis import CrossAxis
+from onboard.core.physics.effects.gps_lever_arm import GpsLeverArm
+from onboard.core.physics.effects.gravity import Gravity
+from onboard.core.physics.effects.load_flex import LoadFlex
+from onboard.core.physics.effects.mount_tilt import MountTilt
+from onboard.core.physics.effects.scale_nonlinearity import ScaleNonlinearity
+from onboard.core.physics.effects.temperature_drift import TemperatureDrift
+from onboard.core.physics.effects.throttle_coupling import ThrottleCoupling
 
 NOMINAL = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 ORIGIN = Origin(t0=-2.0, temperature=30.0)
@@ -111,7 +117,7 @@ def flexed(k, e):
 # What the accelerometer reads too much when unknown k of the family is e.
 READS = {
     "cross axis": (CrossAxis(ORIGIN), cross),
-    "tilt": (ForceTilt(ORIGIN), tilted),
+    "tilt": (MountTilt(ORIGIN), tilted),
     "flex": (LoadFlex(ORIGIN), flexed),
     "nonlinearity": (
         ScaleNonlinearity(ORIGIN),
@@ -203,7 +209,7 @@ def test_a_receiver_that_averages(window):
     np.testing.assert_allclose(got, numeric, atol=0.05 * np.abs(numeric).max())
 
 
-@pytest.mark.parametrize("family", [LeverArm(ORIGIN), AntennaPlace()])
+@pytest.mark.parametrize("family", [GpsLeverArm(ORIGIN), AntennaPlace()])
 def test_an_antenna_away_from_the_imu_swings(family):
     got = columns_of(family)
     e = 1e-3

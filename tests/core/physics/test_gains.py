@@ -7,9 +7,11 @@ import pytest
 
 from onboard.core.diagnosis.regimes import axis_of
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.gains import CrossAxis, LoadFlex, ScaleNonlinearity
-from onboard.core.physics.mount import ForceTilt
-from onboard.core.physics.offsets import BiasRamp
+from onboard.core.physics.effects.bias_ramp import BiasRamp
+from onboard.core.physics.effects.cross_axis import CrossAxis
+from onboard.core.physics.effects.load_flex import LoadFlex
+from onboard.core.physics.effects.mount_tilt import MountTilt
+from onboard.core.physics.effects.scale_nonlinearity import ScaleNonlinearity
 
 F = np.array([[1.0, -2.0, -14.0], [3.0, 0.5, -9.0], [-2.0, 4.0, -20.0]])
 
@@ -18,7 +20,7 @@ F = np.array([[1.0, -2.0, -14.0], [3.0, 0.5, -9.0], [-2.0, 4.0, -20.0]])
     ("kind", "sizes"),
     [
         (CrossAxis, [0.05, -0.04, 0.03, 0.02, -0.05, 0.04]),
-        (ForceTilt, [0.06, -0.08]),
+        (MountTilt, [0.06, -0.08]),
         (ScaleNonlinearity, [0.02, -0.03, 0.02]),
         (LoadFlex, [0.06, -0.05]),
     ],

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from onboard.core.physics.catalogue import response_of
 from onboard.core.physics.finding import Quantity
-from onboard.core.physics.response_curves import law_of
 
 G = 9.80665
 
@@ -45,7 +45,7 @@ def flight():
 
 def response_curve(name, flight, /, **values):
     unknowns = {k: Quantity(v, 0.1 * abs(v), "") for k, v in values.items()}
-    return law_of(name, unknowns, flight, 100.0, 35.0)
+    return response_of(name, unknowns, flight, 100.0, 35.0)
 
 
 def test_a_drift_is_nothing_at_its_reference_and_covers_what_was_felt(flight):
@@ -64,7 +64,7 @@ def test_curvature_is_drawn_for_each_axis_where_it_has_been(flight):
 
 
 def test_a_jump_is_sharp(flight):
-    found = law_of(
+    found = response_of(
         "bias_step",
         {"time": Quantity(40.0, 0.5, "s"), "x": Quantity(0.3, 0.01, "m/s^2")},
         flight,
@@ -94,7 +94,7 @@ def test_one_unit_of_an_unknown_makes_what_the_catalogue_says(flight, name, unkn
     assert np.interp(at, found.x, found.y[unknown]) == pytest.approx(value, rel=2e-2)
 
 
-def test_what_follows_no_single_signal_has_no_law(flight):
+def test_what_follows_no_single_signal_has_no_curve(flight):
     assert response_curve("gps_lever_arm", flight, x=1.0) is None
     assert response_curve("temperature_drift", [], x=1.0) is None
     flight[0].segment.slow = {}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
+from typing import Self
 
 import numpy as np
 
@@ -11,37 +13,51 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Unknown
-from onboard.core.physics.effect import AXES, EffectColumns, on_axes
+from onboard.core.physics.effect import AXES, Bearing, Effect, Origin, on_axes
 
 LARGEST = 3.0
 """Prior sigma of a term's size, m/s^2 at a signal of one; signals are scaled to be about one."""
 
 
-class Product(EffectColumns):
-    """An offset in proportion to a scalar signal, with a size for each axis."""
+class Empirical(Effect):
+    """An offset in proportion to a product of signals, with a size for each axis.
+
+    Without a product (:meth:`of`) it is no candidate.
+    """
 
     effect = "empirical"
+    code = 21
+    title = "An unnamed dependence on a measured signal"
+    sentence = "something is missing"
+    meaning = "a `formula`"
+    bearing = Bearing.WITHIN
     source = "search among products of measured signals"
     cure = "look for what the formula stands for; nothing in the catalogue does"
     apart = "fly the manoeuvre in which the signal changes and nothing else does"
+    named = False
+    written = ""
 
-    def __init__(self, name: str, formula: str, signal: Callable[[Signals], Array]) -> None:
+    def of(self, name: str, written: str, signal: Callable[[Signals], Array]) -> Self:
         """Take a name, the signal as people write it, and how it is evaluated at nodes."""
-        self.name = f"empirical_{name}"
-        self.formula = formula
-        self._signal = signal
-        self.keys = tuple(AXES)
-        self.plausible = (np.inf,) * 3
-        self.unknowns = tuple(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXES)
+        made = copy(self)
+        made.name = f"{self.effect}_{name}"
+        made.written = written
+        made.signal = signal
+        made.keys = tuple(AXES)
+        made.plausible = (np.inf,) * 3
+        made.unknowns = tuple(Unknown(f"{made.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXES)
+        return made
+
+    signal: Callable[[Signals], Array]
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-s e_i``."""
-        return on_axes(np.repeat(self._signal(nodes)[..., None], 3, axis=-1))
+        return on_axes(np.repeat(self.signal(nodes)[..., None], 3, axis=-1))
 
-    def written(self, sizes: Sequence[float]) -> str:
+    def formula(self, sizes: Sequence[float]) -> str:
         """The formula with its sizes: what each axis reads too much, m/s^2."""
         terms = ", ".join(f"{a} {x:+.3g}" for a, x in zip(AXES, sizes, strict=True))
-        return f"({terms}) m/s^2 * {self.formula}"
+        return f"({terms}) m/s^2 * {self.written}"
 
 
 def _rate(axis: int) -> Callable[[Signals], Array]:
@@ -72,15 +88,16 @@ def _over_time(t: Array, x: Array) -> Callable[[Signals], Array]:
     return lambda nodes: np.interp(nodes.t, t, x)
 
 
-def products(batches: Sequence[Batch]) -> list[Product]:
+def products(batches: Sequence[Batch], origin: Origin) -> list[Empirical]:
     """Every product that this recording has the signals for."""
-    out = [Product(f"w{a}", f"w_{a} / (rad/s)", _rate(i)) for i, a in enumerate(AXES)]
+    make = Empirical(origin).of
+    out = [make(f"w{a}", f"w_{a} / (rad/s)", _rate(i)) for i, a in enumerate(AXES)]
     for i, j in ((0, 0), (1, 1), (2, 2), (0, 2), (1, 2)):
         pair = f"{AXES[i]}{AXES[j]}"
-        out.append(Product(f"w{pair}", f"w_{AXES[i]} w_{AXES[j]} / (rad/s)^2", _rates(i, j)))
+        out.append(make(f"w{pair}", f"w_{AXES[i]} w_{AXES[j]} / (rad/s)^2", _rates(i, j)))
     for i, j in ((0, 1), (0, 2), (1, 2)):
         pair = f"{AXES[i]}{AXES[j]}"
-        out.append(Product(f"f{pair}", f"f_{AXES[i]} f_{AXES[j]} / g^2", _forces(i, j)))
+        out.append(make(f"f{pair}", f"f_{AXES[i]} f_{AXES[j]} / g^2", _forces(i, j)))
     t = np.concatenate([c.fixes.t for c in batches])
     t, first = np.unique(t, return_index=True)
     v = np.concatenate([c.fixes.v_n for c in batches])[first]
@@ -88,15 +105,15 @@ def products(batches: Sequence[Batch]) -> list[Product]:
     heard = np.all(np.isfinite(v[:, :2]), axis=1)
     if heard.sum() > 2:
         speed2 = np.sum(v[heard, :2] ** 2, axis=1) / 100.0
-        out.append(Product("v2", "(ground speed / 10 m/s)^2", _over_time(t[heard], speed2)))
+        out.append(make("v2", "(ground speed / 10 m/s)^2", _over_time(t[heard], speed2)))
     if len(t) > 20:
         rate = np.convolve(np.gradient(height, t), np.ones(9) / 9.0, mode="same")
-        out.append(Product("climb", "climb rate / (m/s)", _over_time(t, rate)))
+        out.append(make("climb", "climb rate / (m/s)", _over_time(t, rate)))
     names = set.intersection(*(set(c.segment.slow) for c in batches))
     if "airspeed" in names:
-        out.append(Product("air2", "(airspeed / 10 m/s)^2", _slow("airspeed", 2, 10.0)))
+        out.append(make("air2", "(airspeed / 10 m/s)^2", _slow("airspeed", 2, 10.0)))
     if "throttle" in names:
-        out.append(Product("throttle2", "throttle^2", _slow("throttle", 2, 1.0)))
+        out.append(make("throttle2", "throttle^2", _slow("throttle", 2, 1.0)))
     if "vibration" in names:
-        out.append(Product("vibe", "|vibration| / (10 m/s^2)", _slow("vibration", 1, 10.0)))
+        out.append(make("vibe", "|vibration| / (10 m/s^2)", _slow("vibration", 1, 10.0)))
     return out

@@ -1,0 +1,50 @@
+"""Clocks of GPS and IMU that run at different rates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.quadrature import Around
+from onboard.core.model.regressors import Direct, Unknown
+from onboard.core.physics import response_curves as curves
+from onboard.core.physics.effect import Bearing, Effect
+from onboard.core.physics.finding import Finding
+from onboard.core.physics.wording import first, measured
+
+PARTS_PER_MILLION = 1e6
+
+
+class ClockSkew(Effect):
+    """Receiver stamps that drift against the IMU's clock."""
+
+    effect = "clock_skew"
+    code = 17
+    title = "The GPS and IMU clocks run at different rates"
+    sentence = "GPS and IMU clocks run at different rates"
+    meaning = "`rate`"
+    bearing = Bearing.BESIDE
+    source = "delay that grows: rate (t - t0)"
+    cure = "look at the time stamps: driver, transport, or a log put together from two clocks"
+    apart = "fly longer"
+    keys = ("rate",)
+    plausible = (0.01,)
+    unknowns = (Unknown("clock_rate", "1", 0.0, 3e-3),)
+    response = curves.Response("time", "s", "GPS late by", "ms", curves.time, lambda x, _: 1e3 * x)
+
+    def velocity(self, around: Around) -> Direct:
+        """``-a (t - t0)``."""
+        age = around.now.t - self.origin.t0
+        body = -around.now.f_b[..., None] * age[:, None, None]
+        ned = np.zeros_like(body)
+        ned[:, 2, 0] = -STANDARD_GRAVITY * age
+        return Direct(body=body, ned=ned)
+
+    def position(self, around: Around) -> Direct:
+        """``-v (t - t0)``."""
+        return Direct(along_velocity=-(around.now.t - self.origin.t0)[:, None])
+
+    @classmethod
+    def size(cls, found: Finding) -> str:
+        """``by 120 ± 9 ppm``."""
+        return f"by {measured(first(found.unknowns), PARTS_PER_MILLION, 'ppm')}"

@@ -1,0 +1,39 @@
+"""Gravity that is not the standard one."""
+
+from __future__ import annotations
+
+from onboard.core.maths.arrays import Array
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Unknown
+from onboard.core.physics.effect import Bearing, Effect
+from onboard.core.physics.finding import Finding
+from onboard.core.physics.wording import first, measured
+
+
+class Gravity(Effect):
+    """Gravity that differs from 9.80665 m/s^2."""
+
+    effect = "gravity"
+    code = 18
+    title = "Gravity differs from the expected value"
+    sentence = "gravity is not the expected"
+    meaning = "`delta_g`, m/s²"
+    bearing = Bearing.WITHIN
+    source = "Somigliana's formula says what to expect"
+    cure = "none: the autopilot integrates with 9.80665 everywhere"
+    apart = "fly steep banked turns: an offset turns with the body, gravity does not"
+    keys = ("delta_g",)
+    # Poles to equator, and 5 km up, it is between 0.03 more and 0.045 less than the standard.
+    plausible = (0.045,)
+    unknowns = (Unknown("delta_g", "m/s^2", 0.0, 0.06),)
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """Down, in body axes by the recorded attitude."""
+        flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
+        down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
+        return down[..., None]
+
+    @classmethod
+    def size(cls, found: Finding) -> str:
+        """``by 0.03 ± 0.005 m/s²``."""
+        return f"by {measured(first(found.unknowns), 1.0, 'm/s²')}"

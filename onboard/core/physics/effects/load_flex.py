@@ -1,0 +1,49 @@
+"""A mount that bends under load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.regressors import Unknown
+from onboard.core.physics import response_curves as curves
+from onboard.core.physics.effect import Bearing
+from onboard.core.physics.finding import Finding
+from onboard.core.physics.proportional import Proportional
+from onboard.core.physics.wording import DEGREE, each
+
+
+class LoadFlex(Proportional):
+    """Mount that bends with the load: tilt per g of load beyond one."""
+
+    effect = "load_flex"
+    code = 19
+    title = "The mount bends under load"
+    sentence = "the mount bends under load"
+    meaning = "`roll`, `pitch`, rad per g"
+    bearing = Bearing.BESIDE
+    source = "linear spring: tilt = flex (n - 1), n = -f_z / g"
+    cure = "stiffen the autopilot's mount"
+    apart = "pull up and turn steeply: only a flexing mount follows the load factor"
+    keys = ("roll", "pitch")
+    plausible = (0.2, 0.2)
+    unknowns = (
+        Unknown("load_flex_roll", "rad/g", 0.0, 0.1),
+        Unknown("load_flex_pitch", "rad/g", 0.0, 0.1),
+    )
+    response = curves.Response(
+        "load factor", "g", "tilt", "°", curves.load, lambda x, _: (x - 1.0) / DEGREE
+    )
+
+    def amount(self, f_b: Array) -> Array:
+        """As a tilt, times ``n - 1``."""
+        extra = -f_b[..., 2] / STANDARD_GRAVITY - 1.0
+        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        tilt = np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
+        return tilt * extra[..., None, None]
+
+    @classmethod
+    def size(cls, found: Finding) -> str:
+        """``by pitch 0.6° per g``."""
+        return f"by {each(found.unknowns, 1.0 / DEGREE, '°')} per g"

@@ -1,0 +1,66 @@
+"""The record of a flight's diagnosis, as it is kept and judged before a push.
+
+What becomes of the calibration beside what was found, :mod:`onboard.answers.answer` says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+from onboard.core.estimate.result import Calibration
+from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.effect import Bearing
+
+HEADLINES = {
+    "clean": "Nothing is missing beyond the six numbers and the timing.",
+    "explained": "Physics is missing from the model, and it was found.",
+    "partly_explained": "Physics is missing from the model; a part of it was found.",
+    "unexplained": "Something is missing, and nothing known explains it.",
+    "insufficient": "This flight cannot tell.",
+}
+KNOWN_ALREADY = "Nothing is missing: what was found is in every calibration, and worth knowing."
+
+
+def severity_of_effect(name: str) -> str:
+    """``info`` for what forbids nothing, ``warning`` for what the calibration lacks."""
+    return "info" if bearing_of(name) is Bearing.HARMLESS else "warning"
+
+
+def headline(verdict: str, effects: Collection[str]) -> tuple[str, str]:
+    """A diagnosis in one sentence, and its severity: good, info, warning or error.
+
+    Args:
+        verdict: a value of :class:`onboard.core.diagnosis.records.Verdict`.
+        effects: names of what was found.
+    """
+    if verdict == "explained" and all(severity_of_effect(n) == "info" for n in effects):
+        return KNOWN_ALREADY, "info"
+    severity = {"clean": "good", "unexplained": "error"}
+    return HEADLINES[verdict], severity.get(verdict, "warning")
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosed:
+    """One accelerometer's flight, diagnosed.
+
+    Attributes:
+        imu: which accelerometer.
+        verdict: the diagnosis in one word.
+        effects: names of what was found, the largest first.
+        calibration: of the model with what was found in it, as it was when it was diagnosed.
+        missing: why it must not be written by itself, in words; empty if nothing forbids it.
+        modelled: what is missing is modelled beside the six, which may be offered to a person.
+        document: the diagnosis as other programs read it.
+        resumed: it was made before the service last started.
+    """
+
+    imu: int
+    verdict: str
+    effects: tuple[str, ...]
+    calibration: Calibration
+    missing: str = ""
+    modelled: bool = False
+    document: dict[str, Any] = field(default_factory=dict)
+    resumed: bool = False
