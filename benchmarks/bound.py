@@ -12,7 +12,8 @@ import numpy as np
 
 from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
-from onboard.core.filter.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.noise import NoiseLevels
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.recorded import Array, Flight
-from onboard.core.filter.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 from sitl.builtin import rotation
 from sitl.builtin.smoothing import RATE, derivative

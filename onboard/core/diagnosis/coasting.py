@@ -16,9 +16,9 @@ import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.refusals import Refused
-from onboard.core.filter.innovation_gates import GATE_VELOCITY
-from onboard.core.filter.innovations import Epoch, Rows
-from onboard.core.filter.noise import COLOUR_TIME_S, NoiseLevels
+from onboard.core.filter.innovations import Epoch, WhitenedInnovations
+from onboard.core.filter.limits import COLOUR_TIME_S, GATE_VELOCITY
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.filter.whitening import WhiteningFilter
@@ -66,17 +66,12 @@ class AskingFilter(WhiteningFilter):
         super().__init__(unknowns, (levels,))
         self.asked: list[Asked] = []
 
-    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> Rows | None:
+    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> WhitenedInnovations | None:
         """As ever; a fix that is not to be believed is compared before."""
-        if not epoch.trusted and bool(np.all(np.isfinite(epoch.velocity[:2]))):
-            rows = self._rows(epoch, theta, use_v=True, use_h=False, use_a=False)
-            if rows is not None:
-                _, both, (first, second, noise) = rows
-                E, HP = both[0, :, : self.m + 1], both[0, :, self.m + 1 :]
-                S = HP[:, first] + HP[:, second] + np.diag(self._row_var[0, noise])
-                D = E[:, 1:]
-                S = S + D @ covariance @ D.T
-                self.asked.append(Asked(epoch.t, (E[:, 0] - D @ theta)[:2], S[:2, :2]))
+        expected = None if epoch.trusted else self.expected_velocity(epoch, theta, covariance)
+        if expected is not None:
+            innovation, spread = expected
+            self.asked.append(Asked(epoch.t, innovation[:2], spread[:2, :2]))
         return super().update(epoch, theta, covariance)
 
 

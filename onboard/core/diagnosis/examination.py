@@ -16,8 +16,8 @@ from onboard.core.diagnosis.standing import attitude_unknowns
 from onboard.core.estimate.engine import Engine, moved
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.passes import Pass, PassResult
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.passes import Pass
+from onboard.core.filter.traces import EpochTrace, PassResult
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block

@@ -15,9 +15,9 @@ import numpy as np
 
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.estimate.solution import Solution, solve, total
-from onboard.core.filter.noise import NoiseLevels, distance, line, star, stepped
-from onboard.core.filter.passes import Pass, PassResult
-from onboard.core.filter.traces import EpochState
+from onboard.core.filter.noise import NoiseLevels, distance, line_search, stencil, stepped
+from onboard.core.filter.passes import Pass
+from onboard.core.filter.traces import EpochState, PassResult
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -241,9 +241,9 @@ class Engine:
         for turn in range(rounds):
             members = None
             if target is not None:
-                members = line(self.noise, target)
+                members = line_search(self.noise, target)
             elif turn < noise_rounds:
-                members = star(self.noise)
+                members = stencil(self.noise)
             made = self._new_pass(members)
             self._seed = solve(self._over_buffer(made), self.model)
             point = moved(self.point, self.model, self._seed.theta)

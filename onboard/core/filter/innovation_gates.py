@@ -1,7 +1,10 @@
 """Gates on the filter's innovations: what a measurement may differ by, and when it is back.
 
-Velocity that is impossible is refused until it has been right, and steady, for a while.  Height
-and attitude that stay off are no fault but a new reference, which is what the caller is told.
+A gate compares the normalised innovation squared (NIS) of a measurement, ``r^T S^-1 r``, with the
+chi-square distribution that it has if the filter's model is right.
+
+A velocity outside its gate is refused until it has been inside, and steady, for a while.  A height
+or attitude that stays outside is no fault but a new reference, and the caller is told so.
 """
 
 from __future__ import annotations
@@ -10,20 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.filter.limits import (
+    GATE_ATTITUDE,
+    GATE_HEIGHT,
+    GATE_VELOCITY,
+    PATIENCE_S,
+    RECOVERY_DRIFT,
+    RECOVERY_FIXES,
+    RECOVERY_S,
+    RECOVERY_SIGMAS,
+)
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.maths.arrays import Array
-
-GATE_VELOCITY = 30.0
-"""Chi-square of the velocity innovation past which a fix is refused (3 dof: p of 1e-6)."""
-GATE_HEIGHT = 30.0
-GATE_ATTITUDE = 60.0
-PATIENCE_S = {"height": 3.0, "attitude": 5.0}
-"""What stays off for longer is a new reference (a new satellite), not a fault."""
-RECOVERY_FIXES, RECOVERY_S = 3, 1.0
-"""A velocity is believed again after so many fixes, and so long, inside the gate."""
-RECOVERY_SIGMAS, RECOVERY_DRIFT = 7.0, 0.3
-"""Between two of them the innovation changes by the receiver's noise (5 sigma of a difference) and
-by what the accelerometer is off, m/s^2."""
 
 GATES = (
     ("v", "velocity", GATE_VELOCITY),
@@ -33,15 +34,21 @@ GATES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
-    """What is refused, by name, and whether it has been off so long that it is a new reference."""
+class GateRefusal:
+    """A measurement that a gate refused.
+
+    Attributes:
+        name: ``velocity``, ``height``, ``attitude``, or ``recovery`` for a velocity inside the gate
+            that was outside a moment ago.
+        renewed: whether it has been outside for so long that it is a new reference.
+    """
 
     name: str
     renewed: bool = False
 
 
 class InnovationGates:
-    """Judges innovations; remembers since when each kind has been off."""
+    """Judges innovations; remembers since when each kind of measurement has been refused."""
 
     def __init__(self, levels: NoiseLevels) -> None:
         """Take the noise levels that the innovations were whitened with."""
@@ -56,17 +63,20 @@ class InnovationGates:
 
     def judge(
         self, t: float, kinds: str, E: Array, y: Array, h: Array, theta: Array, C: Array
-    ) -> Refusal | None:
-        """The first group whose innovation is impossible, given all uncertainty.
+    ) -> GateRefusal | None:
+        """Find the first measurement whose innovation is impossible, given all uncertainty.
 
         Args:
-            t: of the epoch, s.
-            kinds: one letter a row: ``v``, ``h``, ``a``, in this order.
-            E: (r, m + 1) innovations and their columns, not whitened.
-            y: (r,) whitened innovations.
-            h: (r, m) their columns.
+            t: time of the epoch, s.
+            kinds: one letter for each of the r innovations: ``v``, ``h``, ``a``, in this order.
+            E: (r, m + 1) innovations and their regressors, not whitened.
+            y: (r,) whitened innovations at ``theta = 0``.
+            h: (r, m) their regressors.
             theta: (m,) estimate.
             C: (m, m) covariance of it.
+
+        Returns:
+            None if all may be used.
         """
         at = 0
         for kind, name, limit in GATES:
@@ -75,26 +85,26 @@ class InnovationGates:
                 continue
             r, D = y[at : at + n] - h[at : at + n] @ theta, h[at : at + n]
             at += n
-            chi2 = float(r @ r)
-            if chi2 > limit:
+            nis = float(r @ r)
+            if nis > limit:
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
-                chi2 = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
-            if chi2 > limit:
+                nis = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
+            if nis > limit:
                 if kind != "v":
-                    return Refusal(name, self._outlasts(name, t))
+                    return GateRefusal(name, self._outlasts(name, t))
                 self._velocity_off, self._good = True, []
-                return Refusal(name)
+                return GateRefusal(name)
             if kind != "v":
                 self._off_since.pop(name, None)
             elif self._velocity_off and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
-                return Refusal("recovery")
+                return GateRefusal("recovery")
         return None
 
     def _recovers(self, t: float, innovation: Array) -> bool:
         """True while a receiver that was off has not been right, and steady, for long enough.
 
-        After seconds of coasting the gate is wide; a receiver that is only noisy falls into it,
-        but then its errors jump, while those of the coasting filter cannot.
+        After seconds of dead reckoning the gate is wide; a receiver that is only noisy falls into
+        it, but then its errors jump, while those of dead reckoning cannot.
         """
         if self._good:
             before, last = self._good[-1]

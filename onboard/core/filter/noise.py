@@ -1,11 +1,11 @@
 """Noise levels of the whitening filter and their estimation from the data.
 
-The levels are found by maximum likelihood: one pass over the data runs the filter for a *star*
-of levels (the centre, and every level up and down by a factor) side by side, a parabola through
-each triple of log-likelihoods gives a step; the next pass tries shares of that step on a *line*,
-for some levels trade with each other, and the likeliest is taken.  Constant factors here, not
-tuned numbers: only ratios of the order of one matter for the estimate, and honesty of the sigmas
-is checked again by the residuals (:mod:`onboard.core.estimate.solution`).
+The levels are found by maximum likelihood.  One pass over the data runs a filter bank on a
+*stencil* of levels: the centre, and every level up and down by a factor.  A parabola through each
+triple of log-likelihoods gives a step.  The next pass is a *line search*: it tries shares of that
+step, because some levels trade with each other, and takes the likeliest.  Only ratios of the order
+of one matter for the estimate, and the honesty of its sigmas is checked again by the residuals
+(:mod:`onboard.core.estimate.solution`).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from onboard.core.filter.limits import LIMITS, LINE_SHARES, STENCIL_FACTOR
+
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevels:
@@ -22,15 +24,17 @@ class NoiseLevels:
 
     Attributes:
         velocity: white noise of a GPS velocity component, m/s.
-        velocity_colour: coloured part (time constant :data:`COLOUR_TIME_S`), m/s.
+        velocity_colour: Gauss-Markov error of a GPS velocity component (correlation time
+            :data:`~onboard.core.filter.limits.COLOUR_TIME_S`), m/s.
         height: white noise of GPS height, m.
         height_walk: wander of GPS height, m/sqrt(s).
         force_walk: velocity random walk from accelerometer noise and all that is like it,
             m/s/sqrt(s).
         tilt_walk: angle random walk of the gyroscope, rad/sqrt(s).
         bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
-        attitude: slow error of the recorded tilt (time constant :data:`ATTITUDE_TIME_S`), rad.
-        heading: slow error of the recorded heading, rad.
+        attitude: Gauss-Markov error of the recorded tilt (correlation time
+            :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
+        heading: the same of the recorded heading, rad.
     """
 
     velocity: float = 0.05
@@ -49,29 +53,6 @@ class NoiseLevels:
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
 
-COLOUR_TIME_S = 3.0
-"""Receivers filter their velocity over a second or two, multipath lasts some seconds."""
-ATTITUDE_TIME_S = 10.0
-"""An EKF that weighs GPS against gyroscopes forgets a tilt error in some tens of seconds."""
-
-LIMITS: dict[str, tuple[float, float]] = {
-    "velocity": (0.02, 2.0),
-    "velocity_colour": (0.005, 1.0),
-    "height": (0.05, 10.0),
-    "height_walk": (0.01, 2.0),
-    "force_walk": (0.01, 3.0),
-    "tilt_walk": (1e-4, 0.03),
-    "bias_walk": (1e-5, 3e-4),
-    "attitude": (0.01, 0.2),
-    "heading": (0.015, 0.5),
-}
-"""No sensor on a small vehicle is better than the lower ends; a noiseless simulation must not make
-the filter believe that timing, interpolation and filters are modelled to the last digit.
-
-The recorded attitude's are no such formality.  An EKF errs with the manoeuvre, and smoothly: the
-likelihood sees how smooth its error is, not how large, and runs to whatever end there is.  With
-half the tilt's end, flights of ArduPilot's SITL err 2.4 times as much, beyond 5 sigma."""
-
 ESTIMATED = (
     "velocity",
     "velocity_colour",
@@ -84,25 +65,21 @@ ESTIMATED = (
     "heading",
 )
 
-STAR_FACTOR = 2.0
-LINE = (0.25, 0.5, 1.0)
-"""Shares of a step that are tried: levels that trade with each other make the whole too long."""
-
 
 def _triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
     """Two more values of a level: one to each side, or both to the inner side of a limit."""
     low, high = limits
-    lower, upper = max(level / STAR_FACTOR, low), min(level * STAR_FACTOR, high)
+    lower, upper = max(level / STENCIL_FACTOR, low), min(level * STENCIL_FACTOR, high)
     # A value clipped to (nearly) the centre itself would bend the parabola: take a half step in.
-    if level / lower < STAR_FACTOR**0.25:
-        lower = level * STAR_FACTOR**0.5
-    elif upper / level < STAR_FACTOR**0.25:
-        upper = level / STAR_FACTOR**0.5
+    if level / lower < STENCIL_FACTOR**0.25:
+        lower = level * STENCIL_FACTOR**0.5
+    elif upper / level < STENCIL_FACTOR**0.25:
+        upper = level / STENCIL_FACTOR**0.5
     return lower, upper
 
 
-def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
-    """The centre, then two more values of each estimated level, the others as they are."""
+def stencil(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
+    """The centre, then two other values of each level in :data:`ESTIMATED`, one level at a time."""
     return (
         centre,
         *(
@@ -114,12 +91,12 @@ def star(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
 
 
 def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels:
-    """Next centre from the log-likelihoods of :func:`star`: a parabola in each log-level.
+    """Next centre from the log-likelihoods of :func:`stencil`: a parabola in each log-level.
 
-    A step is at most :data:`STAR_FACTOR` squared; where the likelihood is flat or convex, it goes
-    towards the best of the three values.
+    A step is at most :data:`STENCIL_FACTOR` squared; where the likelihood is flat or convex, it
+    goes towards the best of the three values.
     """
-    longest = 2.0 * float(np.log(STAR_FACTOR))
+    longest = 2.0 * float(np.log(STENCIL_FACTOR))
     levels = centre
     for i, name in enumerate(ESTIMATED):
         here = getattr(centre, name)
@@ -136,8 +113,8 @@ def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels
     return levels
 
 
-def line(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
-    """The centre, then the shares :data:`LINE` of the way to ``target``, in log-levels."""
+def line_search(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
+    """The centre, then the shares :data:`LINE_SHARES` of the way to ``target``, in log-levels."""
     return (
         centre,
         *(
@@ -148,7 +125,7 @@ def line(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
                     for f in fields(NoiseLevels)
                 )
             )
-            for share in LINE
+            for share in LINE_SHARES
         ),
     )
 

@@ -1,8 +1,9 @@
-"""Accelerometer noise in the columns: what of a column's information is not signal.
+"""Accelerometer noise in the regressors: what of a regressor's information is not signal.
 
-The scale columns are integrals of *noisy* accelerations (errors in variables).  Unit white noise
-on each axis is carried through the same integrals and the same whitening as the columns are; what
-it leaves in the rows, squared, times its density, is the expected part of the sums that is noise.
+The regressors of the scale are integrals of *noisy* accelerations (errors in variables).  Unit
+white noise on each axis is carried through the same integrals and the same whitening as the
+regressors are; its square in the whitened innovations, times its density, is the expected part of
+the sums that is noise.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.filter.limits import FEWEST_NOISE_MEANS, NOISE_MEAN_S
 from onboard.core.filter.state import STATES, V
 from onboard.core.maths.arrays import Array
 
@@ -17,16 +19,13 @@ Index = NDArray[np.intp]
 
 _EYE = np.eye(STATES)
 
-BLOCK_S = 0.05
-"""Vehicles do not manoeuvre faster."""
-FEWEST_BLOCKS = 8
 
-
-class ColumnNoise:
+class RegressorNoise:
     """Carries unit white noise of three body axes along with a filter; owns its Gram.
 
     Attributes:
-        gram: (3,) sum over rows of the whitened noise squared, per unit density of each axis.
+        gram: (3,) sum since :meth:`begin_block` of the whitened noise squared, per unit density
+            ((m/s^2)^2 s) of each body axis.
     """
 
     def __init__(self) -> None:
@@ -36,6 +35,10 @@ class ColumnNoise:
     def forget(self) -> None:
         """The filter starts anew: no noise has been integrated yet.  The Gram stays."""
         self._Xi[:] = 0.0
+
+    def begin_block(self) -> None:
+        """Count the Gram from here on; the noise that was integrated goes on."""
+        self.gram = np.zeros(3)
 
     def predict(self, F: Array, R_nb: Array, duration: float) -> None:
         """Through one interval with transition ``F`` (n, n) and attitude ``R_nb`` (3, 3)."""
@@ -66,21 +69,21 @@ class ColumnNoise:
 def sample_noise_density(t: Array, raw: Array) -> Array:
     """Density (m/s^2)^2 s of what looks like white noise in each axis' samples.
 
-    Samples are averaged to blocks of :data:`BLOCK_S`, third differences of the blocks take the
+    Samples are averaged over :data:`NOISE_MEAN_S`, third differences of the means take the
     manoeuvre out (white noise: 20 times its variance), and the median absolute deviation ignores
     the few jerks that are left.
 
     Args:
         t: (n,) s.
-        raw: (n, 3).
+        raw: (n, 3) sensor axes, m/s^2.
 
     Returns:
-        (3,).
+        (3,) sensor axes; zeros where there are too few samples to tell.
     """
     step = (t[-1] - t[0]) / max(len(t) - 1, 1)
-    size = max(1, round(BLOCK_S / step))
+    size = max(1, round(NOISE_MEAN_S / step))
     count = len(t) // size
-    if count < FEWEST_BLOCKS:
+    if count < FEWEST_NOISE_MEANS:
         return np.zeros(3)
     blocks = raw[: count * size].reshape(count, size, 3).mean(axis=1)
     third = np.diff(blocks, n=3, axis=0)

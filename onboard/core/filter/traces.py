@@ -1,15 +1,25 @@
-"""What each epoch of a pass leaves behind, besides its share of the sums."""
+"""What a pass leaves behind: sums of a block, and on request every epoch."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.blocks import Block
 
 
 @dataclass(frozen=True, slots=True)
 class EpochState:
-    """Filter's state after an epoch: where dead reckoning may start.  ``innovation`` as below."""
+    """State of the filter after an epoch: where dead reckoning may start.
+
+    Attributes:
+        t: time on the boot clock, s.
+        innovation: (3,) velocity innovation at the current estimate, NED, m/s; NaN down where the
+            receiver has no vertical speed.
+        R_nb: (3, 3) body axes to NED.
+        v_n: (3,) velocity, NED, m/s.
+        bias_b: (3,) gyroscope bias, body axes, rad/s.
+    """
 
     t: float
     innovation: Array
@@ -20,10 +30,21 @@ class EpochState:
 
 @dataclass(frozen=True, slots=True)
 class EpochTrace:
-    """What one epoch left, for plots, gates and localisation.
+    """What one epoch measured, for plots, gates and for finding where in a flight an effect is.
 
-    The velocity residual, NED, m/s, at ``theta`` is ``innovation - columns @ theta``; ``y`` and
-    ``h`` are the whitened rows.
+    The velocity residual at unknowns ``theta`` is ``innovation - columns @ theta``; the whitened
+    innovations there are ``y - h @ theta``.
+
+    Attributes:
+        t: time on the boot clock, s.
+        innovation: (v,) velocity innovation at ``theta = 0``, NED, m/s.
+        columns: (v, m) its regressors.
+        y: (r,) whitened innovations at ``theta = 0``.
+        h: (r, m) their regressors.
+        velocities: v, how many of the r are of velocity: they come first.
+        height: whether one of height follows; the rest are of attitude.
+        refused: names of what the gates refused.
+        refused_by: (2 or 3,) innovation of a velocity that was refused, NED, m/s; else empty.
     """
 
     t: float
@@ -35,3 +56,22 @@ class EpochTrace:
     height: bool
     refused: tuple[str, ...]
     refused_by: Array
+
+
+@dataclass(slots=True)
+class PassResult:
+    """What a pass has made of one segment.
+
+    Attributes:
+        block: its sums.
+        states: after every epoch whose velocity was taken.
+        traces: of every epoch, if the pass keeps them.
+        refused: how many measurements the gates refused, by name.
+        epochs: how many fixes were gone through.
+    """
+
+    block: Block
+    states: list[EpochState] = field(default_factory=list)
+    traces: list[EpochTrace] = field(default_factory=list)
+    refused: dict[str, int] = field(default_factory=dict)
+    epochs: int = 0

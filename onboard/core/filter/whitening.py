@@ -1,16 +1,16 @@
-"""The whitening filter: from integrals and GPS epochs to independent rows of unit variance.
+"""The whitening filter: from integrals and fixes to independent innovations of unit variance.
 
 The state (:mod:`onboard.core.filter.state`) is an error of what the inertial samples alone would
-give; the filter runs over the measurement *and over every column* at once, so that its mean is
-``x0 + Xc theta`` (Friedland 1969).
+give.  The filter runs over the measurement *and over every regressor* at once, so that its mean is
+``x0 + Xc theta`` (Friedland 1969), and its innovations are linear in the unknowns ``theta``.
 
 Attitude is carried by the *gyroscope* and corrected by the filter's own estimate after each
-epoch (the recorded attitude, an EKF's, errs with the manoeuvre and with the very accelerometer
-that is calibrated; it only enters as a slow, loose measurement).  With all noise but the GPS's
-set to zero and the recorded attitude taken as it is, the rows are those of the paper's integral
-criterion with V(0) eliminated.
+epoch.  The recorded attitude, an EKF's, errs with the manoeuvre and with the very accelerometer
+that is calibrated; it only enters as a loose measurement with a Gauss-Markov error.  With all
+noise but the GPS's set to zero and the recorded attitude taken as it is, the innovations are those
+of the published integral criterion with V(0) eliminated.
 
-Several noise levels run side by side as a *bank* (leading axis); they share attitude and
+Several noise levels run side by side as a *filter bank* (leading axis); they share attitude and
 linearisation, those of member 0.
 """
 
@@ -19,39 +19,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from onboard.core.filter.innovation_gates import InnovationGates
-from onboard.core.filter.innovations import Epoch, Rows, Step
-from onboard.core.filter.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
-from onboard.core.filter.regressor_noise import ColumnNoise
+from onboard.core.filter.innovations import Epoch, Step, WhitenedInnovations
+from onboard.core.filter.limits import (
+    ATTITUDE_TIME_S,
+    COLOUR_TIME_S,
+    RENEWED_ATTITUDE_VAR,
+    RENEWED_HEIGHT_VAR,
+    SYMMETRY_UPDATES,
+)
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.readings import Reading, innovations, kinds_of, reading
+from onboard.core.filter.regressor_noise import RegressorNoise
 from onboard.core.filter.state import ATT, BIAS, CH, CV, PSI, STATES, H, V
+from onboard.core.filter.variances import Variances
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
-from onboard.core.maths.small_turns import angle_of, skew_of, turn_by
+from onboard.core.maths.small_turns import skew_of, turn_by
 
 _EYE = np.eye(STATES)
 _DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
-
-
-Index = NDArray[np.intp]
-Read = tuple[Index, Index, Index]
-"""The two states whose sum each row reads, and which of the noise variances is its own."""
-
-
-@cache
-def _read(kinds: str) -> Read:
-    """For rows of these kinds: ``v`` velocities, ``h`` height, ``aaa`` attitude."""
-    n, h, a = kinds.count("v"), kinds.count("h"), kinds.count("a")
-    state = [*range(STATES)]
-    return (
-        np.array([*state[V][:n], *[H] * h, *state[PSI][:a]]),
-        np.array([*state[CV][:n], *[CH] * h, *state[ATT][:a]]),
-        np.array([*[0, 1, 2][:n], *[3] * h, *[4, 5, 6][:a]]),
-    )
+_LETTER = {"velocity": "v", "recovery": "v", "height": "h", "attitude": "a"}
 
 
 def _diagonal(matrices: Array) -> Array:
@@ -62,7 +53,15 @@ def _diagonal(matrices: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Uses:
-    """Which measurements and states the filter uses; all but the paper's special case: all."""
+    """Which measurements and states a filter uses; all, except to show a special case.
+
+    Attributes:
+        height: of the fixes.
+        attitude: the recorded one, as a loose measurement.
+        recorded_attitude: take it for exact instead.
+        earth: rotation of the earth and of the local frame.
+        gates: refuse what is impossible.
+    """
 
     height: bool = True
     attitude: bool = True
@@ -71,8 +70,31 @@ class Uses:
     gates: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class _Whitened:
+    """Innovations before (``E`` (B, r, m + 1)) and after whitening, and the gain's two factors."""
+
+    kinds: str
+    read: Reading
+    E: Array
+    y: Array
+    h: Array
+    gain: Array
+    whitener: Array
+    L: Array
+
+
 class WhiteningFilter:
-    """Runs through epochs; owns the mean, its columns, the covariances and the attitude."""
+    """Runs through epochs; owns the mean, its regressors, the covariances and the attitude.
+
+    Attributes:
+        m: number of unknowns.
+        bank: noise levels of the B members.
+        R_nb: (3, 3) attitude, body axes to NED.
+        t: time on the boot clock, s.
+        regressor_noise: noise in the regressors; None while several levels are tried, for only
+            the sums that count need it.
+    """
 
     def __init__(
         self, unknowns: int, bank: Sequence[NoiseLevels], uses: Uses | None = None
@@ -86,33 +108,26 @@ class WhiteningFilter:
         self._P = np.zeros((B, STATES, STATES))
         self.R_nb = np.eye(3)
         self.t = float("nan")
-        self._density = np.zeros((B, STATES))
-        self._attitude_var = np.zeros((B, 3))
-        self._colour_var = np.zeros(B)
-        self._row_var = np.zeros((B, 7))
-        for i, q in enumerate(self.bank):
-            self._density[i, V] = q.force_walk**2
-            self._density[i, PSI] = q.tilt_walk**2
-            self._density[i, BIAS] = q.bias_walk**2
-            self._density[i, CH] = q.height_walk**2
-            self._attitude_var[i] = (q.attitude**2, q.attitude**2, q.heading**2)
-            self._colour_var[i] = q.velocity_colour**2
-            self._row_var[i] = (*(q.velocity**2,) * 3, q.height**2, *(q.attitude**2,) * 3)
+        self._variances = Variances(self.bank)
         self._gates = InnovationGates(self.bank[0]) if self.uses.gates else None
-        # Noise in the columns is only wanted where the sums will count, not while levels are tried.
-        self.column_noise = ColumnNoise() if B == 1 else None
+        self.regressor_noise = RegressorNoise() if B == 1 else None
         self._updates = 0
 
     def start(self, epoch: Epoch, R_nb: Array, tilt_sigma: float, heading_sigma: float) -> None:
         """Begin at an epoch: its velocity and height are the state, as uncertain as they are.
 
-        A flat prior on V(0) followed by this first measurement: the exact elimination of the
+        A flat prior on V(0) followed by this first measurement is the exact elimination of the
         nuisance V(0).
+
+        Args:
+            epoch: has a velocity to be believed.
+            R_nb: (3, 3) attitude there.
+            tilt_sigma: of its roll and pitch, rad.
+            heading_sigma: of its heading, rad.
         """
-        B = len(self.bank)
         self.R_nb = R_nb
         self.t = epoch.t
-        X, P = np.zeros_like(self._X), np.zeros_like(self._P)
+        X = np.zeros_like(self._X)
         velocity = np.where(np.isnan(epoch.velocity), 0.0, epoch.velocity)
         X[:, V, 0] = velocity - R_nb @ epoch.known_body
         X[:, V, 1:] = -(R_nb @ epoch.velocity_body + epoch.velocity_ned)
@@ -122,239 +137,217 @@ class WhiteningFilter:
             + epoch.position_ned[2]
             + velocity[2] * epoch.along_velocity
         )
-        var = np.empty((B, STATES))
-        var[:, V] = self._row_var[:, :3]
-        if np.isnan(epoch.velocity[2]):
-            var[:, 2] = 10.0**2
-        var[:, H] = self._row_var[:, 3]
-        if not self.uses.height:
-            var[:, H] = 1e8
-        var[:, PSI] = (tilt_sigma**2, tilt_sigma**2, heading_sigma**2)
-        var[:, BIAS] = 0.01**2
-        var[:, ATT] = self._attitude_var
-        var[:, CH] = 0.0
-        var[:, CV] = self._colour_var[:, None]
-        if self.uses.recorded_attitude:
-            var[:, PSI] = var[:, BIAS] = var[:, ATT] = 0.0
-        P[:, range(STATES), range(STATES)] = var
-        # GPS reads velocity + colour: the start inherits the first fix's colour with minus sign.
-        for i in range(3):
-            c = CV.start + i
-            P[:, i, i] += self._colour_var
-            P[:, i, c] = P[:, c, i] = -self._colour_var
-        self._X, self._P = X, P
+        self._X = X
+        self._P = self._variances.at_start(
+            tilt_sigma,
+            heading_sigma,
+            down=not np.isnan(epoch.velocity[2]),
+            height=self.uses.height,
+            attitude=not self.uses.recorded_attitude,
+        )
         if self._gates is not None:
             self._gates.forget()
-        if self.column_noise is not None:
-            self.column_noise.forget()
+        if self.regressor_noise is not None:
+            self.regressor_noise.forget()
 
     @property
     def bias_estimate(self) -> tuple[Array, Array]:
-        """Mean of the gyroscope bias of member 0: constant part (3,), columns (3, m)."""
+        """Gyroscope bias of member 0, rad/s: (3,) at ``theta = 0``, and its regressors (3, m)."""
         return self._X[0, BIAS, 0], self._X[0, BIAS, 1:]
 
     def velocity(self, theta: Array) -> Array:
-        """(3,) velocity of member 0 at ``theta``, m/s."""
+        """(3,) velocity of member 0 at ``theta`` (m,), NED, m/s."""
         v: Array = self._X[0, V, 0] + self._X[0, V, 1:] @ theta
         return v
 
     def shift_bias(self, by: Array) -> None:
-        """The caller subtracts ``by`` more from the gyroscope from now on."""
+        """The caller subtracts ``by`` (3,), rad/s, more from the gyroscope from now on."""
         self._X[:, BIAS, 0] -= by
 
     def predict(self, step: Step, theta: Array, latitude: float) -> None:
-        """Carry mean, columns and covariance through one interval."""
+        """Carry mean, regressors and covariance through one step.
+
+        Args:
+            step: integrals over it.
+            theta: (m,) current estimate, for the velocity that the earth's rotation acts on.
+            latitude: rad.
+        """
         T, R = step.duration, self.R_nb
         S, S2 = R @ step.force, R @ step.force_to_end
         A = R @ step.mean_turn
-        lever = skew_of(S - S2 / T)
+        arm = skew_of(S - S2 / T)
+        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
         F = _EYE.copy()
         F[V, PSI] = -skew_of(S)
         F[PSI, BIAS] = -A
-        F[V, BIAS] = lever @ A
+        F[V, BIAS] = arm @ A
         F[H, 2] = -T
         F[H, PSI] = skew_of(S2)[2]
-        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
         keep = _diagonal(F)
         keep[ATT], keep[CV] = keep_att, keep_cv
 
-        down = _DOWN
-        turn_n = None
+        down, turn_n = _DOWN, None
         if self.uses.earth:
-            carried, turn_n = carried_and_turning(
-                latitude, self._X[0, V, 0] + self._X[0, V, 1:] @ theta
-            )
+            carried, turn_n = carried_and_turning(latitude, self.velocity(theta))
             down = down + carried
 
         X = F @ self._X
         turned = R @ step.columns_turn
-        X[:, V, 1:] += R @ step.columns - lever @ turned
+        X[:, V, 1:] += R @ step.columns - arm @ turned
         X[:, V, 0] += down * T
         X[:, H, 1:] -= R[2] @ step.columns_to_end
         X[:, H, 0] -= down[2] * T * T / 2.0
         X[:, PSI, 1:] += turned
         self._X = X
 
-        Q = self._density * T
-        Q[:, ATT] = self._attitude_var * (1.0 - keep_att**2)
-        Q[:, CV] = self._colour_var[:, None] * (1.0 - keep_cv**2)
-        if self.uses.recorded_attitude:
-            Q[:, PSI] = Q[:, BIAS] = Q[:, ATT] = 0.0
-        # Walks act along the interval: half of it before, half after the transition.  What decays
-        # has its exact share already.
-        before = 0.5 * Q
-        before[:, ATT] = before[:, CV] = 0.0
-        Q -= before
+        before, after = self._variances.over(
+            T, keep_att, keep_cv, attitude=not self.uses.recorded_attitude
+        )
         P = self._P
         _diagonal(P)[:] += before
         P = F @ P @ F.T
-        _diagonal(P)[:] += Q
+        _diagonal(P)[:] += after
         self._P = P
-        if self.column_noise is not None:
-            self.column_noise.predict(F, R, T)
+        if self.regressor_noise is not None:
+            self.regressor_noise.predict(F, R, T)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
         self.t += T
 
-    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> Rows | None:
-        """Take an epoch's measurements; None if nothing was usable.
+    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> WhitenedInnovations | None:
+        """Take an epoch's measurements, without those that a gate refuses.
 
         Args:
             epoch: the measurements.
             theta: (m,) current estimate, for gates and for the attitude's correction.
             covariance: (m, m) of it.
+
+        Returns:
+            None if there was nothing to take and nothing to refuse.
         """
         refused: list[str] = []
         off = np.zeros(0)
-        use_v = epoch.trusted and bool(np.all(np.isfinite(epoch.velocity[:2])))
-        use_h = self.uses.height and epoch.trusted and bool(np.isfinite(epoch.height))
-        use_a = self.uses.attitude and epoch.R_attitude is not None
-        while True:
-            rows = self._rows(epoch, theta, use_v=use_v, use_h=use_h, use_a=use_a)
-            if rows is None:
-                break
-            kinds, both, index = rows
-            E, HP = both[:, :, : self.m + 1], both[:, :, self.m + 1 :]
-            S = HP.take(index[0], axis=2) + HP.take(index[1], axis=2)
-            _diagonal(S)[:] += self._row_var[:, index[2]]
-            L = np.linalg.cholesky(S)
-            whitener = np.linalg.inv(L)
-            W = whitener @ both
-            y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
-            verdict = None
+        kinds = kinds_of(
+            epoch,
+            velocity=epoch.trusted,
+            height=self.uses.height and epoch.trusted,
+            attitude=self.uses.attitude,
+        )
+        while kinds:
+            made = self._whitened(epoch, theta, kinds)
+            refusal = None
             if self._gates is not None:
-                verdict = self._gates.judge(epoch.t, kinds, E[0], y[0], h[0], theta, covariance)
-            if verdict is None:
-                break
-            bad = verdict.name
-            refused.append(bad)
-            if verdict.renewed:
-                self._renew(bad)
-            if bad in {"velocity", "recovery"}:
+                refusal = self._gates.judge(
+                    epoch.t, kinds, made.E[0], made.y[0], made.h[0], theta, covariance
+                )
+            if refusal is None:
+                self._take(made, theta)
+                return self._given(epoch.t, made, theta, refused, off)
+            refused.append(refusal.name)
+            if refusal.renewed:
+                self._renew(refusal.name)
+            letter = _LETTER[refusal.name]
+            if letter == "v":
                 n = kinds.count("v")
-                off = E[0, :n, 0] - E[0, :n, 1:] @ theta
-            use_v, use_h, use_a = (
-                use_v and bad not in {"velocity", "recovery"},
-                use_h and bad != "height",
-                use_a and bad != "attitude",
-            )
-        if rows is None:
-            return None if not refused else self._nothing(epoch.t, refused, off)
-        n = kinds.count("v")
-        first, columns = E[0, :n, 0], E[0, :n, 1:]
-        back = np.swapaxes(gain, -1, -2)
-        self._X[:, :, :1] += back @ y[:, :, None]
-        self._X[:, :, 1:] -= back @ h
-        P = self._P - back @ gain
-        self._updates += 1
-        if self._updates % 16 == 0:
-            # Rounding makes it drift from symmetry only slowly.
-            P = (P + np.swapaxes(P, -1, -2)) / 2
-        self._P = P
-        if self.column_noise is not None:
-            self.column_noise.update(whitener[0], back[0], index)
-        self._correct(theta)
-        log_det = 2.0 * np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
-        return Rows(
-            epoch.t,
-            y,
-            h,
-            log_det,
-            n,
-            "h" in kinds,
-            first - columns @ theta,
-            first,
-            columns,
-            tuple(refused),
-            off,
-        )
+                off = made.E[0, :n, 0] - made.E[0, :n, 1:] @ theta
+            kinds = kinds.replace(letter, "")
+        return self._nothing(epoch.t, refused, off) if refused else None
 
-    def _nothing(self, t: float, refused: list[str], off: Array) -> Rows:
-        B = len(self.bank)
-        empty = np.zeros((B, 0))
-        return Rows(
-            t,
-            empty,
-            np.zeros((B, 0, self.m)),
-            np.zeros(B),
-            0,
-            False,  # noqa: FBT003 - a record's field
-            np.zeros(0),
-            np.zeros(0),
-            np.zeros((0, self.m)),
-            tuple(refused),
-            off,
-        )
+    def expected_velocity(
+        self, epoch: Epoch, theta: Array, covariance: Array
+    ) -> tuple[Array, Array] | None:
+        """Compare an epoch's velocity with dead reckoning, without taking it.
 
-    def _rows(
-        self, epoch: Epoch, theta: Array, *, use_v: bool, use_h: bool, use_a: bool
-    ) -> tuple[str, Array, Read] | None:
-        """Innovations with their columns and ``H P``, side by side, and what each row reads."""
-        X, P, R = self._X, self._P, self.R_nb
-        kinds = ""
-        if use_v:
-            kinds += "vvv" if np.isfinite(epoch.velocity[2]) else "vv"
-        if use_h:
-            kinds += "h"
-        if use_a:
-            kinds += "aaa"
+        Args:
+            epoch: the measurement, to be believed or not.
+            theta: (m,) current estimate.
+            covariance: (m, m) of it.
+
+        Returns:
+            Innovation (v,), NED, m/s, and its covariance (v, v), all uncertainty included; None
+            where the epoch has no velocity.
+        """
+        kinds = kinds_of(epoch, velocity=True, height=False, attitude=False)
         if not kinds:
             return None
-        read = first, second, _ = _read(kinds)
-        both = np.empty((len(X), len(first), self.m + 1 + STATES))
-        E = both[:, :, : self.m + 1]
-        np.add(X.take(first, axis=1), X.take(second, axis=1), out=E)
-        np.add(P.take(first, axis=1), P.take(second, axis=1), out=both[:, :, self.m + 1 :])
-        E[:, :, 0] *= -1.0
-        at = 0
-        if use_v:
-            n = kinds.count("v")
-            E[:, :n, 0] += (epoch.velocity - R @ epoch.known_body)[:n]
-            E[:, :n, 1:] += (R @ epoch.velocity_body + epoch.velocity_ned)[:n]
-            at = n
-        if use_h:
-            v_down = float(X[0, 2, 0] + X[0, 2, 1:] @ theta)
-            E[:, at, 0] += epoch.height - epoch.known_height
-            E[:, at, 1:] -= (
-                R[2] @ epoch.position_body + epoch.position_ned[2] + v_down * epoch.along_velocity
-            )
-            at += 1
-        if use_a and epoch.R_attitude is not None:
-            E[:, at:, 0] += angle_of(epoch.R_attitude @ R.T)
-            E[:, at:, 1:] += R @ epoch.attitude_body + epoch.attitude_ned
-        return kinds, both, read
+        first, second, noise = reading(kinds)
+        both = innovations(self._X, self._P, self.R_nb, epoch, theta, kinds)
+        E, HP = both[0, :, : self.m + 1], both[0, :, self.m + 1 :]
+        S = HP[:, first] + HP[:, second] + np.diag(self._variances.reading[0, noise])
+        D = E[:, 1:]
+        return E[:, 0] - D @ theta, S + D @ covariance @ D.T
 
-    def _renew(self, reference: str) -> None:
-        """What it differs by is unknown from here on."""
-        if reference == "height":
-            self._P[:, CH, CH] += 1e4
-        else:
-            self._P[:, range(10, 13), range(10, 13)] += 0.3**2
+    def _whitened(self, epoch: Epoch, theta: Array, kinds: str) -> _Whitened:
+        """Innovations of these kinds, times the inverse Cholesky factor of their covariance."""
+        read = reading(kinds)
+        both = innovations(self._X, self._P, self.R_nb, epoch, theta, kinds)
+        E, HP = both[:, :, : self.m + 1], both[:, :, self.m + 1 :]
+        S = HP.take(read.first, axis=2) + HP.take(read.second, axis=2)
+        _diagonal(S)[:] += self._variances.reading[:, read.noise]
+        L: Array = np.linalg.cholesky(S)
+        whitener: Array = np.linalg.inv(L)
+        W = whitener @ both
+        y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
+        return _Whitened(kinds, read, E, y, h, gain, whitener, L)
 
-    def _correct(self, theta: Array) -> None:
-        """Turn the attitude by the filter's own estimate, so that errors stay small angles."""
+    def _take(self, made: _Whitened, theta: Array) -> None:
+        """Update mean, regressors and covariance; turn the attitude by what was found."""
+        back = np.swapaxes(made.gain, -1, -2)
+        self._X[:, :, :1] += back @ made.y[:, :, None]
+        self._X[:, :, 1:] -= back @ made.h
+        P = self._P - back @ made.gain
+        self._updates += 1
+        if self._updates % SYMMETRY_UPDATES == 0:
+            P = (P + np.swapaxes(P, -1, -2)) / 2
+        self._P = P
+        if self.regressor_noise is not None:
+            self.regressor_noise.update(made.whitener[0], back[0], made.read)
         if self.uses.recorded_attitude:
             return
+        # Turned by the filter's own estimate, so that errors stay small angles.
         psi = self._X[0, PSI, 0] + self._X[0, PSI, 1:] @ theta
         self.R_nb = turn_by(psi) @ self.R_nb
         self._X[:, PSI, 0] -= psi
+
+    def _given(
+        self, t: float, made: _Whitened, theta: Array, refused: Sequence[str], off: Array
+    ) -> WhitenedInnovations:
+        n = made.kinds.count("v")
+        first, regressors = made.E[0, :n, 0], made.E[0, :n, 1:]
+        return WhitenedInnovations(
+            t=t,
+            y=made.y,
+            h=made.h,
+            log_det=2.0 * np.log(np.diagonal(made.L, axis1=1, axis2=2)).sum(axis=1),
+            velocities=n,
+            height="h" in made.kinds,
+            innovation=first - regressors @ theta,
+            raw_innovation=first,
+            raw_columns=regressors,
+            refused=tuple(refused),
+            refused_by=off,
+        )
+
+    def _nothing(self, t: float, refused: Sequence[str], off: Array) -> WhitenedInnovations:
+        """All that the epoch has measured was refused."""
+        B = len(self.bank)
+        return WhitenedInnovations(
+            t=t,
+            y=np.zeros((B, 0)),
+            h=np.zeros((B, 0, self.m)),
+            log_det=np.zeros(B),
+            velocities=0,
+            height=False,
+            innovation=np.zeros(0),
+            raw_innovation=np.zeros(0),
+            raw_columns=np.zeros((0, self.m)),
+            refused=tuple(refused),
+            refused_by=off,
+        )
+
+    def _renew(self, reference: str) -> None:
+        """What a reference (``height`` or ``attitude``) differs by is unknown from here on."""
+        if reference == "height":
+            self._P[:, CH, CH] += RENEWED_HEIGHT_VAR
+        else:
+            _diagonal(self._P)[:, ATT] += RENEWED_ATTITUDE_VAR

@@ -2,6 +2,10 @@
 
 ArduPilot applies ``f_b = R_bs diag(scale) (raw - offset)`` (AP_InertialSensor), so that the
 scale and offset estimated against raw units *are* the parameters.
+
+The estimator's unknowns are ``scale`` and ``beta = -scale * offset`` instead, because
+``f_s = scale * raw + beta`` is linear in them.  The conversion between the two pairs is here, and
+nowhere else: :func:`linear_of`, :func:`parameters_of` and :func:`parameters_jacobian`.
 """
 
 from __future__ import annotations
@@ -71,3 +75,50 @@ class SixParameters:
     def undo(self, f_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inverse of :meth:`apply`."""
         return f_s / np.array(self.scale, np.float64) + np.array(self.offset, np.float64)
+
+    def as_linear(self) -> NDArray[np.float64]:
+        """(6,) ``scale`` (1) and ``beta = -scale * offset`` (m/s^2), sensor axes."""
+        return linear_of(self.as_vector())
+
+
+def linear_of(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scale and offset to the estimator's linear unknowns.
+
+    Args:
+        parameters: (6,) scale x, y, z (1), offset x, y, z (m/s^2), sensor axes.
+
+    Returns:
+        (6,) scale x, y, z (1), ``beta = -scale * offset`` (m/s^2).
+    """
+    scale, offset = parameters[:3], parameters[3:6]
+    return np.concatenate([scale, -scale * offset])
+
+
+def parameters_of(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse of :func:`linear_of`: what a solution means as parameters.
+
+    Args:
+        linear: (6,) or more; scale (1) and beta (m/s^2) come first.
+
+    Returns:
+        (6,) scale (1) and ``offset = -beta / scale`` (m/s^2).
+    """
+    scale, beta = linear[:3], linear[3:6]
+    return np.concatenate([scale, -beta / scale])
+
+
+def parameters_jacobian(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivative of :func:`parameters_of`, for covariances.
+
+    Args:
+        linear: (6,) or more; scale (1) and beta (m/s^2) come first.
+
+    Returns:
+        (6, 6) ``d(scale, offset) / d(scale, beta)``.
+    """
+    scale, beta = linear[:3], linear[3:6]
+    J = np.zeros((6, 6))
+    J[range(3), range(3)] = 1.0
+    J[range(3, 6), range(3)] = beta / scale**2
+    J[range(3, 6), range(3, 6)] = -1.0 / scale
+    return J

@@ -1,8 +1,12 @@
-"""Normal-equation sums of the whitened integral criterion: the currency of everything after.
+"""Sums of the normal equations: all that least squares will ever ask of the measurements.
 
-A whitened row is ``e = y - h theta`` with unit variance.  ``N += h^T h``, ``b += h^T y``,
-``s += y^2``, ``rows += 1`` keep all that least squares will ever ask of the rows, so sums of two
+A whitened innovation is a scalar ``e = y - h theta`` of unit variance, with ``y`` its value at
+``theta = 0`` and ``h`` (m,) its regressors.  ``N = sum h^T h``, ``b = sum h^T y`` and
+``s = sum y^2`` are sufficient for every solution, residual and test, so that the sums of two
 segments of flight (two flights, two days) add up to the sums of both.
+
+:class:`NormalSums` is what is kept of a block of flight.  :class:`BankSums` is the only place
+where whitened innovations are added up: for all members of a filter bank at once.
 """
 
 from __future__ import annotations
@@ -10,6 +14,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -22,15 +27,15 @@ _HEAD = struct.Struct("<4sII")
 
 @dataclass(slots=True)
 class NormalSums:
-    """Sums over whitened rows for ``m`` unknowns.
+    """Sums over whitened innovations for ``m`` unknowns.
 
     Attributes:
-        N: (m, m) ``sum h^T h``.
-        b: (m,) ``sum h^T y``.
-        s: ``sum y^2``.
-        G: (m, m) expected part of ``N`` that is noise in the columns (errors in variables).
-        rows: number of rows.
-        log_det: sum of the log determinants of the whitening (for likelihoods).
+        N: (m, m) ``sum h^T h``, the information matrix: 1 / (unit of i times unit of j).
+        b: (m,) ``sum h^T y``, 1 / unit of i.
+        G: (m, m) expected part of ``N`` that is noise in the regressors (errors in variables).
+        s: ``sum y^2``, dimensionless.
+        rows: number of whitened innovations (scalars).
+        log_det: sum of the log determinants of their covariances (for likelihoods).
     """
 
     N: Array
@@ -49,13 +54,6 @@ class NormalSums:
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.b)
-
-    def add_rows(self, h: Array, y: Array) -> None:
-        """Add whitened rows ``h`` (r, m) with right-hand sides ``y`` (r,)."""
-        self.N += h.T @ h
-        self.b += h.T @ y
-        self.s += float(y @ y)
-        self.rows += len(y)
 
     def __add__(self, other: NormalSums) -> NormalSums:
         return NormalSums(
@@ -89,7 +87,7 @@ class NormalSums:
         )
 
     def shifted(self, theta: Array) -> NormalSums:
-        """Sums of the same rows with unknowns counted from ``theta`` (m,)."""
+        """Sums of the same innovations with unknowns counted from ``theta`` (m,)."""
         return NormalSums(
             self.N.copy(),
             self.b - self.N @ theta,
@@ -100,11 +98,14 @@ class NormalSums:
         )
 
     def residual(self, theta: Array) -> float:
-        """``sum (y - h theta)^2`` over the rows."""
+        """``sum (y - h theta)^2``, the normalised innovation squared at ``theta`` (m,)."""
         return float(self.s - 2.0 * theta @ self.b + theta @ self.N @ theta)
 
     def eliminate(self, keep: Sequence[int]) -> tuple[Array, Array]:
-        """Schur complement over all unknowns that are not in ``keep``.
+        """Eliminate all unknowns that are not in ``keep`` (Schur complement).
+
+        Args:
+            keep: indices of the k unknowns that stay.
 
         Returns:
             ``(S, c)``: (k, k) and (k,), the normal equations ``S x = c`` of the kept unknowns
@@ -154,3 +155,81 @@ class NormalSums:
             body[square + m : 2 * square + m].reshape(m, m).copy(),
             *(float(x) for x in body[-3:]),
         )
+
+
+class BankSums:
+    """Sums of every member of a filter bank, side by side.
+
+    Attributes:
+        N: (B, m, m) information matrices of the B members.
+        b: (B, m).
+        s: (B,).
+        log_det: (B,).
+        rows: number of whitened innovations, the same for every member.
+    """
+
+    __slots__ = ("N", "b", "log_det", "rows", "s")
+
+    def __init__(self, members: int, m: int) -> None:
+        """Empty sums of ``members`` filters with ``m`` unknowns."""
+        self.N = np.zeros((members, m, m))
+        self.b = np.zeros((members, m))
+        self.s = np.zeros(members)
+        self.log_det = np.zeros(members)
+        self.rows = 0
+
+    def add(self, y: Array, h: Array, log_det: Array) -> None:
+        """Add whitened innovations.
+
+        Args:
+            y: (B, r) values at ``theta = 0``.
+            h: (B, r, m) regressors.
+            log_det: (B,) log determinant of the innovations' covariance before whitening.
+        """
+        ht = np.swapaxes(h, -1, -2)
+        self.N += ht @ h
+        self.b += (ht @ y[:, :, None])[:, :, 0]
+        self.s += np.einsum("br,br->b", y, y)
+        self.log_det += log_det
+        self.rows += y.shape[1]
+
+    def __iadd__(self, other: BankSums) -> Self:
+        self.N += other.N
+        self.b += other.b
+        self.s += other.s
+        self.log_det += other.log_det
+        self.rows += other.rows
+        return self
+
+    def member(self, i: int) -> NormalSums:
+        """Copy of the sums of one member; no noise in its regressors is known (``G = 0``)."""
+        return NormalSums(
+            self.N[i].copy(),
+            self.b[i].copy(),
+            np.zeros_like(self.N[i]),
+            float(self.s[i]),
+            float(self.rows),
+            float(self.log_det[i]),
+        )
+
+    def log_likelihoods(self, prior: Array, prior_sigma: Array) -> list[float]:
+        """Log-likelihood of each member, the unknowns integrated out with their prior.
+
+        Args:
+            prior: (m,) mean of the unknowns before the flight.
+            prior_sigma: (m,) standard deviations of it.
+
+        Returns:
+            B numbers, up to a constant that all members share.
+        """
+        information = np.diag(1.0 / prior_sigma**2)
+        prior_b = information @ prior
+        constant = float(prior @ prior_b)
+        out = []
+        for i in range(len(self.s)):
+            A = self.N[i] + information
+            c = self.b[i] + prior_b
+            theta = np.linalg.solve(A, c)
+            nis = float(self.s[i] + constant - c @ theta)
+            out.append(-0.5 * (self.log_det[i] + nis + float(np.linalg.slogdet(A)[1])))
+        return out

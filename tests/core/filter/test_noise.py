@@ -5,7 +5,15 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from onboard.core.filter.noise import ESTIMATED, LIMITS, NoiseLevels, distance, line, star, stepped
+from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.noise import (
+    ESTIMATED,
+    NoiseLevels,
+    distance,
+    line_search,
+    stencil,
+    stepped,
+)
 
 CENTRE = NoiseLevels()
 
@@ -23,8 +31,8 @@ def parabola(top):
 def climbed(start, likelihood, searches=6):
     levels = start
     for _ in range(searches):
-        target = stepped(levels, [likelihood(m) for m in star(levels)])
-        members = line(levels, target)
+        target = stepped(levels, [likelihood(m) for m in stencil(levels)])
+        members = line_search(levels, target)
         levels = members[int(np.argmax([likelihood(m) for m in members]))]
     return levels
 
@@ -44,7 +52,7 @@ def test_from_a_limit_it_comes_back_to_a_top_just_inside(name, end):
     limit = LIMITS[name][end]
     start = replace(CENTRE, **{name: limit})
     top = replace(CENTRE, **{name: limit * (1.3, 1 / 1.3)[end]})
-    one = stepped(start, [parabola(top)(m) for m in star(start)])
+    one = stepped(start, [parabola(top)(m) for m in stencil(start)])
     assert distance(one, top) < 0.01
 
 
@@ -58,7 +66,7 @@ def test_a_top_beyond_the_limits_ends_at_the_limit(beyond):
 def test_a_star_has_three_different_values_of_every_level_inside_its_limits():
     for edge in (0, 1):
         centre = replace(CENTRE, **{n: LIMITS[n][edge] for n in ESTIMATED})
-        members = star(centre)
+        members = stencil(centre)
         for i, name in enumerate(ESTIMATED):
             values = [getattr(m, name) for m in (centre, *members[1 + 2 * i : 3 + 2 * i])]
             assert len(set(values)) == 3
@@ -73,7 +81,7 @@ def test_a_flat_likelihood_moves_nothing():
 
 def test_a_line_leads_from_the_centre_to_the_target():
     target = replace(CENTRE, velocity=0.4, tilt_walk=1e-3)
-    members = line(CENTRE, target)
+    members = line_search(CENTRE, target)
     assert members[0] == CENTRE
     assert distance(members[-1], target) < 1e-12
     steps = [distance(members[0], m) for m in members]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from onboard.core.filter.innovations import Epoch, Step
-from onboard.core.filter.noise import ATTITUDE_TIME_S, COLOUR_TIME_S, NoiseLevels
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
@@ -85,9 +86,9 @@ def literal_and_whitened(noise, gaps=()):
     solution = literal.sums.solve()
     return (
         np.array(solution.alpha + solution.beta),
-        np.linalg.solve(ways.N[0], ways.b[0]),
+        np.linalg.solve(ways.sums.N[0], ways.sums.b[0]),
         literal.sums.N / noise**2,
-        ways.N[0],
+        ways.sums.N[0],
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.core.maths.sums import NormalSums
+from onboard.core.maths.sums import BankSums, NormalSums
 from onboard.errors import StateError
 
 M = 5
@@ -19,9 +19,9 @@ def rows(seed, count):
 
 
 def summed(h, y):
-    out = NormalSums.zeros(M)
-    out.add_rows(h, y)
-    out.log_det = 0.1 * len(y)
+    sums = BankSums(1, M)
+    sums.add(y[None], h[None], np.array([0.1 * len(y)]))
+    out = sums.member(0)
     out.G = 0.01 * h.T @ h
     return out
 

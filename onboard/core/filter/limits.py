@@ -1,0 +1,101 @@
+"""Every number of this room that decides something, with where it comes from.
+
+Provenance in brackets: *probability* (of a false alarm), *physics*, *data sheet*, *cost* (more buys
+nothing), or *tuned* (on simulated flights: to be derived).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Innovation gates (innovation_gates).
+
+GATE_VELOCITY: Final = 30.0
+"""Normalised innovation squared of velocity past which a fix is refused [probability: 1.4e-6 with
+three degrees of freedom, 3e-7 with two]."""
+GATE_HEIGHT: Final = 30.0
+"""The same of height [probability: 4e-8 with one degree of freedom; tuned]."""
+GATE_ATTITUDE: Final = 60.0
+"""The same of the recorded attitude [probability: 6e-13 with three degrees of freedom; wide, for an
+EKF's errors are not Gaussian; tuned]."""
+PATIENCE_S: Final = {"height": 3.0, "attitude": 5.0}
+"""s; what is refused for longer is a new reference (other satellites), not a fault [tuned]."""
+RECOVERY_FIXES: Final = 3
+RECOVERY_S: Final = 1.0
+"""s; velocity is believed again after so many fixes, and so long, inside the gate [tuned]."""
+RECOVERY_SIGMAS: Final = 7.0
+"""Between two of them the innovation changes by no more than so many sigmas of the receiver's
+noise: 5 of a difference [probability: 6e-7]."""
+RECOVERY_DRIFT: Final = 0.3
+"""m/s^2; and by what the accelerometer is off [data sheet: half the prior of an offset]."""
+RENEWED_HEIGHT_VAR: Final = 1e4
+"""m^2; what is added to the variance of the height's reference when it is a new one [physics: no
+two references are further apart than 100 m]."""
+RENEWED_ATTITUDE_VAR: Final = 0.3**2
+"""rad^2; the same of the recorded attitude [physics: past it, angles are not small]."""
+
+# Where a filter starts (whitening, passes).
+
+TILT_START_RAD: Final = 0.06
+"""Sigma of the recorded roll and pitch at the start [tuned: an EKF in a manoeuvre]."""
+HEADING_START_RAD: Final = 0.2
+"""Sigma of the recorded heading at the start [data sheet: a compass on a small vehicle]."""
+BIAS_START_RAD_S: Final = 0.01
+"""Sigma of the gyroscope's bias, 0.6 deg/s [data sheet: after the autopilot's own start-up]."""
+UNKNOWN_DOWN_START_M_S: Final = 10.0
+"""Sigma of a vertical speed that the receiver does not report [physics: no small vehicle climbs
+faster]."""
+UNKNOWN_HEIGHT_VAR: Final = 1e8
+"""m^2; of a height that is not used: flat."""
+
+# Numerics.
+
+LONGEST_STEP_S: Final = 0.26
+"""s; longer intervals (GPS at 1 Hz) are predicted in steps, for attitude errors must stay first
+order [physics]."""
+SYMMETRY_UPDATES: Final = 16
+"""Updates after which the covariance is made symmetric again: rounding drifts slowly [cost]."""
+
+# Correlation times of Gauss-Markov errors (noise).
+
+COLOUR_TIME_S: Final = 3.0
+"""Of the GPS velocity: receivers filter over a second or two, multipath lasts some seconds
+[tuned]."""
+ATTITUDE_TIME_S: Final = 10.0
+"""Of the recorded attitude: an EKF that weighs GPS against gyroscopes forgets a tilt error in some
+tens of seconds [tuned]."""
+
+# The search for noise levels (noise).
+
+LIMITS: Final[dict[str, tuple[float, float]]] = {
+    "velocity": (0.02, 2.0),
+    "velocity_colour": (0.005, 1.0),
+    "height": (0.05, 10.0),
+    "height_walk": (0.01, 2.0),
+    "force_walk": (0.01, 3.0),
+    "tilt_walk": (1e-4, 0.03),
+    "bias_walk": (1e-5, 3e-4),
+    "attitude": (0.01, 0.2),
+    "heading": (0.015, 0.5),
+}
+"""Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
+
+No sensor on a small vehicle is better than the lower ends [data sheet]; a noiseless simulation must
+not make the filter believe that timing, interpolation and filters are modelled to the last digit.
+
+The recorded attitude's are no such formality [tuned].  An EKF errs with the manoeuvre, and
+smoothly: the likelihood sees how smooth its error is, not how large, and runs to whatever end there
+is.  With half the tilt's end, flights of ArduPilot's SITL err 2.4 times as much, beyond 5 sigma."""
+STENCIL_FACTOR: Final = 2.0
+"""Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
+LINE_SHARES: Final = (0.25, 0.5, 1.0)
+"""Shares of a step that a line search tries: levels that trade with each other make the whole too
+long [cost]."""
+
+# Noise in the regressors (regressor_noise).
+
+NOISE_MEAN_S: Final = 0.05
+"""s; samples are averaged over as long: vehicles do not manoeuvre faster [tuned; racing quads
+do]."""
+FEWEST_NOISE_MEANS: Final = 8
+"""Fewer means say nothing about noise [cost]."""

@@ -1,0 +1,153 @@
+"""A segment of flight made ready for the filter: steps of prediction, and what each fix measures.
+
+Integrals and regressors of a whole segment are evaluated at once, because arrays are cheap and
+loops are not; the filter then goes through them one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.filter.innovations import Epoch, Step
+from onboard.core.filter.limits import LONGEST_STEP_S
+from onboard.core.inputs.segments import Fixes, Segment
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.quadrature import Around, Intervals, NodeMaker
+from onboard.core.model.regressors import Model, SegmentColumns
+from onboard.core.model.smoothing import mean_weights
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What the filter goes through in one segment.
+
+    Attributes:
+        steps: K steps of prediction, in order of time.
+        measured: (K,) index into ``epochs`` of the fix at the end of each step; -1: none there.
+        epochs: what the n fixes measure; the filter starts at the first, no step ends there.
+    """
+
+    steps: list[Step]
+    measured: NDArray[np.int_]
+    epochs: list[Epoch]
+
+    def __iter__(self) -> Iterator[tuple[Step, int]]:
+        return zip(self.steps, self.measured.tolist(), strict=True)
+
+    @property
+    def start(self) -> float:
+        """Time of the first fix, latency removed, s."""
+        return self.epochs[0].t
+
+    @property
+    def end(self) -> float:
+        """Time of the last fix, latency removed, s."""
+        return self.epochs[-1].t
+
+
+def prepare(
+    segment: Segment,
+    fixes: Fixes,
+    trusted: NDArray[np.bool_],
+    model: Model,
+    point: Linearisation,
+    bias_b: Array,
+    *,
+    recorded_attitude: bool = False,
+) -> Prepared:
+    """Evaluate integrals and regressors of one segment.
+
+    Args:
+        segment: samples that cover the fixes and what a receiver averages around them.
+        fixes: n >= 2 fixes on the boot clock as stamped (latency not removed).
+        trusted: (n,) whether the receiver is to be believed there.
+        model: families of regressors, m unknowns.
+        point: linearisation.
+        bias_b: (3,) gyroscope bias to subtract, body axes, rad/s.
+        recorded_attitude: relative attitude from the recorded one instead of the gyroscope.
+    """
+    epoch_t = point.true_time(fixes.t)
+    maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
+    start, end, measured = _subdivide(epoch_t)
+    intervals = maker.intervals(start, end)
+    around = maker.around(epoch_t, point.window)
+    regressors = model.columns(intervals, around)
+    return Prepared(
+        _steps(intervals, regressors),
+        measured,
+        _epochs(segment, fixes, trusted, point, around, regressors),
+    )
+
+
+def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Starts (K,), ends (K,) and measured epoch (K,), or -1, of steps between epochs (n,), s."""
+    start: list[float] = []
+    end: list[float] = []
+    measured: list[int] = []
+    for k in range(len(epoch_t) - 1):
+        parts = max(1, int(np.ceil((epoch_t[k + 1] - epoch_t[k]) / LONGEST_STEP_S)))
+        edges = np.linspace(epoch_t[k], epoch_t[k + 1], parts + 1)
+        start.extend(edges[:-1])
+        end.extend(edges[1:])
+        measured.extend([-1] * (parts - 1) + [k + 1])
+    return np.array(start), np.array(end), np.array(measured)
+
+
+def _steps(intervals: Intervals, regressors: SegmentColumns) -> list[Step]:
+    force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
+    mean_turn = np.einsum("ki,kiab->kab", intervals.weight, intervals.P)
+    return [
+        Step(
+            float(intervals.duration[k]),
+            intervals.P[k, -1],
+            force[k, :, 0],
+            force_to_end[k, :, 0],
+            mean_turn[k],
+            regressors.force1[k],
+            regressors.force2[k],
+            regressors.turn[k],
+        )
+        for k in range(len(intervals.duration))
+    ]
+
+
+def _epochs(
+    segment: Segment,
+    fixes: Fixes,
+    trusted: NDArray[np.bool_],
+    point: Linearisation,
+    around: Around,
+    c: SegmentColumns,
+) -> list[Epoch]:
+    R_att, near = point.attitude(segment, around.now.t)
+    kappa = mean_weights(around.offset, point.window)
+    known = np.einsum("j,kja->ka", kappa, around.f_epoch)
+    known += around.swing @ segment.lever_arm_b
+    a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
+    known_height = -a_down * point.window**2 / 24.0 - R_att[:, 2] @ segment.lever_arm_b
+    return [
+        Epoch(
+            float(around.now.t[e]),
+            fixes.v_n[e],
+            float(fixes.height[e]),
+            float(fixes.latitude[e]),
+            R_att[e] if near[e] else None,
+            known[e],
+            float(known_height[e]),
+            c.velocity_body[e],
+            c.velocity_ned[e],
+            c.position_body[e],
+            c.position_ned[e],
+            c.along_velocity[e],
+            c.attitude_body[e],
+            c.attitude_ned[e],
+            bool(trusted[e]),
+        )
+        for e in range(len(fixes))
+    ]
