@@ -1,9 +1,9 @@
 """MAVLink as a sans-IO codec: bytes to frames and messages, messages to bytes.
 
-Frames are found (:mod:`framing`) and verified here; pymavlink builds and packs the message objects.  Its own
-parser is not used because after a false start it throws the whole supposed frame away, up
-to 280 bytes and several good messages with it, where this one resumes one byte later; and
-because messages that nobody wants need never become objects.
+Where a frame begins and whether it is right is said by :mod:`onboard.mavlink.framing`; pymavlink
+builds and packs the message objects.  Its own parser is not used because after a false start it
+throws the whole supposed frame away, up to 280 bytes and several good messages with it, where this
+one resumes one byte later; and because messages that nobody wants need never become objects.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Where a MAVLink 1 or 2 packet begins and ends, what its header says, whether its checksum holds.
 
 The only place that knows the layout of a packet: the live link, telemetry logs and unpackers ask
-here.  ``data`` is anything that can be indexed as bytes, ``at`` the place of the packet's first byte.
+here.  ``data`` is anything indexed as bytes, ``at`` the place of the first byte of a packet.
 
 MAVLink 2: magic, payload length, two flag bytes, sequence, system, component, three bytes of
 message number, payload, two bytes of checksum, and 13 of signature where a flag says so.
