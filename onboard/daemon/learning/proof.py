@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.inputs.airborne import Ground
+from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
+from onboard.daemon.learning.meaning import carried, hand_on
 
 
 class ProofFlight:
@@ -23,22 +23,19 @@ class ProofFlight:
         """No push waits for a flight, or another board is there."""
         self._calibrator = None
 
-    def feed(
-        self, sample: Sample, parameters: Iterable[ParameterValue]
-    ) -> dict[int, Calibration] | None:
+    def feed(self, sample: Sample, parameters: ParametersInForce) -> dict[int, Calibration] | None:
         """Take a sample; the answers, when the flight ends.
 
         Args:
             sample: in the order of arrival.
-            parameters: all that are known, for the beginning of a flight.
+            parameters: in force, for the beginning of a flight.
         """
         ended = False
         if isinstance(sample, VehicleState):
             before, self._ground = self._ground, self._ground.after(sample)
             if self._ground.armed and not before.armed and self._calibrator is None:
                 self._calibrator = Calibrator(self._settings)
-                for parameter in parameters:
-                    self._calibrator.feed(parameter)
+                hand_on(carried(parameters), self._calibrator)
             ended = bool(before.armed) and not self._ground.armed
         if self._calibrator is None:
             return None
