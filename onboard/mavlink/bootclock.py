@@ -1,6 +1,26 @@
-"""The autopilot's boot clock as its messages stamp it: 32-bit wrap, unix stamps, reboots."""
+"""The autopilot's boot clock as its messages stamp it: 32-bit wrap, unix stamps, reboots.
+
+How far a stamp may lie behind the newest before it is of another boot is said once, for the link
+and for the estimator: :mod:`onboard.core.inputs.boot_time`.
+"""
 
 from __future__ import annotations
+
+from typing import Final
+
+from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
+from onboard.mavlink.dialect import MESSAGE_IDS, Message
+
+STAMPED_MS: Final = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE")
+"""Messages with a 32-bit ``time_boot_ms`` of the moment of sending."""
+STAMPED_US: Final = ("RAW_IMU", "HIGHRES_IMU", "VIBRATION")
+"""Messages with a 64-bit ``time_usec`` of the moment of sending.  Not those of GPS receivers: a fix
+may be old, so that it must not set the clock."""
+STAMPED: Final = ("SYSTEM_TIME", *STAMPED_MS, *STAMPED_US)
+"""All messages that tell the boot time."""
+_MS = frozenset(MESSAGE_IDS[name] for name in STAMPED_MS)
+_US = frozenset(MESSAGE_IDS[name] for name in STAMPED_US)
+_SYSTEM_TIME = MESSAGE_IDS["SYSTEM_TIME"]
 
 WRAP_S = 4294967.296
 """``time_boot_ms`` is a 32-bit count of milliseconds: it starts again after 49.7 days."""
@@ -8,8 +28,6 @@ NEAR_WRAP_S = 600.0
 """A jump back by one wrap counts as a wrap only this close to it; else it is a reboot."""
 UNIX_FROM_US = 10**15
 """A ``time_usec`` above this (31 years of uptime) is unix time: some autopilots send that."""
-REBOOT_STEP_S = 3.0
-"""Time that goes back by less is late delivery (UDP, radio buffers), not a reboot."""
 UNIX_STEP_S = 10.0
 """Unix time that departs this far from boot time has been set (by GPS, say)."""
 
@@ -17,7 +35,9 @@ UNIX_STEP_S = 10.0
 class BootClock:
     """Turns message stamps into seconds since boot and notices reboots.
 
-    One instance per autopilot, fed in the order of arrival.  A reboot is confirmed by the
+    One instance per autopilot, which :meth:`observe` has to be told every stamped message once, in
+    the order of arrival; :meth:`seconds_ms` and :meth:`seconds_us` only convert, so that whoever
+    wants to know the time may ask the one clock that there is.  A reboot is confirmed by the
     second stamp that lies in the past, so that one stray late packet is not taken for it.
     """
 
@@ -28,24 +48,33 @@ class BootClock:
         self._unix_offset: float | None = None
         self._paired = False
 
-    def from_ms(self, time_boot_ms: int) -> float:
+    def observe(self, message: Message) -> bool:
+        """Take note of the time that a message tells; whether that confirms a reboot.
+
+        Messages that are not stamped (see ``STAMPED``) say nothing.
+        """
+        number, before = message.get_msgId(), self.reboots
+        if number in _MS:
+            self._tick(self.seconds_ms(message.time_boot_ms))
+        elif number in _US:
+            self._tick_us(message.time_usec)
+        elif number == _SYSTEM_TIME:
+            self._pair(message.time_unix_usec, message.time_boot_ms)
+        return self.reboots != before
+
+    def seconds_ms(self, time_boot_ms: int) -> float:
         """Seconds since boot from a 32-bit ``time_boot_ms``; continues across the wrap."""
-        t = self._unwrapped(time_boot_ms * 1e-3)
-        self._observe(t)
-        return t
+        t, latest = time_boot_ms * 1e-3, self.latest
+        if latest is None or latest < WRAP_S - NEAR_WRAP_S:
+            return t
+        nearest = t + round((latest - t) / WRAP_S) * WRAP_S
+        if abs(nearest - latest) < NEAR_WRAP_S:
+            return nearest
+        same_turn = t + latest // WRAP_S * WRAP_S
+        return same_turn if same_turn >= latest else t
 
-    def from_us(self, time_usec: int) -> float:
-        """Seconds since boot from a 64-bit ``time_usec`` (boot or unix time)."""
-        t = self.convert_us(time_usec)
-        if time_usec < UNIX_FROM_US:
-            self._observe(t)
-        elif self.latest is None or t > self.latest:
-            # Unix time runs on through a reboot: it tells how late it is, not of reboots.
-            self.latest = t
-        return t
-
-    def convert_us(self, time_usec: int) -> float:
-        """As :meth:`from_us`, for a stamp that may be old and says nothing about now."""
+    def seconds_us(self, time_usec: int) -> float:
+        """Seconds since boot from a 64-bit ``time_usec`` (boot or unix time), however old."""
         t = time_usec * 1e-6
         if time_usec < UNIX_FROM_US:
             return t
@@ -57,30 +86,29 @@ class BootClock:
             self._unix_offset = t - reference
         return t - self._unix_offset
 
-    def pair(self, time_unix_usec: int, time_boot_ms: int) -> None:
+    def _tick_us(self, time_usec: int) -> None:
+        t = self.seconds_us(time_usec)
+        if time_usec < UNIX_FROM_US:
+            self._tick(t)
+        elif self.latest is None or t > self.latest:
+            # Unix time runs on through a reboot: it tells how late it is, not of reboots.
+            self.latest = t
+
+    def _pair(self, time_unix_usec: int, time_boot_ms: int) -> None:
         """SYSTEM_TIME: both clocks at one instant."""
-        t = self.from_ms(time_boot_ms)
+        t = self.seconds_ms(time_boot_ms)
+        self._tick(t)
         if time_unix_usec > UNIX_FROM_US:
             self._unix_offset = time_unix_usec * 1e-6 - t
             self._paired = True
 
-    def _unwrapped(self, t: float) -> float:
-        latest = self.latest
-        if latest is None or latest < WRAP_S - NEAR_WRAP_S:
-            return t
-        nearest = t + round((latest - t) / WRAP_S) * WRAP_S
-        if abs(nearest - latest) < NEAR_WRAP_S:
-            return nearest
-        same_turn = t + latest // WRAP_S * WRAP_S
-        return same_turn if same_turn >= latest else t
-
-    def _observe(self, t: float) -> None:
+    def _tick(self, t: float) -> None:
         latest = self.latest
         if latest is None or t >= latest:
             self.latest = t
             self._suspect = None
-        elif t < latest - REBOOT_STEP_S:
-            if self._suspect is not None and abs(t - self._suspect) < REBOOT_STEP_S:
+        elif began_anew(t, latest):
+            if self._suspect is not None and abs(t - self._suspect) < LONGEST_DELAY_S:
                 self.reboots += 1
                 self.latest = t
                 self._suspect = None

@@ -1,9 +1,9 @@
 """MAVLink as a sans-IO codec: bytes to frames and messages, messages to bytes.
 
-Frames are found and verified here; pymavlink builds and packs the message objects.  Its own
-parser is not used because after a false start it throws the whole supposed frame away, up
-to 280 bytes and several good messages with it, where this one resumes one byte later; and
-because messages that nobody wants need never become objects.
+Where a frame begins and whether it is right is said by :mod:`onboard.mavlink.framing`; pymavlink
+builds and packs the message objects.  Its own parser is not used because after a false start it
+throws the whole supposed frame away, up to 280 bytes and several good messages with it, where this
+one resumes one byte later; and because messages that nobody wants need never become objects.
 """
 
 from __future__ import annotations
@@ -11,14 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.mavlink import framing
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.signing import Signing
 
-MAGIC_V1 = 0xFE
-MAGIC_V2 = 0xFD
-FLAG_SIGNED = 0x01
-SIGNATURE_LENGTH = 13
-SHORTEST_FRAME = 8
 REORDERING = 16
 """A sequence number at most this far behind is a late packet; further back, packets were lost."""
 
@@ -30,6 +26,7 @@ class Frame(NamedTuple):
     message_id: int
     system: int
     component: int
+    sequence: int
     message: Message | None
 
 
@@ -133,10 +130,10 @@ class Codec:
         end = len(buffer)
         frames: list[Frame] = []
         position = 0
-        while end - position >= SHORTEST_FRAME:
-            length = _frame_length(buffer, position)
+        while end - position >= framing.SHORTEST:
+            length = framing.packet_length(buffer, position)
             if length == 0:
-                start = _next_magic(buffer, position + 1)
+                start = framing.next_magic(buffer, position + 1)
                 statistics.bad_bytes += start - position
                 position = start
                 continue
@@ -158,19 +155,14 @@ class Codec:
         """Verify one supposed frame.  None: not a frame; message id -1: refused."""
         raw = bytes(buffer[start : start + length])
         statistics = self.statistics
-        if raw[0] == MAGIC_V2:
-            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
-            system, component = raw[5], raw[6]
-            signed = raw[2] & FLAG_SIGNED
-        else:
-            message_id, system, component, signed = raw[5], raw[3], raw[4], 0
-        kind = mavlink.mavlink_map.get(message_id)
-        if kind is None:
+        message_id, system, component, sequence, signed, _ = framing.header(raw, 0)
+        key = (message_id, system, component, sequence)
+        if message_id not in mavlink.mavlink_map:
             if not _is_credible(buffer, start, length):
                 return None
             statistics.unknown += 1
-            return Frame(raw, message_id, system, component, None)
-        if not _checksum_holds(raw, kind.crc_extra, signed=bool(signed)):
+            return Frame(raw, *key, None)
+        if not framing.is_valid(raw, 0, message_id):
             statistics.bad_frames += 1
             return None
         signing = self._signing
@@ -178,7 +170,7 @@ class Codec:
             signing.verify(raw) if signed else signing.accepts_unsigned(message_id)
         ):
             statistics.bad_signatures += 1
-            return Frame(raw, -1, system, component, None)
+            return Frame(raw, -1, system, component, sequence, None)
         message = None
         if self.wanted is None or message_id in self.wanted:
             try:
@@ -187,7 +179,7 @@ class Codec:
                 # The checksum held, so the sender meant it: a payload that our dialect's
                 # definition cannot hold.  Pass it on as a frame without a message.
                 statistics.unknown += 1
-        return Frame(raw, message_id, system, component, message)
+        return Frame(raw, *key, message)
 
     def _count(self, frame: Frame) -> None:
         statistics = self.statistics
@@ -196,31 +188,7 @@ class Codec:
         source = statistics.sources.get(key)
         if source is None:
             source = statistics.sources[key] = SourceStatistics()
-        raw = frame.raw
-        source.count(raw[4] if raw[0] == MAGIC_V2 else raw[2])
-
-
-def _frame_length(buffer: bytearray, start: int) -> int:
-    """Length of the frame that would start here (at least 3 bytes are there), 0 if none can."""
-    magic = buffer[start]
-    if magic == MAGIC_V2:
-        flags = buffer[start + 2]
-        if flags & ~FLAG_SIGNED:
-            return 0
-        return buffer[start + 1] + (12 + SIGNATURE_LENGTH if flags else 12)
-    return buffer[start + 1] + 8 if magic == MAGIC_V1 else 0
-
-
-def _next_magic(buffer: bytearray, start: int) -> int:
-    """Where the next byte is that may start a frame, or the end of the buffer."""
-    places = [i for i in (buffer.find(MAGIC_V2, start), buffer.find(MAGIC_V1, start)) if i >= 0]
-    return min(places, default=len(buffer))
-
-
-def _checksum_holds(raw: bytes, crc_extra: int, *, signed: bool) -> bool:
-    end = len(raw) - (2 + SIGNATURE_LENGTH if signed else 2)
-    crc = mavlink.x25crc(raw[1:end] + bytes((crc_extra,))).crc
-    return bool(crc == raw[end] | raw[end + 1] << 8)
+        source.count(frame.sequence)
 
 
 def _is_credible(buffer: bytearray, start: int, length: int) -> bool:
@@ -230,17 +198,6 @@ def _is_credible(buffer: bytearray, start: int, length: int) -> bool:
     frame that can be verified starts inside it.
     """
     end = start + length
-    if end < len(buffer) and buffer[end] not in (MAGIC_V1, MAGIC_V2):
+    if end < len(buffer) and buffer[end] not in framing.MAGICS:
         return False
-    inner = _next_magic(buffer, start + 1)
-    while inner < end and len(buffer) - inner >= SHORTEST_FRAME:
-        span = _frame_length(buffer, inner)
-        raw = bytes(buffer[inner : inner + span])
-        if span and len(raw) == span:
-            number = raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else raw[5]
-            kind = mavlink.mavlink_map.get(number)
-            signed = raw[0] == MAGIC_V2 and bool(raw[2] & FLAG_SIGNED)
-            if kind is not None and _checksum_holds(raw, kind.crc_extra, signed=signed):
-                return False
-        inner = _next_magic(buffer, inner + 1)
-    return True
+    return framing.next_valid(buffer, start + 1, end) == end

@@ -50,13 +50,14 @@ NOTHING: Samples = ()
 
 
 class Decoder:
-    """Turns the messages of one autopilot into samples; keeps its boot clock.
+    """Turns the messages of one autopilot into samples, stamped by its boot clock.
 
     Only the autopilot is listened to: the system and component given, or else those of the
     first HEARTBEAT that comes from an autopilot (gimbals, ground stations and companions
     send heartbeats, too).  Until then nothing comes out but what has no time: parameters that
     were told before are told then.  Messages without a time of their own get the latest boot
-    time heard.  ``refused`` counts what could not be used, by name.
+    time heard.  The clock is the link's where there is one, which the link has told each message
+    before; else the decoder keeps one.  ``refused`` counts what could not be used, by name.
     """
 
     names: tuple[str, ...] = (
@@ -81,8 +82,14 @@ class Decoder:
         *(("GNSS_INTEGRITY",) if "GNSS_INTEGRITY" in MESSAGE_IDS else ()),
     )
 
-    def __init__(self, system: int | None = None, component: int | None = None) -> None:
-        self.clock = BootClock()
+    def __init__(
+        self,
+        system: int | None = None,
+        component: int | None = None,
+        clock: BootClock | None = None,
+    ) -> None:
+        self.clock = BootClock() if clock is None else clock
+        self._tells_clock = clock is None
         self.refused: dict[str, int] = {}
         self._system = system
         self._component = component
@@ -108,15 +115,21 @@ class Decoder:
             message.get_srcComponent() == self._component
             and message.get_srcSystem() == self._system
         ):
-            return decoder(message)
+            return self._heard(decoder, message)
         if self._adopts(message):
             early = self._early.pop((message.get_srcSystem(), message.get_srcComponent()), {})
             self._early.clear()
             told = tuple(sample for m in early.values() for sample in self._param_value(m))
-            return told + decoder(message)
+            return told + self._heard(decoder, message)
         if self._component is None and message.get_msgId() == PARAM_VALUE:
             self._keep(message)
         return NOTHING
+
+    def _heard(self, decoder: Callable[[Message], Samples], message: Message) -> Samples:
+        """Decode a message of the autopilot."""
+        if self._tells_clock:
+            self.clock.observe(message)
+        return decoder(message)
 
     def _keep(self, message: Message) -> None:
         """A parameter of somebody who may turn out to be the autopilot."""
@@ -144,17 +157,17 @@ class Decoder:
     # Inertial
 
     def _raw_imu(self, m: Message) -> Samples:
-        t = self.clock.from_us(m.time_usec)
+        t = self.clock.seconds_us(m.time_usec)
         return self._integer_imu(t, m.id + 1, m, ImuSource.RAW_IMU)
 
     def _scaled_imu(self, m: Message) -> Samples:
-        return self._integer_imu(self.clock.from_ms(m.time_boot_ms), 1, m, ImuSource.SCALED_IMU)
+        return self._integer_imu(self.clock.seconds_ms(m.time_boot_ms), 1, m, ImuSource.SCALED_IMU)
 
     def _scaled_imu2(self, m: Message) -> Samples:
-        return self._integer_imu(self.clock.from_ms(m.time_boot_ms), 2, m, ImuSource.SCALED_IMU)
+        return self._integer_imu(self.clock.seconds_ms(m.time_boot_ms), 2, m, ImuSource.SCALED_IMU)
 
     def _scaled_imu3(self, m: Message) -> Samples:
-        return self._integer_imu(self.clock.from_ms(m.time_boot_ms), 3, m, ImuSource.SCALED_IMU)
+        return self._integer_imu(self.clock.seconds_ms(m.time_boot_ms), 3, m, ImuSource.SCALED_IMU)
 
     def _integer_imu(self, t: float, imu: int, m: Message, source: ImuSource) -> Samples:
         x, y, z, p, q, r = m.xacc, m.yacc, m.zacc, m.xgyro, m.ygyro, m.zgyro
@@ -176,7 +189,7 @@ class Decoder:
         )
 
     def _highres_imu(self, m: Message) -> Samples:
-        t = self.clock.from_us(m.time_usec)
+        t = self.clock.seconds_us(m.time_usec)
         if m.fields_updated & ACCEL_FIELDS != ACCEL_FIELDS:
             return self._refuse("HIGHRES_IMU: no acceleration")
         f_b = (m.xacc, m.yacc, m.zacc)
@@ -189,7 +202,7 @@ class Decoder:
         return (ImuSample(t, m.id + 1, f_b, w_b, source=ImuSource.HIGHRES_IMU),)
 
     def _attitude(self, m: Message) -> Samples:
-        t = self.clock.from_ms(m.time_boot_ms)
+        t = self.clock.seconds_ms(m.time_boot_ms)
         if not (math.isfinite(m.roll) and math.isfinite(m.pitch) and math.isfinite(m.yaw)):
             return self._refuse("ATTITUDE: not finite")
         return (AttitudeSample(t, m.roll, m.pitch, m.yaw),)
@@ -214,7 +227,7 @@ class Decoder:
             course = 0.0
         # The stamp is that of the fix, 0 before the first one; a fix may be old, so that it
         # must not set the boot clock.
-        t = self.clock.convert_us(m.time_usec) if m.time_usec else self.clock.latest
+        t = self.clock.seconds_us(m.time_usec) if m.time_usec else self.clock.latest
         if t is None:
             return self._refuse(f"{name}: no time yet")
         return (
@@ -261,7 +274,7 @@ class Decoder:
         return NOTHING if t is None else (EkfHealth(t, m.flags),)
 
     def _vibration(self, m: Message) -> Samples:
-        t = self.clock.from_us(m.time_usec)
+        t = self.clock.seconds_us(m.time_usec)
         level = (m.vibration_x, m.vibration_y, m.vibration_z)
         if not all(map(math.isfinite, level)):
             return self._refuse("VIBRATION: not finite")
@@ -303,9 +316,8 @@ class Decoder:
         current = None if m.current_battery < 0 else m.current_battery * CENTI
         return (Battery(t, m.voltage_battery * 1e-3, current),)
 
-    def _system_time(self, m: Message) -> Samples:
-        self.clock.pair(m.time_unix_usec, m.time_boot_ms)
-        return NOTHING
+    def _system_time(self, _: Message) -> Samples:
+        return NOTHING  # told to the clock, like all that is stamped
 
     def _param_value(self, m: Message) -> Samples:
         if not math.isfinite(m.param_value):

@@ -23,11 +23,11 @@ from onboard.mavlink.autopilot import (
     LinkEvent,
     Participant,
 )
-from onboard.mavlink.bootclock import BootClock
+from onboard.mavlink.bootclock import STAMPED, BootClock
 from onboard.mavlink.codec import Codec, Frame
 from onboard.mavlink.connection import Connection
 from onboard.mavlink.decode import is_autopilot
-from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink, message_ids
+from onboard.mavlink.dialect import COMPONENT, Message, mavlink, message_ids
 from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.signing import Signing
@@ -45,8 +45,6 @@ FAILOVER_S = 1.5
 """Silence on the endpoint in use after which another one that hears the autopilot takes over."""
 ITERATOR_LIMIT = 10_000
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
-_CLOCK_NAMES = ("SYSTEM_TIME", "ATTITUDE", "RAW_IMU")
-"""Messages that the link itself reads boot time from, to notice a reboot."""
 
 
 class Link:
@@ -118,7 +116,7 @@ class Link:
         self._found = asyncio.Event()
         self._stopped: asyncio.Future[None] | None = None
         self._closed = False
-        self.subscribe(self._watch_boot_clock, _CLOCK_NAMES)
+        self.subscribe(self._watch_boot_clock, STAMPED)
 
     # Who gets what
 
@@ -309,12 +307,7 @@ class Link:
     def _watch_boot_clock(self, now: float, message: Message) -> None:
         if (message.get_srcSystem(), message.get_srcComponent()) != self._source:
             return
-        before = self.boot_clock.reboots
-        if message.get_msgId() == MESSAGE_IDS["RAW_IMU"]:
-            self.boot_clock.from_us(message.time_usec)
-        else:
-            self.boot_clock.from_ms(message.time_boot_ms)
-        if self.boot_clock.reboots != before:
+        if self.boot_clock.observe(message):
             self._emit(now, AutopilotRebooted(self.boot_clock.reboots))
             self._restart_participants(now)
 

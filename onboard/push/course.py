@@ -1,13 +1,18 @@
-"""The course of a push: what is done on entering each state of its state machine.
+"""The course of a push: its state, and what is done on entering each state.
 
-The rules that it serves are in :mod:`onboard.push.transaction`, which also says which trigger an
-event amounts to; the machine itself is :data:`onboard.push.states.TRANSITIONS`.
+The rules that it serves are in :mod:`onboard.push.transaction`; which trigger an answer of the
+autopilot amounts to is said by :mod:`onboard.push.answers`; the state machine itself is
+:data:`onboard.push.states.TRANSITIONS`.
+
+A step may ask the autopilot for something.  What the parameter client says to that at once is
+*returned* by the step, for whoever took it to hear.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TypeAlias
 
 from onboard.errors import PushError
 from onboard.mavlink.parameters import ClientSettings, ParameterClient, ParameterOutput
@@ -22,8 +27,13 @@ from onboard.push.entries import (
     Writing,
 )
 from onboard.push.plan import PushPlan
+from onboard.push.progress import Progress
 from onboard.push.signals import Finished, Outcome, Reason, Record, TransactionOutput
 from onboard.push.states import FORWARD, TRANSITIONS, State, Trigger
+
+Heard: TypeAlias = tuple[ParameterOutput, ...]
+"""What the parameter client said to the request of a step."""
+NOTHING: Heard = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +47,7 @@ class TransactionSettings:
 
 
 class Course:
-    """The state, the six values as last read, what is still to be written, and how it went.
+    """Where a transaction is, what it has come to, and the steps from state to state.
 
     Args:
         plan: what to write.
@@ -55,157 +65,171 @@ class Course:
         settings: TransactionSettings,
         support: Support | None = None,
     ) -> None:
-        self._plan = plan
-        self._identifier = identifier
-        self._purpose = purpose
+        self.plan = plan
+        self.identifier = identifier
+        self.purpose = purpose
+        self.client = ParameterClient(settings.client)
+        self.state = State.NEW
+        self.progress = Progress()
+        self.settled_at: float | None = None
+        self.journal_broken = False
+        self.result = Result.INTERRUPTED
+        self.reason, self.sentence = Reason.NONE, ""
+        self.outcome: Outcome | None = None
         self._support = support
         self._settings = settings
-        self._client = ParameterClient(self._settings.client)
-        self._turned = False
-        self._state = State.NEW
         self._out: list[TransactionOutput] = []
         self._unconfirmed = 0
-        self._journal_broken = False
-        self._awaiting: set[str] = set()
-        self._values: dict[str, float] = {}
-        self._queue: list[str] = []
-        self._written: set[str] = set()
-        self._left: frozenset[str] = frozenset()
-        self._undo_unsaved = False
-        self._rounds = 0
-        self._finishing = False
-        self._limit_at: float | None = None
-        self._settled_at: float | None = None
-        self._result = Result.INTERRUPTED
-        self._reason, self._sentence = Reason.NONE, ""
-        self._outcome: Outcome | None = None
 
-    def _absorb(self, outputs: tuple[ParameterOutput, ...], now: float) -> None:
-        """What the parameter client says to a request of a step."""
-        raise NotImplementedError
+    @property
+    def forward(self) -> bool:
+        """Whether it is on the way to "new"."""
+        return self.state in FORWARD
 
     # Steps
 
-    def _go(self, trigger: Trigger, now: float) -> None:
-        following = TRANSITIONS[self._state].get(trigger)
+    def go(self, trigger: Trigger, now: float) -> Heard:
+        """Take the step that a trigger leads to.
+
+        Raises:
+            PushError: the state machine has no such step.
+        """
+        following = TRANSITIONS[self.state].get(trigger)
         if following is None:
-            raise PushError(f"no transition from {self._state.value} by {trigger.value}")
-        previous, self._state = self._state, following
-        self._settled_at = None
+            raise PushError(f"no transition from {self.state.value} by {trigger.value}")
+        previous, self.state = self.state, following
+        self.settled_at = None
         match following:
             case State.COMPARING | State.VERIFYING | State.UNDO_VERIFYING:
-                self._read_six(now)
+                return self._read_six(now)
             case State.RECORDING:
-                self._record(Planned(self._identifier, self._plan, self._purpose, self._support))
+                self.record(Planned(self.identifier, self.plan, self.purpose, self._support))
             case State.WRITING:
-                self._queue = list(self._plan.write_order(self._values))
-                self._write_next(now)
+                self.progress.queue = list(self.plan.write_order(self.progress.values))
+                return self.write_next(now)
             case State.SETTLING | State.UNDO_SETTLING:
-                self._finishing = previous is State.INSPECTING and following is State.SETTLING
-                self._settled_at = now + self._settings.settle_s
+                resumed = previous is State.INSPECTING and following is State.SETTLING
+                self.progress.finishing = resumed
+                self.settled_at = now + self._settings.settle_s
             case State.INSPECTING:
                 if previous is not State.NEW:
                     self._turn()
-                self._read_six(now)
+                return self._read_six(now)
             case State.UNDOING:
-                self._undo(now)
+                return self._undo(now)
             case State.CLOSING:
                 self._close(previous)
             case State.FINISHED:
                 self._finish(previous)
+        return NOTHING
 
-    def _read_six(self, now: float) -> None:
-        self._client.cancel()
-        names = (*self._plan.names, self._plan.device_id_name)
-        self._awaiting = set(names)
-        self._absorb(self._client.read(names, now), now)
+    def write_next(self, now: float) -> Heard:
+        """Write what is next in the queue, or go on when all is written."""
+        undo = self.state is State.UNDOING
+        target = self.plan.before if undo else self.plan.wanted
+        if not self.progress.queue:
+            return self.go(Trigger.DONE, now)
+        name = self.progress.queue.pop(0)
+        previous = self.progress.values[name]
+        self.progress.written.add(name)
+        self.record(Writing(self.identifier, name, previous, target[name], undo))
+        return self.client.set(name, target[name], now, before=previous)
 
-    def _turn(self) -> None:
-        """From here on back to old, also after a crash."""
-        self._finishing = False
-        self._turned = True
-        self._record(Undoing(self._identifier, self._reason.value, self._sentence))
+    def trouble(self, reason: Reason, sentence: str, now: float) -> Heard:
+        """Turn towards "old"; on that way already, or closing, it changes nothing."""
+        if not self.forward:
+            return NOTHING
+        self.note(reason, sentence)
+        return self.go(Trigger.TROUBLE, now)
 
-    def _undo(self, now: float) -> None:
-        if not self._turned:
-            self._turn()
-        self._rounds += 1
-        if self._rounds > self._settings.undo_rounds:
-            self._stuck(Reason.REVERTED, "what is undone does not stay undone", now)
-            return
-        self._write_next(now)
-
-    def _write_next(self, now: float) -> None:
-        undo = self._state is State.UNDOING
-        target = self._plan.before if undo else self._plan.wanted
-        if not self._queue:
-            self._go(Trigger.DONE, now)
-            return
-        name = self._queue.pop(0)
-        previous = self._values[name]
-        self._written.add(name)
-        self._record(Writing(self._identifier, name, previous, target[name], undo))
-        self._absorb(self._client.set(name, target[name], now, before=previous), now)
-
-    def _close(self, previous: State) -> None:
-        if previous is State.VERIFYING:
-            self._result = Result.COMPLETED
-            self._sentence = self._sentence or "all six read back as wanted"
-        elif previous is State.RECORDING:
-            self._result = Result.ABORTED
+    def stuck(self, reason: Reason, sentence: str, now: float) -> Heard:
+        """Nothing more can be done now: the journal stays open."""
+        if self.state is State.CLOSING:
+            return NOTHING  # everything is read back: only the journal is waited for
+        if self.forward or self.reason in {Reason.NONE, Reason.RESTARTED}:
+            self.note(reason, sentence)
         else:
-            self._result = Result.ROLLED_BACK
-            if self._left:
-                self._sentence += f"; {', '.join(sorted(self._left))} left as somebody else set it"
-        values = {n: self._values[n] for n in self._plan.names}
-        entry = Closed(self._identifier, self._result, self._reason.value, self._sentence, values)
-        self._record(entry)
+            self.sentence += f"; then {sentence}"
+        return self.go(Trigger.STUCK, now)
 
-    def _finish(self, previous: State) -> None:
-        self._client.cancel()
-        if previous is State.COMPARING:
-            self._result = Result.ABORTED
-        still_open = self._result in {Result.INTERRUPTED, Result.OTHER_VEHICLE}
-        self._outcome = Outcome(
-            transaction=self._identifier,
-            plan=self._plan,
-            purpose=self._purpose,
-            result=self._result,
-            reason=self._reason,
-            sentence=self._sentence,
-            values=MappingProxyType(
-                {n: self._values[n] for n in self._plan.names if n in self._values}
-            ),
-            left=tuple(sorted(self._left)),
-            open=still_open or (self._journal_broken and previous is not State.COMPARING),
-        )
-        self._out.append(Finished(self._outcome))
+    def note(self, reason: Reason, sentence: str) -> None:
+        """Remember why it does not simply complete."""
+        self.reason, self.sentence = reason, sentence
 
-    def _record(self, entry: Entry) -> None:
+    # The journal, and what goes out
+
+    def record(self, entry: Entry) -> None:
+        """Have an entry written before anything that follows it."""
         self._unconfirmed += 1
         self._out.append(Record(entry))
 
-    def _flush(self) -> tuple[TransactionOutput, ...]:
+    def journalled(self, now: float) -> Heard:
+        """The oldest entry is on the disk, or cannot be written."""
+        self._unconfirmed = max(0, self._unconfirmed - 1)
+        if self._unconfirmed == 0 and self.state in {State.RECORDING, State.CLOSING}:
+            return self.go(Trigger.DURABLE, now)
+        return NOTHING
+
+    def send(self, output: TransactionOutput) -> None:
+        """Hand out a message that the parameter client wants sent."""
+        self._out.append(output)
+
+    def flush(self) -> tuple[TransactionOutput, ...]:
+        """All that is to be acted on, in order."""
         out, self._out = tuple(self._out), []
         return out
 
-    # Turns
+    # On entering a state
 
-    def _trouble(self, reason: Reason, sentence: str, now: float) -> None:
-        """Turn towards "old"; on that way already, or closing, it changes nothing."""
-        if self._state not in FORWARD:
-            return
-        self._note(reason, sentence)
-        self._go(Trigger.TROUBLE, now)
+    def _read_six(self, now: float) -> Heard:
+        self.client.cancel()
+        names = (*self.plan.names, self.plan.device_id_name)
+        self.progress.awaiting = set(names)
+        return self.client.read(names, now)
 
-    def _stuck(self, reason: Reason, sentence: str, now: float) -> None:
-        if self._state is State.CLOSING:
-            return  # everything is read back: only the journal is waited for
-        if self._state in FORWARD or self._reason in {Reason.NONE, Reason.RESTARTED}:
-            self._note(reason, sentence)
+    def _turn(self) -> None:
+        """From here on back to old, also after a crash."""
+        self.progress.finishing = False
+        self.progress.turned = True
+        self.record(Undoing(self.identifier, self.reason.value, self.sentence))
+
+    def _undo(self, now: float) -> Heard:
+        if not self.progress.turned:
+            self._turn()
+        self.progress.rounds += 1
+        if self.progress.rounds > self._settings.undo_rounds:
+            return self.stuck(Reason.REVERTED, "what is undone does not stay undone", now)
+        return self.write_next(now)
+
+    def _close(self, previous: State) -> None:
+        left = self.progress.left
+        if previous is State.VERIFYING:
+            self.result = Result.COMPLETED
+            self.sentence = self.sentence or "all six read back as wanted"
+        elif previous is State.RECORDING:
+            self.result = Result.ABORTED
         else:
-            self._sentence += f"; then {sentence}"
-        self._go(Trigger.STUCK, now)
+            self.result = Result.ROLLED_BACK
+            if left:
+                self.sentence += f"; {', '.join(sorted(left))} left as somebody else set it"
+        values = {n: self.progress.values[n] for n in self.plan.names}
+        self.record(Closed(self.identifier, self.result, self.reason.value, self.sentence, values))
 
-    def _note(self, reason: Reason, sentence: str) -> None:
-        self._reason, self._sentence = reason, sentence
+    def _finish(self, previous: State) -> None:
+        self.client.cancel()
+        if previous is State.COMPARING:
+            self.result = Result.ABORTED
+        still_open = self.result in {Result.INTERRUPTED, Result.OTHER_VEHICLE}
+        values = self.progress.values
+        self.outcome = Outcome(
+            transaction=self.identifier,
+            plan=self.plan,
+            purpose=self.purpose,
+            result=self.result,
+            reason=self.reason,
+            sentence=self.sentence,
+            values=MappingProxyType({n: values[n] for n in self.plan.names if n in values}),
+            left=tuple(sorted(self.progress.left)),
+            open=still_open or (self.journal_broken and previous is not State.COMPARING),
+        )
+        self._out.append(Finished(self.outcome))

@@ -26,6 +26,7 @@ from enum import Enum
 import numpy as np
 
 from onboard.core.estimate.result import Calibration, Status
+from onboard.core.inputs.airborne import grounded
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.push.plan import GRAVITY, Change, PushPlan, offset_is_zero
 
@@ -107,6 +108,11 @@ class VehicleCondition:
     disarmed_for: float = 0.0
     landed: bool | None = None
     ekf_flags: int | None = None
+
+    @property
+    def may_fly(self) -> bool:
+        """Whether it is in the air as far as it says; what it does not say counts as yes."""
+        return not grounded(armed=self.armed, landed=self.landed)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 from onboard.mavlink.parameter_messages import ParameterEvent, SendAction
 from onboard.push.entries import Entry, Purpose, Result
 from onboard.push.plan import PushPlan
+from onboard.push.policy import VehicleCondition, ekf_healthy
 
 
 class Reason(Enum):
@@ -50,6 +51,12 @@ class VehicleReport:
 
     armed: bool | None = None
     ekf_healthy: bool | None = None
+
+    @classmethod
+    def of(cls, condition: VehicleCondition) -> Self:
+        """What a transaction and the watch after it need of a vehicle's condition."""
+        flags = condition.ekf_flags
+        return cls(condition.armed, None if flags is None else ekf_healthy(flags))
 
 
 @dataclass(frozen=True, slots=True)

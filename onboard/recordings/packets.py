@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from onboard.mavlink.dialect import Message, mavlink
-
-MAGIC_1 = 0xFE
-HEADER_1, HEADER_2 = 6, 10
+from onboard.mavlink.framing import header
 
 
 class Packet:
@@ -49,16 +47,12 @@ class Unpacker:
         Raises:
             MAVError: a payload that cannot be unpacked.
         """
-        if packet[0] == MAGIC_1:
-            header, system, component, kind = HEADER_1, packet[3], packet[4], packet[5]
-        else:
-            header, system, component = HEADER_2, packet[5], packet[6]
-            kind = int.from_bytes(packet[7:10], "little")
+        kind, system, component, _, _, start = header(packet, 0)
         plain = self._plain.get(kind)
         if plain is None:
             return self._whole(bytearray(packet))
         unpacker, names = plain
         # The sender leaves out zeros at the end, and may know more fields than we do.
-        payload = packet[header : header + packet[1]][: unpacker.size].ljust(unpacker.size, b"\0")
+        payload = packet[start : start + packet[1]][: unpacker.size].ljust(unpacker.size, b"\0")
         fields = dict(zip(names, unpacker.unpack(payload), strict=True))
         return Packet(kind, system, component, fields)

@@ -7,7 +7,6 @@ length and by what follows them.  Damage costs the packets that it hit and no ot
 
 from __future__ import annotations
 
-import re
 import struct
 from array import array
 from collections import Counter
@@ -22,6 +21,14 @@ from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
+from onboard.mavlink.framing import (
+    MAGICS,
+    header,
+    is_valid,
+    message_id,
+    next_valid,
+    packet_length,
+)
 from onboard.recordings.packets import Unpacker
 from onboard.recordings.recording import Recording, elapsed_s
 
@@ -34,10 +41,6 @@ LONGEST_SILENCE_US = 86_400_000_000
 LATE_S = 60.0
 """A parameter that is first reported so long after the inertial samples began was read late, as
 by a ground station that connected in flight; one that never changed was in force all along."""
-MAGIC_1, MAGIC_2 = 0xFE, 0xFD
-SIGNED = 0x01
-SIGNATURE_LENGTH = 13
-MAGIC_BYTE = re.compile(b"[\xfd\xfe]")
 INERTIAL = {
     mavlink.MAVLINK_MSG_ID_RAW_IMU: ("<Q", 1e6),
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: ("<Q", 1e6),
@@ -88,7 +91,7 @@ class TlogIndex:
 
 def is_tlog(head: bytes) -> bool:
     """Whether the beginning of a file holds a valid packet after a time stamp."""
-    return _next_valid(head, STAMP_LENGTH) < len(head)
+    return next_valid(head, STAMP_LENGTH) < len(head)
 
 
 def open_tlog(path: Path) -> Recording:
@@ -124,14 +127,14 @@ def index_tlog(data: Bytes) -> TlogIndex:
     end = len(data)
     at = STAMP_LENGTH  # of the packet; its time of arrival stands before it
     while at < end:
-        length = _packet_length(data, at)
-        kind = _message_id(data, at) if length else -1
+        length = packet_length(data, at)
+        kind = message_id(data, at) if length else -1
         wanted = kind in WANTED
         if (
             length
             and at + length <= end
             and (
-                _is_valid(data, at, length, kind)
+                is_valid(data, at, kind)
                 or (not wanted and _chained(data, at, at + length + STAMP_LENGTH, end))
             )
         ):
@@ -140,7 +143,7 @@ def index_tlog(data: Bytes) -> TlogIndex:
                 _note(index, data, at, length, kind)
             at += length + STAMP_LENGTH
             continue
-        found = _next_valid(data, at + 1)
+        found = next_valid(data, at + 1)
         if found < end or at - STAMP_LENGTH < end:
             if found >= end:
                 index.cut_off = True
@@ -151,26 +154,9 @@ def index_tlog(data: Bytes) -> TlogIndex:
     return index
 
 
-def _packet_length(data: Bytes, at: int) -> int:
-    """Length of the packet that would begin at ``at``; 0 if none can."""
-    head = data[at : at + 3]
-    if len(head) == 3:
-        if head[0] == MAGIC_2:
-            return head[1] + 12 + (SIGNATURE_LENGTH if head[2] & SIGNED else 0)
-        if head[0] == MAGIC_1:
-            return head[1] + 8
-    return 0
-
-
-def _message_id(data: Bytes, at: int) -> int:
-    if data[at] == MAGIC_1:
-        return data[at + 5] if at + 5 < len(data) else -1
-    return int.from_bytes(data[at + 7 : at + 10], "little")
-
-
 def _chained(data: Bytes, at: int, following: int, end: int) -> bool:
     """Whether a packet that we cannot check is followed by another that arrived about then."""
-    if following >= end or data[following] not in (MAGIC_1, MAGIC_2):
+    if following >= end or data[following] not in MAGICS:
         return following == end + STAMP_LENGTH
     here, there = (
         int.from_bytes(data[place - STAMP_LENGTH : place], "big") for place in (at, following)
@@ -178,33 +164,9 @@ def _chained(data: Bytes, at: int, following: int, end: int) -> bool:
     return abs(there - here) < LONGEST_SILENCE_US
 
 
-def _is_valid(data: Bytes, at: int, length: int, kind: int) -> bool:
-    """Checksum of a packet of a known message."""
-    message = mavlink.mavlink_map.get(kind)
-    if message is None:
-        return False
-    header = 6 if data[at] == MAGIC_1 else 10
-    body = at + header + data[at + 1]
-    crc = mavlink.x25crc(data[at + 1 : body] + bytes((message.crc_extra,))).crc
-    return bool(crc == int.from_bytes(data[body : body + 2], "little")) and body + 2 <= at + length
-
-
-def _next_valid(data: Bytes, start: int) -> int:
-    """Place of the next packet with a right checksum, or the end of the data."""
-    end = len(data)
-    for match in MAGIC_BYTE.finditer(data, start):
-        at = match.start()
-        length = _packet_length(data, at)
-        if length and at + length <= end and _is_valid(data, at, length, _message_id(data, at)):
-            return at
-    return end
-
-
 def _note(index: TlogIndex, data: Bytes, at: int, length: int, kind: int) -> None:
-    if data[at] == MAGIC_1:
-        source, payload = (data[at + 3], data[at + 4]), at + 6
-    else:
-        source, payload = (data[at + 5], data[at + 6]), at + 10
+    head = header(data, at)
+    source, payload = (head.system, head.component), head.payload
     vehicle = index.vehicles.get(source)
     if vehicle is None:
         vehicle = index.vehicles[source] = _Vehicle()

@@ -1,5 +1,9 @@
 """The vehicle's condition as the push policy gets it: what is stale is unknown."""
 
+from hypothesis import given
+from hypothesis import strategies as st
+
+from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import EkfHealth, VehicleState
 from onboard.daemon.process.condition import STALE_S, Observed
 
@@ -45,3 +49,19 @@ def test_flags_that_a_message_does_not_carry_stay():
     assert (condition.armed, condition.landed, condition.ekf_flags) == (True, True, 0x3F)
     observed.forget()
     assert observed.condition(1.0) == Observed().condition(1.0)
+
+
+WORD = st.sampled_from([None, False, True])
+
+
+@given(st.lists(st.tuples(WORD, WORD), max_size=12))
+def test_service_and_estimator_have_one_idea_of_where_the_vehicle_is(words):
+    """While nothing is stale: armed, landed and in the air are the estimator's own."""
+    observed, ground = Observed(), Ground()
+    for k, (is_armed, landed) in enumerate(words):
+        state = VehicleState(0.1 * k, armed=is_armed, landed=landed)
+        observed.feed(state, 0.1 * k)
+        ground.feed(state)
+        condition = observed.condition(0.1 * k)
+        assert (condition.armed, condition.landed) == (ground.armed, ground.landed)
+        assert condition.may_fly == (ground.grounded is not True)

@@ -4,45 +4,63 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from onboard.core.estimate.calibrator import Calibrator, Restarted
+from onboard.core.inputs.samples import ImuSample
 from onboard.mavlink.bootclock import WRAP_S, BootClock
+from onboard.mavlink.decode import Decoder
+from onboard.mavlink.dialect import mavlink
 
 WRAP_MS = 2**32
 UNIX_US = 1_700_000_000_000_000
 
 
+def heard_ms(clock, ms):
+    clock.observe(mavlink.MAVLink_attitude_message(ms, 0, 0, 0, 0, 0, 0))
+    return clock.seconds_ms(ms)
+
+
+def heard_us(clock, us):
+    clock.observe(mavlink.MAVLink_raw_imu_message(us, *range(9)))
+    return clock.seconds_us(us)
+
+
+def heard_both(clock, unix_us, ms):
+    clock.observe(mavlink.MAVLink_system_time_message(unix_us, ms))
+
+
 @given(st.integers(0, WRAP_MS - 1), st.lists(st.integers(0, 500_000), min_size=1, max_size=200))
 def test_the_32_bit_wrap_is_invisible(start, steps):
     clock = BootClock()
-    clock.from_ms(start)
+    heard_ms(clock, start)
     now = start
     for step in steps:
         now += step
-        assert clock.from_ms(now % WRAP_MS) == pytest.approx(now * 1e-3, abs=1e-5)
+        assert heard_ms(clock, now % WRAP_MS) == pytest.approx(now * 1e-3, abs=1e-5)
     assert clock.reboots == 0
 
 
 def test_a_late_packet_from_before_the_wrap_stays_before_it():
     clock = BootClock()
     for ms in (WRAP_MS - 40, WRAP_MS - 20, 0):
-        clock.from_ms(ms % WRAP_MS)
-    assert clock.from_ms(WRAP_MS - 10) == pytest.approx(WRAP_S - 0.01)
+        heard_ms(clock, ms % WRAP_MS)
+    assert heard_ms(clock, WRAP_MS - 10) == pytest.approx(WRAP_S - 0.01)
     assert clock.latest == pytest.approx(WRAP_S)
     assert clock.reboots == 0
 
 
 def test_a_64_bit_stamp_tells_how_often_the_32_bits_wrapped():
     clock = BootClock()
-    clock.from_us(round(3 * WRAP_S * 1e6) + 5_000_000)
-    assert clock.from_ms(5010) == pytest.approx(3 * WRAP_S + 5.010)
+    heard_us(clock, round(3 * WRAP_S * 1e6) + 5_000_000)
+    assert heard_ms(clock, 5010) == pytest.approx(3 * WRAP_S + 5.010)
     assert clock.reboots == 0
 
 
 @pytest.mark.parametrize("uptime", [10.0, 3600.0, WRAP_S + 5000.0])
 def test_a_reboot_is_noticed_and_time_starts_again(uptime):
     clock = BootClock()
-    clock.from_us(round(uptime * 1e6))
+    heard_us(clock, round(uptime * 1e6))
     for ms in (500, 520, 540):
-        t = clock.from_ms(ms)
+        t = heard_ms(clock, ms)
     assert clock.reboots == 1
     assert t == clock.latest == pytest.approx(0.54)
 
@@ -50,7 +68,7 @@ def test_a_reboot_is_noticed_and_time_starts_again(uptime):
 def test_one_stray_packet_is_not_a_reboot():
     clock = BootClock()
     for ms in (100_000, 100_020, 90_000, 100_040, 90_020, 100_060):
-        clock.from_ms(ms)
+        heard_ms(clock, ms)
     assert clock.reboots == 0
     assert clock.latest == pytest.approx(100.06)
 
@@ -59,39 +77,81 @@ def test_one_stray_packet_is_not_a_reboot():
 def test_reordering_within_seconds_is_not_a_reboot(order):
     clock = BootClock()
     for ms in order:
-        assert clock.from_ms(5000 + ms) == pytest.approx((5000 + ms) * 1e-3)
+        assert heard_ms(clock, 5000 + ms) == pytest.approx((5000 + ms) * 1e-3)
     assert clock.reboots == 0
     assert clock.latest == pytest.approx(5.98)
 
 
 def test_unix_stamps_are_put_on_the_boot_clock_by_system_time():
     clock = BootClock()
-    clock.pair(UNIX_US, 60_000)
-    assert clock.from_us(UNIX_US + 1_500_000) == pytest.approx(61.5)
+    heard_both(clock, UNIX_US, 60_000)
+    assert heard_us(clock, UNIX_US + 1_500_000) == pytest.approx(61.5)
     assert clock.reboots == 0
 
 
 def test_without_system_time_the_last_stamp_heard_has_to_do():
     clock = BootClock()
-    clock.from_ms(60_000)
-    assert clock.from_us(UNIX_US) == pytest.approx(60.0)
-    clock.from_ms(60_020)
-    assert clock.from_us(UNIX_US + 20_000) == pytest.approx(60.02, abs=1e-6)
+    heard_ms(clock, 60_000)
+    assert heard_us(clock, UNIX_US) == pytest.approx(60.0)
+    heard_ms(clock, 60_020)
+    assert heard_us(clock, UNIX_US + 20_000) == pytest.approx(60.02, abs=1e-6)
 
 
 def test_a_step_of_the_autopilots_unix_clock_is_followed():
     clock = BootClock()
-    clock.from_ms(60_000)
-    clock.from_us(UNIX_US)
-    clock.from_ms(61_000)
-    assert clock.from_us(UNIX_US + 3_600_000_000) == pytest.approx(61.0)
+    heard_ms(clock, 60_000)
+    heard_us(clock, UNIX_US)
+    heard_ms(clock, 61_000)
+    assert heard_us(clock, UNIX_US + 3_600_000_000) == pytest.approx(61.0)
 
 
 def test_a_reboot_is_noticed_under_unix_stamps_too():
     clock = BootClock()
-    clock.pair(UNIX_US, 600_000)
+    heard_both(clock, UNIX_US, 600_000)
     for i in range(5):
-        clock.from_us(UNIX_US + 5_000_000 + i * 20_000)
-        clock.from_ms(300 + i * 20)
+        heard_us(clock, UNIX_US + 5_000_000 + i * 20_000)
+        heard_ms(clock, 300 + i * 20)
     assert clock.reboots == 1
     assert clock.latest == pytest.approx(0.38, abs=0.03)
+
+
+STAMPS = st.lists(
+    st.one_of(
+        st.integers(0, WRAP_MS - 1).map(lambda ms: ("ms", ms)),
+        st.integers(0, 3 * WRAP_MS).map(lambda ms: ("us", ms * 1000)),
+        st.integers(0, 10**9).map(lambda us: ("us", UNIX_US + us)),
+    ),
+    max_size=30,
+)
+
+
+@given(STAMPS)
+def test_asking_the_clock_again_says_the_same_and_changes_nothing(stamps):
+    clock = BootClock()
+    for kind, stamp in stamps:
+        first = heard_ms(clock, stamp) if kind == "ms" else heard_us(clock, stamp)
+        latest, reboots = clock.latest, clock.reboots
+        again = clock.seconds_ms(stamp) if kind == "ms" else clock.seconds_us(stamp)
+        assert again == first
+        assert (clock.latest, clock.reboots) == (latest, reboots)
+
+
+def test_a_decoder_with_the_links_clock_takes_its_time_and_does_not_move_it():
+    clock = BootClock()
+    decoder = Decoder(1, 1, clock=clock)
+    message = mavlink.MAVLink_attitude_message(5000, 0, 0, 0, 0, 0, 0)
+    message.get_srcSystem = message.get_srcComponent = lambda: 1
+    (sample,) = decoder.decode(message)
+    assert sample.t == 5.0
+    assert clock.latest is None  # the link tells it, and only once
+
+
+@pytest.mark.parametrize("back", [0.5, 1.5, 2.9, 3.1, 60.0])
+def test_link_and_estimator_agree_on_what_a_reboot_is(back):
+    clock, calibrator = BootClock(), Calibrator()
+    restarted = False
+    for t in (100.0, 100.02, 100.02 - back, 100.04 - back):
+        heard_us(clock, round(t * 1e6))
+        events = calibrator.feed(ImuSample(t, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)))
+        restarted |= any(isinstance(event, Restarted) for event in events)
+    assert restarted == bool(clock.reboots)

@@ -24,6 +24,7 @@ from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.gps.trust import Reason, TrustWindow, WindowClosed, WindowOpened
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
+from onboard.core.inputs.boot_time import began_anew
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.range_checks import impossible
 from onboard.core.inputs.samples import (
@@ -52,8 +53,6 @@ MOST_SAVED = 16
 """Blocks that are saved: enough for folds and clusters."""
 MOST_WAITING = 4
 """Sums of earlier starts that wait for a flight that agrees with them, the latest."""
-BACKWARDS_S = 1.0
-"""A clock that goes back by more is a reboot; by less, a message that was overtaken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,7 +329,7 @@ class Calibrator:
 
     def _clock(self, t: float) -> tuple[Event, ...]:
         """Notice a reboot."""
-        if not t < self._newest - BACKWARDS_S:
+        if not began_anew(t, self._newest):
             return ()
         self._counts["reboots"] += 1
         return self.restart("reboot")

@@ -26,7 +26,11 @@ shows only the sum of z scale and offset."""
 
 
 class Ground:
-    """The autopilot's last word on where it is."""
+    """The autopilot's last word on whether it is armed and has landed.
+
+    Everybody who follows a vehicle keeps one of these: the estimator, the flight that judges a
+    push, and the service (which also remembers how old the word is).
+    """
 
     __slots__ = ("armed", "landed")
 
@@ -53,9 +57,19 @@ class Ground:
     @property
     def grounded(self) -> bool | None:
         """True on the ground, False in the air, None where the motion has to decide."""
-        if self.armed is False or self.landed:
-            return True
-        return None if self.landed is None else False
+        return grounded(armed=self.armed, landed=self.landed)
+
+
+def grounded(*, armed: bool | None, landed: bool | None) -> bool | None:
+    """True on the ground, False in the air, None where the autopilot's word does not say.
+
+    Args:
+        armed: by the autopilot, None if it has not said.
+        landed: likewise.
+    """
+    if armed is False or landed:
+        return True
+    return None if landed is None else False
 
 
 def still(v_n: Array, w_b: Array) -> bool:

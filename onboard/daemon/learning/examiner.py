@@ -26,7 +26,8 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
-from onboard.daemon.learning.flight import Judged, JudgedFlight, in_force
+from onboard.daemon.learning.flight import Judged, JudgedFlight
+from onboard.daemon.learning.meaning import all_in_force, in_force
 from onboard.push.conditioning import CHI_SQUARE_999
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
@@ -34,7 +35,6 @@ from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)
 
-IMUS = range(1, 6)
 IN_FLIGHT_SHARE = 0.02
 """Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later."""
 
@@ -71,7 +71,7 @@ class Examiner:
 
     def took_off(self, parameters: ParametersInForce) -> None:
         """A flight begins: these are the values that it is flown with, unless they are changed."""
-        self._at_takeoff = {imu: in_force(parameters, imu) for imu in IMUS}
+        self._at_takeoff = all_in_force(parameters.values)
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -118,7 +118,7 @@ class Examiner:
         flight = frozen.flight
         self.counters["diagnoses"] += 1
         device_id = flight.parameters.device_id(imu)
-        six = frozen.at_takeoff.get(imu) or in_force(flight.parameters, imu)
+        six = frozen.at_takeoff.get(imu) or in_force(flight.parameters.values, imu)
         if device_id is None or six is None:
             self.counters["diagnosis_of_unknown"] += 1
             return

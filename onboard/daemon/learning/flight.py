@@ -15,7 +15,6 @@ import msgspec
 
 from onboard.core.estimate.result import Calibration, Six
 from onboard.core.inputs.parameters import ParametersInForce
-from onboard.core.maths.accelerometer import parameter_names
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
@@ -62,15 +61,6 @@ class JudgedFlight:
             if parameters.device_id(imu) in (None, judged.device_id)
         }
         return replace(self, imus=there) if there else None
-
-
-def in_force(parameters: ParametersInForce, imu: int) -> Six | None:
-    """The six as they were reported, float32; None if one was not."""
-    values = [parameters.values.get(name) for name in parameter_names(imu).six]
-    if any(value is None for value in values):
-        return None
-    a, b, c, d, e, f = (to_float32(value) for value in values if value is not None)
-    return a, b, c, d, e, f
 
 
 def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calibration:

@@ -17,7 +17,7 @@ be wrong and must not be added to those of a flight that is right.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -28,11 +28,11 @@ from onboard.core.estimate.calibrator import Advanced, Calibrator, FlightEnded, 
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.gps.trust import WindowClosed, WindowOpened
-from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue, Sample
-from onboard.daemon.learning.examiner import IMUS, Examiner
-from onboard.daemon.learning.flight import JudgedFlight, compared_now, decode, encode, in_force
+from onboard.daemon.learning.examiner import Examiner
+from onboard.daemon.learning.flight import JudgedFlight, compared_now, decode, encode
 from onboard.daemon.learning.heap import trim
+from onboard.daemon.learning.meaning import all_in_force, carried, hand_on, in_force, matters
 from onboard.daemon.learning.proof import ProofFlight, answers
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.snapshot import TrustView
@@ -41,8 +41,6 @@ from onboard.errors import StateError
 
 SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
-KEPT_PARAMETERS = ("INS", "AHRS", "GPS", "ARMING")
-"""Beginnings of the names that change what an estimator makes of the messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +112,6 @@ class Learner:
         self._in_air = False
         self._unjudged = False
         self._windows = 0
-        self._parameters: dict[str, ParameterValue] = {}
         self._answers: dict[int, Calibration] = {}
         self._calibrated: set[int] = set()
         self._stale = self._urgent = False
@@ -134,11 +131,10 @@ class Learner:
         before, self._identity = self._identity, there
         self._examiner.autopilot, self._examiner.board = there.autopilot, there.board
         same = before is not None and bool(there.board) and there == before
-        if not same and before is not None:
-            self._parameters.clear()  # of another board, for all that is known
-        for parameter in told:
-            self._parameter(parameter)
-        if same and self._values_in_force() == self._before_gap:
+        # Of another board, for all that is known, nothing holds any more.
+        values = carried(self._calibrator.parameters) if same or before is None else {}
+        values |= {parameter.name: parameter.value for parameter in told if matters(parameter.name)}
+        if same and all_in_force(values) == self._before_gap:
             return
         calibrator = Calibrator(self._settings)
         kept = None
@@ -150,7 +146,7 @@ class Learner:
                 self._save_quietly(before)
             loaded = self._load(calibrator)
             kept = kept or loaded
-        self._begin(calibrator)
+        self._begin(calibrator, values)
         self._flight = None if kept is None else kept.outdated()
         if calibrator.waiting:
             text = "what was learned before is added when a flight agrees with it"
@@ -158,11 +154,7 @@ class Learner:
 
     def gap(self) -> None:
         """The autopilot rebooted or was silent: from here on it may be another board."""
-        self._before_gap = self._values_in_force()
-
-    def _values_in_force(self) -> dict[int, Six | None]:
-        values = {p.name: p.value for p in self._parameters.values()}
-        return {imu: in_force(ParametersInForce(values), imu) for imu in IMUS}
+        self._before_gap = all_in_force(self._calibrator.parameters.values)
 
     def _load(self, calibrator: Calibrator) -> JudgedFlight | None:
         """Lay what is on the disk beside this calibrator; the last flight that was judged."""
@@ -180,11 +172,10 @@ class Learner:
         self._counters["state_resumed"] += 1
         return decode(saved.flight) if saved.flight else None
 
-    def _begin(self, calibrator: Calibrator) -> None:
-        """Go on with another calibrator; what the messages mean stays known."""
+    def _begin(self, calibrator: Calibrator, parameters: Mapping[str, float]) -> None:
+        """Go on with another calibrator, which is told what the messages mean."""
         self._calibrator = calibrator
-        for parameter in self._parameters.values():
-            calibrator.feed(parameter)
+        hand_on(parameters, calibrator)
         self._examiner.begin_anew(calibrator)
         self._calibrated.clear()
         self._answers = {}
@@ -210,7 +201,7 @@ class Learner:
             for event in self._calibrator.feed(sample):
                 self._note(event)
             if judging:
-                flown = self._proof.feed(sample, self._parameters.values())
+                flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
         if not judging:
             self._proof.drop()
@@ -233,7 +224,7 @@ class Learner:
 
     def reset(self) -> Learned:
         """Forget everything that was learned, on disk too; the parameters in force stay known."""
-        self._begin(Calibrator(self._settings))
+        self._begin(Calibrator(self._settings), carried(self._calibrator.parameters))
         self._windows = 0
         self._flight = None
         if self._identity is not None:
@@ -317,7 +308,7 @@ class Learner:
         """Of the flight as it was judged, or the estimator's own answers since then."""
         judged = {}
         for imu, found in (self._flight.diagnosed if self._flight else {}).items():
-            now = in_force(self._calibrator.parameters, imu)
+            now = in_force(self._calibrator.parameters.values, imu)
             if now is not None:
                 judged[imu] = compared_now(found.calibration, self._answers.get(imu), now)
         both = judged | self._answers if self._unjudged else self._answers | judged
@@ -367,14 +358,10 @@ class Learner:
                 self._counters[f"event_{type(event).__name__}"] += 1
 
     def _parameter(self, parameter: ParameterValue) -> None:
-        """Keep what a reset must not forget."""
-        name, value = parameter.name, parameter.value
-        if not name.startswith(KEPT_PARAMETERS):
-            return
-        before = self._parameters.get(name)
-        if before is None or before.value != value:
+        """Solve anew where a value changes what the messages mean."""
+        name = parameter.name
+        if matters(name) and self._calibrator.parameters.values.get(name) != parameter.value:
             self._stale = self._urgent = True
-        self._parameters[name] = parameter
 
     def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
         self._news.append(News(kind, text, warning))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.inputs.airborne import Ground
+from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
+from onboard.daemon.learning.meaning import carried, hand_on
 
 
 class ProofFlight:
@@ -16,32 +17,29 @@ class ProofFlight:
     def __init__(self, settings: EstimatorSettings) -> None:
         self._settings = settings
         self._calibrator: Calibrator | None = None
-        self._armed = False
+        self._ground = Ground()
 
     def drop(self) -> None:
         """No push waits for a flight, or another board is there."""
         self._calibrator = None
 
-    def feed(
-        self, sample: Sample, parameters: Iterable[ParameterValue]
-    ) -> dict[int, Calibration] | None:
+    def feed(self, sample: Sample, parameters: ParametersInForce) -> dict[int, Calibration] | None:
         """Take a sample; the answers, when the flight ends.
 
         Args:
             sample: in the order of arrival.
-            parameters: all that are known, for the beginning of a flight.
+            parameters: in force, for the beginning of a flight.
         """
         ended = False
-        if isinstance(sample, VehicleState) and sample.armed is not None:
-            if sample.armed and not self._armed and self._calibrator is None:
+        if isinstance(sample, VehicleState):
+            before, self._ground = self._ground, self._ground.after(sample)
+            if self._ground.armed and not before.armed and self._calibrator is None:
                 self._calibrator = Calibrator(self._settings)
-                for parameter in parameters:
-                    self._calibrator.feed(parameter)
-            ended = self._armed and not sample.armed
-            self._armed = sample.armed
+                hand_on(carried(parameters), self._calibrator)
+            ended = bool(before.armed) and not self._ground.armed
         if self._calibrator is None:
             return None
-        if ended or self._armed or type(sample) is ParameterValue:
+        if ended or self._ground.armed or type(sample) is ParameterValue:
             self._calibrator.feed(sample)
         return answers(self._calibrator) if ended else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import EkfHealth, Sample, VehicleState
 from onboard.push.policy import VehicleCondition
 
@@ -12,17 +13,16 @@ STALE_S = 5.0
 
 
 class Observed:
-    """Keeps the last word on each flag and when it came; ``now`` is a monotonic clock, s."""
+    """How old the autopilot's last word on each flag is; ``now`` is a monotonic clock, s."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
         """The autopilot rebooted or is another one: nothing is known."""
-        self._armed: bool | None = None
+        self._ground = Ground()
         self._armed_at = -math.inf
         self._disarmed_since: float | None = None
-        self._landed: bool | None = None
         self._landed_at = -math.inf
         self._ekf: int | None = None
         self._ekf_at = -math.inf
@@ -31,14 +31,15 @@ class Observed:
         """Take a sample of any kind."""
         match sample:
             case VehicleState(armed=armed, landed=landed):
+                self._ground.feed(sample)
                 if armed is not None:
                     if armed:
                         self._disarmed_since = None
                     elif self._disarmed_since is None or now - self._armed_at > STALE_S:
                         self._disarmed_since = now
-                    self._armed, self._armed_at = armed, now
+                    self._armed_at = now
                 if landed is not None:
-                    self._landed, self._landed_at = landed, now
+                    self._landed_at = now
             case EkfHealth(_, flags):
                 self._ekf, self._ekf_at = flags, now
             case _:
@@ -46,11 +47,11 @@ class Observed:
 
     def condition(self, now: float) -> VehicleCondition:
         """What is known now; what is stale counts as unknown."""
-        armed = self._armed if now - self._armed_at <= STALE_S else None
+        armed = self._ground.armed if now - self._armed_at <= STALE_S else None
         since = self._disarmed_since
         return VehicleCondition(
             armed=armed,
             disarmed_for=now - since if armed is False and since is not None else 0.0,
-            landed=self._landed if now - self._landed_at <= STALE_S else None,
+            landed=self._ground.landed if now - self._landed_at <= STALE_S else None,
             ekf_flags=self._ekf if now - self._ekf_at <= STALE_S else None,
         )

@@ -95,7 +95,6 @@ class Portrait:
         learned = self.learning.learned
         proposals = {proposal.imu: proposal for proposal in push.proposals}
         values = self.parameters.values
-        flying = condition.armed is not False and condition.landed is not True
         return tuple(
             imu_view(
                 calibration,
@@ -103,7 +102,7 @@ class Portrait:
                     proposal=proposals.get(imu),
                     writing=imu == push.active_imu,
                     written=imu in push.can_roll_back,
-                    flying=flying,
+                    flying=condition.may_fly,
                 ),
                 values,
             )

@@ -331,7 +331,9 @@ class Service:
             case AutopilotFound(autopilot):
                 who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
                 post("autopilot_found", who)
-                self.learning.decoder = Decoder(autopilot.system, autopilot.component)
+                self.learning.decoder = Decoder(
+                    autopilot.system, autopilot.component, clock=self.link.boot_clock
+                )
                 self.phase = "running"
                 if not autopilot.is_ardupilot:
                     self._advise_only(

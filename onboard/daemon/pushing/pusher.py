@@ -45,7 +45,7 @@ from onboard.push.entries import (
 )
 from onboard.push.journal import Journal
 from onboard.push.plan import PushPlan
-from onboard.push.policy import Mode, VehicleCondition, ekf_healthy, moment
+from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import (
     Finished,
     JournalFailed,
@@ -185,10 +185,7 @@ class Pusher:
         if board != self._board:
             self._board = board
             self._read_journal()
-        report = VehicleReport(
-            condition.armed,
-            None if condition.ekf_flags is None else ekf_healthy(condition.ekf_flags),
-        )
+        report = VehicleReport.of(condition)
         if report != self._report:
             self._report = report
             self._tell(report, now)

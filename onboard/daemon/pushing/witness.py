@@ -8,7 +8,7 @@ from onboard.core.estimate.result import Calibration
 from onboard.daemon.view.snapshot import JudgedView
 from onboard.daemon.view.view import finite
 from onboard.push.entries import Planned, Watched
-from onboard.push.policy import VehicleCondition, ekf_healthy
+from onboard.push.policy import VehicleCondition
 from onboard.push.signals import VehicleReport
 from onboard.push.watch import PushWatch
 
@@ -38,8 +38,7 @@ class Witness:
 
     def report(self, condition: VehicleCondition, now: float) -> tuple[Watched, ...]:
         """Verdicts from the vehicle's state (a push in flight after which the EKF fell ill)."""
-        healthy = None if condition.ekf_flags is None else ekf_healthy(condition.ekf_flags)
-        report = VehicleReport(condition.armed, healthy)
+        report = VehicleReport.of(condition)
         found = ((imu, watch.vehicle(report, now)) for imu, (_, watch) in self._watches.items())
         return self._fallen([(imu, None, verdict) for imu, verdict in found if verdict])
 

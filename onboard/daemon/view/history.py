@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from onboard.core.inputs.airborne import grounded
 from onboard.daemon.view.snapshot import ImuView, Snapshot
 from onboard.outage import Outage
 
@@ -234,7 +235,7 @@ class History:
 
 def is_flying(snapshot: Snapshot) -> bool:
     """Whether the vehicle is in the air, as far as it says."""
-    return snapshot.link.armed is not False and snapshot.link.landed is not True
+    return not grounded(armed=snapshot.link.armed, landed=snapshot.link.landed)
 
 
 def _row(view: ImuView, time: float, flown_s: float) -> Row:

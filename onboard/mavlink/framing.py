@@ -1,0 +1,120 @@
+"""Where a MAVLink 1 or 2 packet begins and ends, what its header says, whether its checksum holds.
+
+The only place that knows the layout of a packet: the live link, telemetry logs and unpackers ask
+here.  ``data`` is anything indexed as bytes, ``at`` the place of the first byte of a packet.
+
+MAVLink 2: magic, payload length, two flag bytes, sequence, system, component, three bytes of
+message number, payload, two bytes of checksum, and 13 of signature where a flag says so.
+MAVLink 1: magic, payload length, sequence, system, component, message number, payload, checksum.
+"""
+
+from __future__ import annotations
+
+import re
+from mmap import mmap
+from typing import NamedTuple, TypeAlias
+
+from onboard.mavlink.dialect import mavlink
+
+Bytes: TypeAlias = bytes | bytearray | mmap
+
+MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
+MAGICS = (MAGIC_V1, MAGIC_V2)
+SHORTEST = 8
+"""A MAVLink 1 packet without payload."""
+_MAGIC = re.compile(rb"[\xfd\xfe]")
+_SIGNED = 0x01
+_HEADER_V1, _HEADER_V2 = 6, 10
+_CHECKSUM = 2
+_SIGNATURE = 13
+
+
+class Header(NamedTuple):
+    """What the header of a whole packet says; ``payload`` is the place where the payload begins."""
+
+    message_id: int
+    system: int
+    component: int
+    sequence: int
+    signed: bool
+    payload: int
+
+
+def packet_length(data: Bytes, at: int) -> int:
+    """Length of the packet that would begin at ``at``; 0 if none can, or fewer than 3 bytes follow.
+
+    A flag that we do not know changes the layout in an unknown way (that is what the first flag
+    byte is for), so that nothing can be said of such a packet.
+    """
+    head = data[at : at + 3]
+    if len(head) < 3:
+        return 0
+    if head[0] == MAGIC_V2:
+        flags = head[2]
+        if flags & ~_SIGNED:
+            return 0
+        return head[1] + _HEADER_V2 + _CHECKSUM + (_SIGNATURE if flags else 0)
+    return head[1] + _HEADER_V1 + _CHECKSUM if head[0] == MAGIC_V1 else 0
+
+
+def message_id(data: Bytes, at: int) -> int:
+    """Number of the message; -1 if its bytes have not come."""
+    if data[at] == MAGIC_V1:
+        return data[at + 5] if at + 5 < len(data) else -1
+    number = data[at + 7 : at + _HEADER_V2]
+    return int.from_bytes(number, "little") if len(number) == 3 else -1
+
+
+def header(data: Bytes, at: int) -> Header:
+    """The header of a packet that is there as a whole."""
+    if data[at] == MAGIC_V1:
+        return Header(
+            message_id=data[at + 5],
+            system=data[at + 3],
+            component=data[at + 4],
+            sequence=data[at + 2],
+            signed=False,
+            payload=at + _HEADER_V1,
+        )
+    return Header(
+        message_id=int.from_bytes(data[at + 7 : at + _HEADER_V2], "little"),
+        system=data[at + 5],
+        component=data[at + 6],
+        sequence=data[at + 4],
+        signed=bool(data[at + 2] & _SIGNED),
+        payload=at + _HEADER_V2,
+    )
+
+
+def is_valid(data: Bytes, at: int, kind: int) -> bool:
+    """Whether the checksum of a packet that is there as a whole holds, if it is a ``kind``.
+
+    False for a message that the dialect does not have: its checksum cannot be computed.
+    """
+    message = mavlink.mavlink_map.get(kind)
+    if message is None:
+        return False
+    end = at + (_HEADER_V1 if data[at] == MAGIC_V1 else _HEADER_V2) + data[at + 1]
+    crc = mavlink.x25crc(data[at + 1 : end] + bytes((message.crc_extra,))).crc
+    return bool(crc == int.from_bytes(data[end : end + _CHECKSUM], "little"))
+
+
+def next_magic(data: Bytes, start: int) -> int:
+    """Place of the next byte that may begin a packet, or the end of the data."""
+    found = _MAGIC.search(data, start)
+    return len(data) if found is None else found.start()
+
+
+def next_valid(data: Bytes, start: int, stop: int | None = None) -> int:
+    """Place of the next whole packet with a right checksum that begins before ``stop``.
+
+    ``stop`` (the end of the data, if not given) if there is none.
+    """
+    stop = len(data) if stop is None else stop
+    at = next_magic(data, start)
+    while at < stop:
+        length = packet_length(data, at)
+        if length and at + length <= len(data) and is_valid(data, at, message_id(data, at)):
+            return at
+        at = next_magic(data, at + 1)
+    return stop
