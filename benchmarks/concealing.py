@@ -12,7 +12,7 @@ found.  What a flight cannot show by nature is declared here, before any recordi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any, Literal
@@ -37,74 +37,15 @@ STAMPED_EARLY = 0.02
 SHAKEN = (4.0, 4.0, 6.0)
 """Motor tone in recordings of vibration's own effect: no vibration, nothing to rectify."""
 
-UNITS: dict[str, dict[Vehicle, dict[str, float]]] = {
-    "gps_lever_arm": {
-        "copter": {"x": 0.035, "y": 0.03, "z": 0.035},
-        "plane": {"x": 0.2, "y": 0.08, "z": 0.05},
-    },
-    "cross_axis": {
-        "copter": {"xy": 0.011, "xz": 0.013, "yx": 0.013, "yz": 0.01, "zx": 0.01, "zy": 0.012},
-        "plane": {"xy": 0.036, "xz": 0.017, "yx": 0.026, "yz": 0.014, "zx": 0.016, "zy": 0.024},
-    },
-    "mount_tilt": {"copter": {"roll": 0.02, "pitch": 0.02}, "plane": {"roll": 0.02, "pitch": 0.02}},
-    "heading_error": {"copter": {"yaw": 0.05}, "plane": {"yaw": 0.05}},
-    "heading_by_throttle": {
-        "copter": {"yaw_per_throttle": 0.1},
-        "plane": {"yaw_per_throttle": 0.06},
-    },
-    "temperature_drift": {
-        "copter": {"x": 0.009, "y": 0.009, "z": 0.003},
-        "plane": {"x": 0.015, "y": 0.015, "z": 0.006},
-    },
-    "bias_ramp": {
-        "copter": {"x": 6e-4, "y": 6e-4, "z": 2e-4},
-        "plane": {"x": 1.1e-3, "y": 1.2e-3, "z": 4e-4},
-    },
-    "bias_step": {
-        "copter": {"x": 0.07, "y": 0.07, "z": 0.04},
-        "plane": {"x": 0.12, "y": 0.12, "z": 0.06},
-    },
-    "scale_nonlinearity": {"plane": {"x": 0.02, "z": 0.01}},
-    "vibration_rectification": {
-        "copter": {"x": 0.006, "y": 0.006, "z": 0.002},
-        "plane": {"x": 0.006, "y": 0.006, "z": 0.002},
-    },
-    "throttle_coupling": {
-        "copter": {"x": 0.2, "y": 0.2, "z": 0.1},
-        "plane": {"x": 0.3, "y": 0.2, "z": 0.12},
-    },
-    "load_flex": {"plane": {"roll": 0.011, "pitch": 0.015}},
-    "clock_skew": {"copter": {"rate": 1e-4}, "plane": {"rate": 1.3e-4}},
-    "imu_delay": {"copter": {"delay": 0.03}, "plane": {"delay": 0.03}},
-    "gps_latency": {"copter": {"delay": 0.04}, "plane": {"delay": 0.04}},
-    "gps_smoothing": {"copter": {"window": 0.15}, "plane": {"window": 0.15}},
-    "gps_fault": {
-        "copter": {"north": 0.6, "east": 0.6},
-        "plane": {"north": 0.6, "east": 0.6},
-    },
-    "saturation": {"copter": {"limit": 13.0}, "plane": {"limit": 13.0}},
-}
+CONCEALED = {kind.name: kind for kind in concealed.ALL if kind.units}
+UNITS: dict[str, Mapping[str, Mapping[str, float]]] = {n: k.units for n, k in CONCEALED.items()}
+"""Sizes of one unit by effect, vehicle and unknown, as the concealed effects state them."""
 RAILS: dict[Level, tuple[float, float]] = {
     "small": (13.0, 14.0),
     "medium": (11.6, 12.0),
     "large": (11.0, 11.5),
 }
 """Limits of a clipping accelerometer, m/s^2; the higher, the less there is to clip."""
-POSITIVE = ("gps_latency", "gps_smoothing")
-MOST = {"gps_smoothing": 0.42, "imu_delay": 0.1, "gps_latency": 0.25, "scale_nonlinearity": 0.05}
-"""Sizes at which a part is broken, not wrong; the calibration says so."""
-MAKERS: dict[str, Callable[..., concealed.Effect]] = {
-    kind.name: kind for kind in concealed.ALL if kind.name != "rotor_drag"
-}
-ALIKE: tuple[frozenset[str], ...] = (
-    frozenset({"bias_ramp", "temperature_drift", "bias_step"}),
-    frozenset({"throttle_coupling", "vibration_rectification", "scale_nonlinearity"}),
-    frozenset({"mount_tilt", "cross_axis", "load_flex"}),
-    frozenset({"heading_error", "heading_by_throttle"}),
-)
-"""Effects of one kind: two of them at once are one effect of that kind to any single flight."""
-ALONE = frozenset({"saturation", "vibration_rectification"})
-"""Not paired: what is clipped has lost the other effect; shaken vehicles fly alone."""
 NAMELESS: dict[str, tuple[float, float, float]] = {
     "dynamic_pressure": (0.12, 0.12, 0.1),
     "roll_rate": (0.3, 0.3, 0.3),
@@ -168,7 +109,7 @@ class Secret:
         if name == "gps_fault":
             sizes["start"] = float(rng.uniform(0.3, 0.6) * duration)
             sizes["end"] = sizes["start"] + float(rng.uniform(8.0, 25.0))
-        return MAKERS[name](**sizes)
+        return CONCEALED[name](**sizes)
 
 
 def _sizes(rng: Rng, units: Mapping[str, float], level: Level, name: str) -> dict[str, float]:
@@ -179,8 +120,8 @@ def _sizes(rng: Rng, units: Mapping[str, float], level: Level, name: str) -> dic
     out = {}
     for key in keys:
         size = units[key] * float(rng.uniform(*LEVELS[level]))
-        sign = 1.0 if name in POSITIVE else float(rng.choice([-1.0, 1.0]))
-        out[key] = sign * min(size, MOST.get(name, np.inf))
+        sign = 1.0 if CONCEALED[name].positive else float(rng.choice([-1.0, 1.0]))
+        out[key] = sign * min(size, CONCEALED[name].most)
     return out
 
 
@@ -214,8 +155,8 @@ class Challenge:
         rng = np.random.default_rng([self.first, 6])
         for i in range(self.pairs):
             vehicle = self.vehicles[i % 2]
-            able = [n for n in UNITS if vehicle in UNITS[n] and n not in ALONE]
-            couples = [p for p in combinations(able, 2) if not any(set(p) <= a for a in ALIKE)]
+            able = [n for n in UNITS if vehicle in UNITS[n] and not CONCEALED[n].alone]
+            couples = [p for p in combinations(able, 2) if not _alike(*p)]
             yield "pair", vehicle, couples[int(rng.integers(len(couples)))], "large"
         for i in range(self.nameless):
             names = list(NAMELESS)
@@ -225,3 +166,9 @@ class Challenge:
                 (names[i % len(names)],),
                 "large",
             )
+
+
+def _alike(one: str, other: str) -> bool:
+    """Two effects of one kind at once are one effect of that kind to any single flight."""
+    kind = CONCEALED[one].kind
+    return bool(kind) and kind == CONCEALED[other].kind

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from sitl.builtin import effects as fx
-from sitl.builtin import rotation
+from sitl.builtin.effects.base import turned
 from sitl.builtin.orientation import board_rotation
 from sitl.builtin.smoothing import DT, RATE, Array, derivative
 from sitl.builtin.trajectory import STANDARD_GRAVITY, Trajectory
@@ -140,15 +140,14 @@ def read_imu(
     level = vibration_level(shake)
     temperature = temperature_profile(imu, t)
     f_b = trajectory.f_b + _lever(trajectory, imu)
-    f_b = f_b + _deterministic(
-        truth,
-        index,
-        f_b,
+    scene = fx.Scene(
+        f_b=f_b,
         elapsed=t - origin,
         temperature=temperature,
-        trajectory=trajectory,
         level=level,
+        trajectory=trajectory,
     )
+    f_b = f_b + _deterministic(truth, index, scene)
     R_bs = board_rotation(truth.orientation)
     board = board_axes(truth)
     f_s = (f_b + shake) @ board @ R_bs
@@ -214,70 +213,22 @@ def vibration_level(shake: Array) -> Array:
     return level
 
 
-def _deterministic(
-    truth: Truth,
-    index: int,
-    f_b: Array,
-    *,
-    elapsed: Array,
-    temperature: Array,
-    trajectory: Trajectory,
-    level: Array,
-) -> Array:
+def _deterministic(truth: Truth, index: int, scene: fx.Scene) -> Array:
     """Sum of the accelerometer effects on IMU ``index``: what it reads too much, (n, 3)."""
-    extra = np.zeros_like(f_b)
+    extra = np.zeros_like(scene.f_b)
     for effect in truth.effects:
         if not _hits(getattr(effect, "imu", 0), index):
             continue
-        match effect:
-            case fx.CrossAxis(xy=xy, xz=xz, yx=yx, yz=yz, zx=zx, zy=zy):
-                extra += f_b @ np.array([[0, xy, xz], [yx, 0, yz], [zx, zy, 0]]).T
-            case fx.TemperatureDrift(x=x, y=y, z=z, reference=reference):
-                extra += np.outer(temperature - reference, (x, y, z))
-            case fx.BiasRamp(x=x, y=y, z=z):
-                extra += np.outer(elapsed, (x, y, z))
-            case fx.BiasStep(time=time, x=x, y=y, z=z):
-                extra += np.outer(elapsed >= time, (x, y, z))
-            case fx.ScaleNonlinearity(x=x, y=y, z=z):
-                extra += np.array((x, y, z)) * f_b**2 / STANDARD_GRAVITY
-            case fx.VibrationRectification(x=x, y=y, z=z):
-                extra += np.array((x, y, z)) * level**2
-            case fx.ThrottleCoupling(x=x, y=y, z=z):
-                extra += np.outer(trajectory.throttle, (x, y, z))
-            case fx.AccelerometerTilt(roll=roll, pitch=pitch):
-                extra += f_b @ _turned(-roll, -pitch) - f_b
-            case fx.LoadFlex(roll=roll, pitch=pitch):
-                load = -f_b[:, 2] / STANDARD_GRAVITY - 1.0
-                flex = rotation.from_vector(np.outer(load, (roll, pitch, 0.0)))
-                extra += rotation.rotate(flex, f_b) - f_b
-            case fx.Nameless(term=term, x=x, y=y, z=z):
-                extra += np.outer(_nameless(term, trajectory, elapsed), (x, y, z))
-            case _:
-                pass
+        added = effect.reads_too_much(scene)
+        if added is not None:
+            extra += added
     return extra
-
-
-def _turned(roll: float, pitch: float) -> Array:
-    """(3, 3) axes turned by roll and pitch (rad): their components times it are the old ones."""
-    out: Array = rotation.from_euler(np.array([roll]), np.array([pitch]), np.zeros(1))[0]
-    return out
 
 
 def board_axes(truth: Truth) -> Array:
     """(3, 3) axes of the autopilot in the airframe: ``f_b @ board_axes`` is what it feels."""
     tilts = [e for e in truth.effects if isinstance(e, fx.BoardTilt)]
-    return _turned(tilts[0].roll, tilts[0].pitch) if tilts else np.eye(3)
-
-
-def _nameless(term: str, trajectory: Trajectory, elapsed: Array) -> Array:
-    """Signal of :class:`~sitl.builtin.effects.Nameless`, (n,)."""
-    signals = {
-        "dynamic_pressure": (trajectory.airspeed / 10.0) ** 2,
-        "roll_rate": trajectory.w_b[:, 0],
-        "swing": np.sin(2.0 * np.pi * elapsed / 40.0),
-        "climb_rate": -trajectory.v_n[:, 2],
-    }
-    return signals[term]
+    return turned(tilts[0].roll, tilts[0].pitch) if tilts else np.eye(3)
 
 
 def _gyro(
