@@ -65,6 +65,7 @@ class Pass:
         """Of all segments that are finished."""
         self.bias_b = np.zeros(3)
         self._running = False
+        self._before: Segment | None = None
         self._since_solve = 0
         self._epochs = 0
         self._last_velocity_t = -np.inf
@@ -82,6 +83,7 @@ class Pass:
     def restart(self) -> None:
         """Forget the filter's state (a gap): the next segment begins a new one.  Sums stay."""
         self._running = False
+        self._before = None
 
     def hold(self, theta: Array, covariance: Array) -> None:
         """Gates and feedback follow this estimate (m,), (m, m) until :meth:`release`."""
@@ -109,6 +111,8 @@ class Pass:
                 at = float(fixes.t[-1])
                 return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
             fixes, trusted = fixes.between(first_good, len(fixes)), trusted[first_good:]
+        segment = self.model.remembering(segment, self._before.slow if self._before else {})
+        self._before = segment
         ready = prepare(
             segment,
             fixes,

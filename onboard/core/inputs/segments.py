@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ DENSE_S = 0.15
 """Attitude samples this close together can be interpolated: between sparser ones a vehicle turns
 in ways that they do not show."""
 NEAR_S = 0.02
+
+
+Signal: TypeAlias = tuple[Array, Array]
+"""A slow signal: times (j,), s, and values (j,) or (j, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +70,7 @@ class Segment:
     t_attitude: Array
     R_attitude: Array
     R_bs: Array
-    slow: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    slow: dict[str, Signal] = field(default_factory=dict)
     lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
 
     def interpolant(self) -> Hermite:

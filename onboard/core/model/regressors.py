@@ -18,11 +18,12 @@ The prediction is that of what the autopilot *recorded*; unknowns are errors of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Around, Intervals, Signals
 
@@ -68,6 +69,20 @@ class Family:
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
         """True if the recording has the signals that the columns need."""
         return True
+
+    def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:  # noqa: ARG002
+        """A signal of this segment that depends on what was before it: an effect with a memory.
+
+        It is looked up at nodes like any slow signal, under the name of the family.
+
+        Args:
+            segment: samples; segments overlap, so that ``before`` has a value at its start.
+            before: the signal over the segment before, None after a gap.
+
+        Returns:
+            Times (j,) and values (j,) or (j, 3).
+        """
+        return None
 
     def acceleration(self, nodes: Signals) -> Array | None:  # noqa: ARG002
         """(K, M + 1, 3, m) body axes, m/s^2 per unit; added to the predicted specific force."""
@@ -125,6 +140,20 @@ class Model:
         self.index = {u.name: i for i, u in enumerate(self.unknowns)}
         self.prior = np.array([u.prior for u in self.unknowns])
         self.prior_sigma = np.array([u.prior_sigma for u in self.unknowns])
+
+    def remembering(self, segment: Segment, before: Mapping[str, Signal]) -> Segment:
+        """The segment with what families remember among its slow signals.
+
+        Args:
+            segment: samples.
+            before: slow signals of the segment before; empty after a gap.
+        """
+        remembered = {
+            f.name: signal
+            for f in self.families
+            if (signal := f.remembers(segment, before.get(f.name))) is not None
+        }
+        return replace(segment, slow=segment.slow | remembered) if remembered else segment
 
     def columns(self, intervals: Intervals, around: Around) -> SegmentColumns:
         """Evaluate every family on one segment."""
