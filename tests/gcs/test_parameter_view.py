@@ -9,6 +9,7 @@ import pytest
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.gps.trust import Reason
+from onboard.core.physics.catalogue import kinds
 from onboard.daemon.outlets import parameter_view
 from onboard.daemon.outlets.parameter_view import (
     FINDINGS,
@@ -133,6 +134,8 @@ def test_the_manual_has_every_name_and_number():
         "OBC_DISTRUST": dict(REASONS),
         "OBC_FINDING": dict(FINDINGS),
     }
+    for kind in kinds():
+        assert f"| {kind.code} | `{kind.effect}` | {kind.title} |" in manual
 
 
 def effect(name, share):

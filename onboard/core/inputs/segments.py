@@ -22,6 +22,14 @@ NEAR_S = 0.02
 
 Signal: TypeAlias = tuple[Array, Array]
 """A slow signal: times (j,), s, and values (j,) or (j, 3)."""
+SLOW_SIGNALS = {
+    "temperature": "of the accelerometer, degC",
+    "throttle": "0 to 1",
+    "vibration": "(j, 3) level by axis, m/s^2",
+    "clipping": "samples at the rail since boot, by accelerometer",
+    "airspeed": "m/s",
+}
+"""Names of the slow signals that a recording may have, and what they are."""
 
 
 @dataclass(frozen=True, slots=True)
