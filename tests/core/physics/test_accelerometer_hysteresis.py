@@ -1,0 +1,103 @@
+"""An accelerometer that lags behind its load: the loop, its memory, and a flight that conceals it.
+
+The concealed effect moves from turning point to turning point of the true load; the regressors
+follow what was read, sample by sample.  They share the law and nothing else.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.concealing import Secret
+from benchmarks.explaining import heard
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.inputs.segments import Segment
+from onboard.core.model.regressors import Model
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.accelerometer_hysteresis import PLAY, AccelerometerHysteresis
+from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis as Concealed
+
+ORIGIN = Origin(t0=0.0)
+SIZES = np.array([0.3, -0.2, 0.4])
+
+
+def load(seconds=40.0, rate=100.0, seed=5):
+    """A load of three axes that goes up and down by several m/s^2, and stands still at times."""
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-6.0, 6.0, (3, int(seconds) + 1))
+    corners[:, 10:14] = corners[:, 10:11]
+    f_b = np.column_stack([np.interp(t, np.arange(corners.shape[1]), c) for c in corners])
+    return t, f_b
+
+
+def segment(t, f_b):
+    still = np.zeros((len(t), 3))
+    return Segment(t, still, f_b, t[:2], np.stack([np.eye(3)] * 2), np.eye(3))
+
+
+def read(f_b):
+    """What the concealed sensor reads."""
+    concealed = Concealed(x=SIZES[0], y=SIZES[1], z=SIZES[2], width=2.0 * PLAY)
+    return f_b + concealed.reads_too_much(SimpleNamespace(f_b=f_b))
+
+
+def taken_off(effect, made, t):
+    """By the regressors: what is added to the reading for the true load, (n, 3)."""
+    nodes = SimpleNamespace(t=t, slow=lambda name: made.slow_at(name, t))
+    return effect.acceleration(nodes) @ SIZES
+
+
+def test_about_its_size_the_regressors_give_the_true_load_back():
+    t, f_b = load()
+    reading = read(f_b)
+    effect = AccelerometerHysteresis(ORIGIN).about(SIZES)
+    made = Model([effect]).remembering(segment(t, reading), {})
+    assert reading + taken_off(effect, made, t) == pytest.approx(f_b, abs=1e-9)
+
+
+def test_without_its_size_they_are_right_to_first_order():
+    t, f_b = load()
+    reading = read(f_b)
+    effect = AccelerometerHysteresis(ORIGIN)
+    made = Model([effect]).remembering(segment(t, reading), {})
+    left = reading + taken_off(effect, made, t) - f_b
+    assert np.sqrt(np.mean(left**2)) < 0.4 * np.sqrt(np.mean((reading - f_b) ** 2))
+
+
+def test_the_memory_goes_on_from_segment_to_segment_and_ends_at_a_gap():
+    t, f_b = load()
+    # On a plateau the load alone does not say on which branch it is.
+    cut, overlap = int(np.searchsorted(t, 12.0)), 20
+    effect = AccelerometerHysteresis(ORIGIN)
+    model = Model([effect])
+    whole = model.remembering(segment(t, f_b), {})
+    first = model.remembering(segment(t[:cut], f_b[:cut]), {})
+    rest = segment(t[cut - overlap :], f_b[cut - overlap :])
+    goes_on = model.remembering(rest, first.slow)
+    at = rest.t[::7]
+    np.testing.assert_allclose(
+        goes_on.slow_at(effect.name, at), whole.slow_at(effect.name, at), atol=1e-9
+    )
+    anew = model.remembering(rest, {})
+    assert np.max(np.abs(anew.slow_at(effect.name, at) - whole.slow_at(effect.name, at))) > 0.5
+
+
+def test_a_model_without_memory_leaves_the_segment_as_it_is():
+    t, f_b = load(seconds=12.0)
+    plain = segment(t, f_b)
+    assert Model([]).remembering(plain, {}) is plain
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["copter", "plane"])
+def test_a_flight_that_conceals_it_is_explained(vehicle):
+    concealed = Concealed(x=0.2, y=-0.16, z=0.2)
+    said = diagnose(heard(replace(Secret(501, vehicle, "control").spec(), effects=(concealed,))), 1)
+    assert [e.name for e in said.effects] == ["accelerometer_hysteresis"]
+    for key, q in said.effects[0].unknowns.items():
+        true = getattr(concealed, key)
+        assert abs(q.value - true) < max(0.1 * abs(true), 3.0 * q.sigma), key
+    assert said.mismatch.held_out_after < said.mismatch.held_out_before
