@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.estimate.calibration_record import six_covariance, six_information
-from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator, Event, Restarted
+from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
 from onboard.core.estimate.dead_reckoning import free_errors, intervals
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.events import Event, Restarted
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample

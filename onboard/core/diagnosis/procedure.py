@@ -45,9 +45,9 @@ from onboard.core.diagnosis.timing_effects import (
     standing_effects,
     without,
 )
+from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.engine import moved
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch

@@ -7,16 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import interpolate_rotation
 from onboard.core.maths.interpolation import Hermite
-
-LONGEST_FIX_GAP_S = 2.5
-"""Receivers report at 1 Hz or faster: longer without a fix is an outage, not trusted flight."""
-DENSE_S = 0.15
-"""Attitude samples this close together can be interpolated: between sparser ones a vehicle turns
-in ways that they do not show."""
-NEAR_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
 
 
 class ProofFlight:
     """Learns what is flown between arming and disarming, and nothing else."""
 
-    def __init__(self, settings: EstimatorSettings) -> None:
+    def __init__(self, settings: CalibratorSettings) -> None:
         self._settings = settings
         self._calibrator: Calibrator | None = None
         self._armed = False
