@@ -42,9 +42,10 @@ from onboard.core.diagnosis.timing_effects import (
     standing_effects,
     without,
 )
-from onboard.core.estimate.calibration_record import CONTRADICTION, timing_of
+from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
+from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival

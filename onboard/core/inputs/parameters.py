@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import board_rotation, is_axis_aligned
+from onboard.core.maths.board_orientation import board_rotation, is_axis_aligned
 
 DEFAULT_FILTER_HZ = 20.0
 
