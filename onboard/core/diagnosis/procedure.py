@@ -237,7 +237,7 @@ def _second_thoughts(
         Those that are large enough; of them, those beside which another effect could stand.
     """
     clock = fix_clock(calibrator.parameters, full.batches)
-    told = clock.told_on_stamp
+    told = clock.configured_on_stamp
     index = choice.fitter.model.index
     standing: Standing = {}
     for _ in range(len(STANDING)):

@@ -84,7 +84,7 @@ def standing_effects(
 def _timing(timing: Mapping[str, Estimate], clock: FixClock) -> Standing:
     out: Standing = {}
     delay = timing["gps_delay_s"]
-    off = abs(delay.value - clock.told_on_stamp)
+    off = abs(delay.value - clock.configured_on_stamp)
     if off > LATENCY_S and off > SURE * delay.sigma:
         out["gps_latency"] = (
             {"delay": Quantity(delay.value, delay.sigma, "s")},
@@ -113,7 +113,7 @@ def _of_latency(delay: float, clock: FixClock) -> tuple[str, dict[str, float]]:
         taken = " or ".join(f"{1e3 * lag:.0f}" for lag in clock.assumed)
         return f"none: {clock.name} is 0, for which this receiver's driver takes {taken} ms", {}
     cure = "tell the autopilot the receiver's latency"
-    if not clock.told and clock.assumed:
+    if not clock.configured and clock.assumed:
         taken = " or ".join(f"{1e3 * lag:.0f}" for lag in clock.assumed)
         cure += f" (0 stands for {taken} ms, by its driver)"
     if round(1e3 * clock.late):

@@ -14,7 +14,6 @@ from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import (
-    AntennaPlace,
     AttitudeOffset,
     GpsLatency,
     GpsSmoothing,
@@ -22,6 +21,7 @@ from onboard.core.model.nuisances import (
     GyroTiming,
     HeightLatency,
     ImuDelay,
+    LeverArmError,
     Six,
 )
 from onboard.core.model.regressors import Family, Model
@@ -55,7 +55,7 @@ def calibration_model(
         GyroTiming(),
         GyroScale(),
         AttitudeOffset(),
-        AntennaPlace(),
+        LeverArmError(),
     )
     gone = {f.instead_of for f in more}
     return Model([*(f for f in always if f.name not in gone), *more])

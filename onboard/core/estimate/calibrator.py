@@ -212,7 +212,7 @@ class Calibrator:
         return tuple(self._engines.earlier)
 
     def _parameter(self, parameter: ParameterValue) -> None:
-        """Take a report; what was taken for raw before the six were known, was not raw."""
+        """Take a report; what was taken for raw before the calibration was known, was not raw."""
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)

@@ -55,7 +55,7 @@ def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
         batch: flight.
         coast_s: longest dead reckoning, s.
     """
-    if batch.fresh or batch.fixes.t[0] - made.coasting_since > coast_s:
+    if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
         made.restart()
     return made.process(batch.segment, batch.fixes, batch.trusted)
 

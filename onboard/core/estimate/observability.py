@@ -1,4 +1,4 @@
-"""What a flight can and cannot tell about the six numbers, in percent and in plain words.
+"""What a flight can and cannot tell about the calibration parameters, in percent and in words.
 
 Input is the information that the data alone give (the 6x6 Schur complement of the sums) and
 what was known before (prior sigmas).  A number counts as observed when its posterior sigma

@@ -15,10 +15,15 @@ from onboard.core.maths.interpolation import Hermite
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
-    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed.
+    """GPS epochs with even times.
 
-    ``late`` (n,): how much later they are stamped than the time from which the autopilot counts the
-    receiver's latency, s; empty where that is not known to differ.
+    Attributes:
+        t: (n,) s, boot clock, latency not removed.
+        v_n: (n, 3) velocity, NED, m/s; NaN down where the receiver has no vertical speed.
+        height: (n,) above mean sea level, m.
+        latitude: (n,) rad.
+        late: (n,) how much later they are stamped than the time from which the autopilot counts the
+            receiver's latency, s; empty where that is not known to differ.
     """
 
     t: Array
@@ -50,7 +55,7 @@ class Segment:
         R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
         R_bs: (3, 3) board orientation.
         slow: other signals by name: times (j,) and values (j,) or (j, 3).
-        lever_arm_b: (3,) from the accelerometer to the GPS antenna as it was told, m.
+        lever_arm_b: (3,) configured lever arm, accelerometer to GPS antenna, body axes, m.
     """
 
     t: Array
@@ -88,7 +93,14 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Some seconds of flight.  ``fresh`` if the filter must not continue from the one before."""
+    """Some seconds of flight.
+
+    Attributes:
+        segment: samples that cover the fixes and what is needed around them.
+        fixes: n epochs; the first is the last of the batch before, unless ``fresh``.
+        trusted: (n,) whether the receiver is to be believed there.
+        fresh: the filter must not continue from the batch before.
+    """
 
     segment: Segment
     fixes: Fixes

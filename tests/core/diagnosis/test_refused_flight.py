@@ -165,7 +165,7 @@ def test_what_the_driver_assumes_by_itself_is_not_advised():
     cure, parameters = _of_latency(0.19, FixClock(assumed=(0.2,)))
     assert parameters == {}
     assert cure.startswith("none")
-    _, parameters = _of_latency(0.19, FixClock(told=0.1, assumed=(0.1,)))
+    _, parameters = _of_latency(0.19, FixClock(configured=0.1, assumed=(0.1,)))
     assert parameters == {"GPS1_DELAY_MS": 190.0}
 
 

@@ -1,5 +1,7 @@
 """Dead reckoning against motions that are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,3 +52,14 @@ def test_an_offset_drifts_with_time():
     drift = free_drift(chain, states, [off], horizon_s=60.0)
     assert drift.end[0] == pytest.approx(0.6, rel=0.01)
     assert drift.rms[0] == pytest.approx(0.6 / np.sqrt(3.0), rel=0.02)
+
+
+@pytest.mark.parametrize("since", [0.0, 0.137, 1234.5678, 98765.4321])
+def test_which_windows_are_looked_at_does_not_depend_on_when_the_clock_began(since):
+    """Windows that follow on a grid of epochs: sums of times must not decide by rounding."""
+    chain, states, force = steady(np.array([20.0, 0.0, 0.0]), 240.0)
+    chain = [replace(x, start=since + x.start, end=since + x.end) for x in chain]
+    states = [replace(states[0], t=since)] + [replace(states[0], t=x.end) for x in chain]
+    six = np.concatenate([np.ones(3), force])
+    drift = free_drift(chain, states, [six], horizon_s=60.0, most=4)
+    assert drift.windows == 4
