@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.matched import draw, path
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
@@ -27,10 +27,10 @@ REPEATS = 5
 BETWEEN_FLIGHTS_S = 3.0
 PARTS = 8
 """Blocks of the long stream that are timed one by one."""
-ONCE = replace(EstimatorSettings(), refine=False)
+ONCE = replace(CalibratorSettings(), refine=False)
 
 
-def _seconds(samples: list[Sample], settings: EstimatorSettings) -> tuple[float, Calibrator]:
+def _seconds(samples: list[Sample], settings: CalibratorSettings) -> tuple[float, Calibrator]:
     made = Calibrator(settings)
     began = time.process_time()
     for sample in samples:
@@ -46,7 +46,7 @@ def per_sample(samples: list[Sample]) -> list[str]:
     others: list[Sample] = [s for s in samples if not isinstance(s, GpsFix)]
     inertial, whole, refined = (
         float(np.median([_seconds(x, settings)[0] for _ in range(REPEATS)]))
-        for x, settings in ((others, ONCE), (samples, ONCE), (samples, EstimatorSettings()))
+        for x, settings in ((others, ONCE), (samples, ONCE), (samples, CalibratorSettings()))
     )
     length = imu / 50.0
     return [

@@ -20,7 +20,7 @@ from benchmarks.recorded import Array, Flight, error_of, fed
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from sitl.builtin.world import Vehicle
 
 VEHICLES: tuple[Vehicle, ...] = ("copter", "plane")
@@ -28,7 +28,7 @@ VEHICLES: tuple[Vehicle, ...] = ("copter", "plane")
 
 def told(made: Calibrator, flight: Flight) -> Array:
     """(6,) error of an engine that is told the levels of noise, over the same flight."""
-    settings = replace(EstimatorSettings(), refine=False)
+    settings = replace(CalibratorSettings(), refine=False)
     engine = Engine(settings, np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), noise=LEVELS)
     for batch in made.engine(1).batches:
         engine.add(batch)

@@ -26,7 +26,7 @@ from benchmarks.concealing import LEVELS, Challenge, Secret
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages, truth_record
@@ -118,7 +118,7 @@ def one(secret: Secret) -> Outcome:
 
 def heard(spec: FlightSpec) -> Calibrator:
     """A calibrator that has listened to all of a flight."""
-    calibrator = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0))
+    calibrator = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0))
     decoder = Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):

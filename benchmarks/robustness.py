@@ -27,7 +27,7 @@ from benchmarks.recorded import (
 )
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Status
-from onboard.core.gps.trust import WindowClosed
+from onboard.core.gps.distrust import WindowClosed
 from sitl.builtin.truth import random_imus
 from sitl.builtin.world import Vehicle
 from sitl.recording import FlightSpec

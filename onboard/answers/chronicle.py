@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.estimate.calibration_record import six_covariance, six_information
-from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator, Event, Restarted
+from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
 from onboard.core.estimate.dead_reckoning import free_errors, intervals
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.events import Event, Restarted
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.maths.accelerometer import parameters_of
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -236,12 +238,11 @@ class Chronicle:
         for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
             solution = engine.solution() if i == last else None
             solution = solution or solve(blocks[: i + 1], engine.model)
-            scale = solution.theta[:3]
             seen = assess(six_information(solution), engine.settings.needs)
             rows.append(
                 (
                     np.array([times[i]]),
-                    np.concatenate([scale, -solution.theta[3:6] / scale]),
+                    parameters_of(solution.theta),
                     np.sqrt(np.diag(six_covariance(solution))),
                     self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
@@ -268,8 +269,7 @@ class Chronicle:
         if solution is None:
             raise KeyError(imu)
         held = self.calibrator.parameters.six(imu)
-        scale = np.array(held.scale)
-        sixes = (np.concatenate([scale, -scale * np.array(held.offset)]), solution.theta[:6])
+        sixes = (held.as_linear(), solution.theta[:6])
         chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
         states = list(engine.states)
         known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}

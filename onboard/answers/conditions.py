@@ -14,7 +14,7 @@ import numpy as np
 
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.core.maths.frames import board_rotation
+from onboard.core.maths.board_orientation import board_rotation
 from onboard.core.physics.catalogue import kind_of
 from onboard.core.physics.effect import AXES, Bearing
 

@@ -19,13 +19,13 @@ from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Status
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import Sample
 
 PAUSE_S = 10.0
 """Between two recordings."""
 NO_FLIGHT = "no stretch of flight with trusted GPS and inertial data"
-KEEPING_ALL = EstimatorSettings(refine=False, buffer_s=math.inf)
+KEEPING_ALL = CalibratorSettings(refine=False, buffer_s=math.inf)
 
 
 class Recorded:

@@ -6,7 +6,7 @@ import pytest
 
 from onboard.answers.answer import Answer, diagnosed
 from onboard.core.estimate.result import Status
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
 from onboard.daemon.learning import examiner as examiner_module
 from onboard.daemon.learning.learner import Identity, Learner
@@ -17,7 +17,7 @@ from sitl.recording import FlightSpec, fly_messages
 
 BOARD = Identity(1, board="0a0b0c")
 TWO = (ImuTruth(scale=(1.02, 0.985, 1.015)), ImuTruth(offset=(0.2, -0.15, 0.3)))
-SETTINGS = EstimatorSettings(refine=False, buffer_s=60.0)
+SETTINGS = CalibratorSettings(refine=False, buffer_s=60.0)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.daemon.learning import learning as learning_module
 from onboard.daemon.learning.learner import Identity, Learner
 from onboard.daemon.learning.learning import Learning
@@ -36,7 +36,7 @@ async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
     now, told = 0.0, False
     learning = Learning(
-        Learner(Store(directory), EstimatorSettings(), clock=lambda: now, wall_clock=lambda: now),
+        Learner(Store(directory), CalibratorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
         judging=lambda: False,
         identity=lambda: Identity(1),

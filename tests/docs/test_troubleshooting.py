@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.gps.trust import Reason as Distrust
+from onboard.core.gps.distrust import Distrust
 from onboard.daemon.outlets.announcer import LINES
 from onboard.daemon.outlets.parameter_view import REASONS
 from onboard.push.policy import Objection

@@ -8,7 +8,7 @@ import pytest
 
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Status
-from onboard.core.gps.trust import Reason
+from onboard.core.gps.distrust import Distrust
 from onboard.core.physics.catalogue import kinds
 from onboard.daemon.outlets import parameter_view
 from onboard.daemon.outlets.parameter_view import (
@@ -113,7 +113,7 @@ def test_trust_and_why_not():
 def test_tables_know_every_word_of_the_service():
     assert set(POLICIES) == {mode.value for mode in Mode}
     assert {status.value for status in Status} < set(STATUSES) == set(NAMES)
-    assert set(REASONS) == {reason.value for reason in Reason}
+    assert set(REASONS) == {reason.value for reason in Distrust}
     for table in (STATES, STATUSES, REASONS, FINDINGS):
         assert len(set(table.values())) == len(table)
 

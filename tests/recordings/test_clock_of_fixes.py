@@ -10,7 +10,7 @@ import pytest
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import GpsFix, ImuSample
 from onboard.mavlink.decode import Decoder
 from onboard.recordings.opening import open_recording
@@ -21,7 +21,7 @@ from tests.recordings.simulated_log import logged
 
 
 def diagnosed(samples):
-    made = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0))
+    made = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0))
     for sample in samples:
         made.feed(sample)
     made.finish()

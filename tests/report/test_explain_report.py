@@ -11,7 +11,7 @@ from onboard.answers.explain_document import explain_document
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Mismatch, Series, Verdict
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.mavlink.decode import Decoder
 from onboard.report.explain import explain_html
 from onboard.report.parameters import parameter_text
@@ -43,7 +43,7 @@ class Balanced(HTMLParser):
 def diagnosis():
     arm = GpsLeverArm(x=0.8, y=-0.5, z=-0.4)
     spec = FlightSpec(vehicle="copter", seed=3, duration=150.0, imus=random_imus(3), effects=(arm,))
-    calibrator, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    calibrator, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):
             calibrator.feed(sample)

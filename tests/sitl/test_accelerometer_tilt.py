@@ -8,7 +8,7 @@ import pytest
 
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.mavlink.decode import Decoder
 from sitl import harness
 from tests.sitl.listener import Listener
@@ -48,7 +48,7 @@ async def flown(kind, **parameters):
         np.mean([(m.roll, m.pitch) for m in flight if m.get_type() == name], axis=0)
         for name in ("ATTITUDE", "SIMSTATE")
     )
-    decoder, made = Decoder(), Calibrator(EstimatorSettings(buffer_s=3600.0, refine=False))
+    decoder, made = Decoder(), Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
     for message in listener.messages:
         for sample in decoder.decode(message):
             made.feed(sample)

@@ -44,13 +44,14 @@ from onboard.core.diagnosis.standing import (
     timing_unknowns,
     without,
 )
-from onboard.core.estimate.calibration_record import CONTRADICTION, timing_of
+from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
+from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
-from onboard.core.model.nuisances import AntennaPlace
+from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds, response_of
 from onboard.core.physics.effect import Cure, Effect, Origin, Standing
 from onboard.core.physics.effects.mount_tilt import trim_in_words
@@ -174,7 +175,7 @@ class Judge:
 
     def _held(self, names: Sequence[str]) -> Array:
         """Unknowns of ``names`` at the value that means *not in the model*."""
-        told = self.clock.told_on_stamp
+        told = self.clock.configured_on_stamp
         return without(names, self.index, self.engine.point, self.engine.absent, told)
 
     def _ladder(self) -> tuple[tuple[Rung, ...], list[Fit]]:
@@ -242,7 +243,7 @@ class Judge:
         return any(bic >= MARGIN and held >= HELD_OUT_GAIN for bic, held in every)
 
     def _told_antenna(self) -> list[int]:
-        place = self.engine.model.slices.get(AntennaPlace.name, slice(0, 0))
+        place = self.engine.model.slices.get(LeverArmError.name, slice(0, 0))
         return [i for i in self.all if not place.start <= i < place.stop]
 
     def _standing_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
@@ -250,7 +251,7 @@ class Judge:
         choice, full = self.choice, self.choice.fitter.model.index
         target = Candidate(name, tuple(full[c] for c in columns), ())
         rest = [i for i in choice.free if i not in target.index]
-        told = self.clock.told_on_stamp
+        told = self.clock.configured_on_stamp
         held = without(columns, full, self.full_point, choice.fitter.absent, told)
         others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
         return tuple(confounders_of(choice.fitter, rest, target, others, held))
@@ -410,7 +411,7 @@ class Judge:
                 out += [
                     Ambiguity((e.name, k.effect), k.apart)
                     for k in kinds()
-                    if k.instead_of == AntennaPlace.name
+                    if k.instead_of == LeverArmError.name
                 ]
         out += [
             Ambiguity((name, *others), standing_kinds()[name].apart)

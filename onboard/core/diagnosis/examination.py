@@ -13,14 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.diagnosis.standing import attitude_unknowns
-from onboard.core.estimate.engine import Engine, moved
+from onboard.core.estimate.calibration_model import moved
+from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.solution import Solution, solve
-from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace, PassResult
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import Effect
@@ -80,11 +78,12 @@ class Examination(Engine):
             point,
             origin.noise,
             more=tuple(families),
+            observer=self,
         )
         self.batches = list(like.batches if batches is None else batches)
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
-        self._sample = _sampled(self.batches)
+        self.sample = _sampled(self.batches)
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
@@ -96,11 +95,13 @@ class Examination(Engine):
         self.tune(NOISE_ROUNDS, NOISE_ROUNDS - 1)
         return self
 
-    def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
-        made = super()._new_pass(members)
-        made.keep_traces = members is None
+    def begin(self) -> None:
+        """A pass begins: its epochs are kept, those of the one before are not."""
         self.traces = []
-        return made
+
+    def take(self, result: PassResult) -> None:
+        """Keep the epochs of a batch that has gone through."""
+        self.traces.extend(result.traces)
 
     def with_rows(self, theta: Array | None = None, covariance: Array | None = None) -> Examination:
         """Go through the whole flight, keep every row; again if timing was off or gates were blind.
@@ -165,31 +166,6 @@ class Examination(Engine):
         mine = [i for i, u in enumerate(self.model.unknowns) if u.name not in attitude]
         sigma = np.sqrt(np.diag(after.covariance))[mine]
         return bool(np.max(np.abs(after.theta - before.theta)[mine] / sigma) > AGREE)
-
-    def once(self, held: tuple[Array, Array] | None = None) -> None:
-        """Go through the whole flight as it is linearised; ``held`` are what gates know."""
-        self._pass = self._new_pass()
-        if held is not None:
-            self._pass.hold(*held)
-        self.refused.clear()
-        self.states.clear()
-        self.blocks = []
-        for batch in self.batches:
-            self._run(batch)
-
-    def through(self, made: Pass, batch: Batch) -> PassResult:
-        """One batch through a pass, its rows kept."""
-        result = super().through(made, batch)
-        self.traces.extend(result.traces)
-        return result
-
-    def _over_buffer(self, made: Pass) -> list[Block]:
-        """The sample only: noise and timing are what is asked of these passes."""
-        out = []
-        for part in self._sample:
-            made.restart()
-            out += [self.through(made, batch).block for batch in part]
-        return out
 
     @property
     def absent(self) -> Array:

@@ -13,9 +13,10 @@ import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.records import Plain
+from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibration_record import six_covariance
-from onboard.core.estimate.engine import calibration_model
 from onboard.core.estimate.solution import solve
+from onboard.core.maths.accelerometer import parameters_of
 from onboard.core.maths.blocks import Block
 from onboard.core.physics.effect import Effect
 
@@ -30,7 +31,7 @@ def plain_six(final: Examination, families: Sequence[Effect]) -> Plain:
         final: the model with them.
         families: effects whose columns are in it.
     """
-    model = calibration_model(final.point, final.prior, final.settings)
+    model = calibration_model(final.point, final.prior, final.settings.needs)
     stands_for = {f.instead_of: f.name for f in families if f.instead_of}
     index = [
         i
@@ -45,8 +46,7 @@ def plain_six(final: Examination, families: Sequence[Effect]) -> Plain:
         [Block(p.start, p.end, p.sums.shifted(at).subset(index)) for p in final.all_blocks],
         model,
     )
-    scale, beta = solution.theta[:3], solution.theta[3:6]
-    value = np.concatenate([scale, -beta / scale])
+    value = parameters_of(solution.theta)
     sigma = np.sqrt(np.diag(six_covariance(solution)))
     return Plain(
         tuple(float(x) for x in value),  # type: ignore[arg-type] # six by construction

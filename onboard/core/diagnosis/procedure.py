@@ -44,9 +44,9 @@ from onboard.core.diagnosis.standing import (
     without,
 )
 from onboard.core.diagnosis.testability import testable_of, unseen_share
+from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.engine import moved
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
@@ -230,7 +230,7 @@ def _second_thoughts(
         Those that are large enough; of them, those beside which another effect could stand.
     """
     clock = fix_clock(calibrator.parameters, full.batches)
-    told = clock.told_on_stamp
+    told = clock.configured_on_stamp
     index = choice.fitter.model.index
     standing: Measured = {}
     unknowns = {name: kind.in_every_model for name, kind in standing_kinds().items()}

@@ -7,27 +7,26 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from onboard.core.diagnosis.records import Unused
-from onboard.core.gps.trust import Reason, Refusal
+from onboard.core.gps.distrust import Distrust, RefusedFixes
+from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.finding import Finding
 
 OPINIONS: Final = frozenset(
     {
-        Reason.SPOOFED,
-        Reason.JAMMED,
-        Reason.FEW_SATELLITES,
-        Reason.HDOP,
-        Reason.SPEED_ACCURACY,
-        Reason.GPS_GLITCH,
-        Reason.EKF_GPS_GLITCH,
-        Reason.EKF_UNHEALTHY,
+        Distrust.SPOOFED,
+        Distrust.JAMMED,
+        Distrust.FEW_SATELLITES,
+        Distrust.HDOP,
+        Distrust.SPEED_ACCURACY,
+        Distrust.GPS_GLITCH,
+        Distrust.EKF_GPS_GLITCH,
+        Distrust.EKF_UNHEALTHY,
     }
 )
 """Reasons to refuse a receiver that has a fix and goes on reporting: the inertia can be asked."""
 SAME_FIX_S = 0.1
 """Times in a batch are even, those of the trust window are as stamped: jitter is between them."""
-LONGEST_FIX_GAP_S = 2.5
-"""Receivers report at 1 Hz or faster: longer without a fix is an outage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +35,10 @@ class Refused:
 
     start: float
     end: float
-    reason: Reason
+    reason: Distrust
 
 
-def refused(batches: Sequence[Batch], refusals: Sequence[Refusal]) -> list[Refused]:
+def refused(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> list[Refused]:
     """Flight that was not used, in order of time, each segment with one reason.
 
     A segment goes from the first fix that was refused to the next one that was believed.
@@ -58,7 +57,7 @@ def refused(batches: Sequence[Batch], refusals: Sequence[Refusal]) -> list[Refus
             if opened and again:
                 out[-1] = replace(out[-1], end=t)
             elif again and t - last > LONGEST_FIX_GAP_S:
-                out.append(Refused(last, t, Reason.GPS_GAP))
+                out.append(Refused(last, t, Distrust.GPS_GAP))
             reason = None if believed else _reason(t, refusals)
             if reason is not None and not (opened and again and out[-1].reason is reason):
                 out.append(Refused(t, t, reason))
@@ -78,7 +77,7 @@ def believed(batches: Sequence[Batch]) -> int:
 
 def unused_flight(
     batches: Sequence[Batch],
-    refusals: Sequence[Refusal],
+    refusals: Sequence[RefusedFixes],
     fault: Finding | None,
     t0: float,
     *,
@@ -95,7 +94,7 @@ def unused_flight(
     return tuple(out)
 
 
-def _reason(t: float, refusals: Sequence[Refusal]) -> Reason | None:
+def _reason(t: float, refusals: Sequence[RefusedFixes]) -> Distrust | None:
     """Why the fix at ``t`` was refused: by the refusal that is nearest; None if none is near."""
     off = [(max(r.start - t, t - r.end, 0.0), k) for k, r in enumerate(refusals)]
     nearest, k = min(off, default=(float("inf"), 0))

@@ -23,7 +23,7 @@ def regime_of(batch: Batch) -> str:
     """The word for what a batch of flight mostly was."""
     s = batch.segment
     turn = float(np.sqrt(np.mean(s.w_b[:, 2] ** 2)))
-    load = float(np.percentile(-s.raw_s[:, 2], 90)) / STANDARD_GRAVITY
+    load = float(np.percentile(-(s.raw_s @ s.R_bs.T)[:, 2], 90)) / STANDARD_GRAVITY
     speed = np.linalg.norm(np.nan_to_num(batch.fixes.v_n[:, :2]), axis=1)
     surge = float(np.std(speed))
     climb = float(np.ptp(batch.fixes.height)) / max(batch.duration, 1e-3)

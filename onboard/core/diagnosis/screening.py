@@ -18,11 +18,11 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.faults import fault_effect
 from onboard.core.diagnosis.refusals import OPINIONS, refused
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.engine import Engine, through
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.gps.trust import Reason
+from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Finding
@@ -137,7 +137,7 @@ def _asked_again(
             heard = np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
             t = full.point.true_time(batch.fixes.t)
             asked = replace(batch, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
-        traces.extend(Engine.through(full, made, asked).traces)
+        traces.extend(through(made, asked, full.settings.coast_s).traces)
     return traces
 
 
@@ -158,7 +158,7 @@ def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tu
     bad = np.concatenate([~c.trusted for c in full.batches])
     step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
     closed = step * calibrator.trust.rejected.get("gps_glitch", 0)
-    if closed <= 2.0 * calibrator.settings.trust.recovery[Reason.GPS_GLITCH]:
+    if closed <= 2.0 * calibrator.settings.trust.recovery[Distrust.GPS_GLITCH]:
         return []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(int)))
     spans = zip(t[edges[::2]], t[edges[1::2] - 1], strict=True)

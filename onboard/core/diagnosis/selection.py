@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.estimate.solution import FOLDS, solve, total
+from onboard.core.estimate.limits import FOLDS
+from onboard.core.estimate.solution import solve, total
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums

@@ -16,20 +16,14 @@ little to *confirm* anything, and what was learned waits.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import CHI_SQUARE_6_999, STRANGER
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
-
-CHI_SQUARE_6_999: Final = 22.46
-"""Exceeded once in a thousand times by a chi-square of six degrees of freedom."""
-STRANGER: Final = 0.01
-"""Probability with which another sensor may pass for this one."""
 
 
 def agrees(engine: Engine, saved: SavedEngine) -> bool | None:

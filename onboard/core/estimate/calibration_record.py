@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
+
 import numpy as np
 
 from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import (
+    APART_S,
+    CONTRADICTION,
+    FEWEST_OBSERVED,
+    LONG_DRIFT_S,
+    LONG_DRIFTS,
+    OFFSET_FLOOR,
+    SCALE_FLOOR,
+    SHORT_DRIFT_S,
+    SHORT_DRIFTS,
+    TIMING_FLOOR_S,
+)
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.result import (
     Calibration,
@@ -16,15 +31,10 @@ from onboard.core.estimate.result import (
     Status,
 )
 from onboard.core.estimate.solution import Solution, fitted_rms, held_out
+from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
 from onboard.core.maths.arrays import Array, Vector3
-
-SCALE_FLOOR = 5e-4
-OFFSET_FLOOR = 1e-3
-"""What the model does not know (filters, interpolation, clocks) limits every flight to this."""
-FEWEST_OBSERVED = 3
-CONTRADICTION = 6.0
-"""Inflation of the variance past which blocks of one flight ask for different parameters."""
 
 
 def calibration_of(
@@ -38,33 +48,34 @@ def calibration_of(
 ) -> Calibration:
     """Everything about one accelerometer, cheap enough for once a second.
 
-    ``kind`` is that of the vehicle, for the advice.
+    Args:
+        imu: which accelerometer.
+        engine: has its sums.
+        parameters: in force.
+        finished: whether no more flight will come.
+        rejected: what was refused before it reached the engine, by name.
+        kind: of the vehicle, for the advice.
+
+    Raises:
+        KeyError: no flight was processed.
     """
-    in_force = parameters.six(imu)
     solution = engine.solution()
-    refused = dict(rejected)
-    for name, count in engine.refused.items():
-        key = {"velocity": "innovation", "height": "height_innovation"}.get(name, name)
-        refused[key] = refused.get(key, 0) + count
     if solution is None:
         raise KeyError(imu)
-    scale = solution.theta[:3]
-    beta = solution.theta[3:6]
-    offset = -beta / scale
+    in_force = parameters.six(imu)
+    value = parameters_of(solution.theta)
     covariance = six_covariance(solution)
+    sigma = np.sqrt(np.diag(covariance))
     seen = assess(six_information(solution), engine.settings.needs, kind)
     status, note = _status(engine, solution, seen, parameters, finished=finished)
-    held_scale, held_offset = np.array(in_force.scale), np.array(in_force.offset)
-    force_six = np.concatenate([held_scale, -held_scale * held_offset])
-    fixed = {i: float(x) for i, x in enumerate(force_six)}
+    held = {i: float(x) for i, x in enumerate(in_force.as_linear())}
     blocks, model = engine.all_blocks, engine.model
-    sigma = np.sqrt(np.diag(covariance))
-    long, short = _drifts(engine, force_six, solution.theta[:6])
+    long, short = _drifts(engine, in_force.as_linear(), solution.theta[:6])
     return Calibration(
         imu=imu,
         status=status,
-        scale=_three(scale),
-        offset=_three(offset),
+        scale=_three(value[:3]),
+        offset=_three(value[3:]),
         scale_sigma=_three(sigma[:3]),
         offset_sigma=_three(sigma[3:]),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
@@ -75,10 +86,10 @@ def calibration_of(
         parameters_known=parameters.known(imu),
         timing=timing_of(engine, solution),
         trusted_s=engine.trusted_s,
-        rejected=refused,
-        whitened_rms_before=fitted_rms(blocks, model, fixed),
+        rejected=_refused(rejected, engine.refused),
+        whitened_rms_before=fitted_rms(blocks, model, held),
         whitened_rms_after=fitted_rms(blocks, model),
-        held_out_before=held_out(blocks, model, fixed),
+        held_out_before=held_out(blocks, model, held),
         held_out_after=held_out(blocks, model),
         velocity_rms_before=float("nan") if short is None else float(short.rms[0]),
         velocity_rms_after=float("nan") if short is None else float(short.rms[1]),
@@ -91,9 +102,18 @@ def calibration_of(
     )
 
 
+def _refused(before: Mapping[str, int], gates: Mapping[str, int]) -> dict[str, int]:
+    """Counts of what was refused on the way and by the gates, by name."""
+    names = {"velocity": "innovation", "height": "height_innovation"}
+    refused = Counter(before)
+    for name, count in gates.items():
+        refused[names.get(name, name)] += count
+    return dict(refused)
+
+
 def six_covariance(solution: Solution) -> Array:
-    """(6, 6) covariance of (scale, offset) with the floor of what the model does not know."""
-    J = offset_jacobian(solution.theta)
+    """Covariance (6, 6) of scale (1) and offset (m/s^2), with a floor for what no model knows."""
+    J = parameters_jacobian(solution.theta)
     C = J @ solution.covariance[:6, :6] @ J.T
     floor = np.array([SCALE_FLOOR**2] * 3 + [OFFSET_FLOOR**2] * 3)
     out: Array = C + np.diag(floor)
@@ -101,25 +121,15 @@ def six_covariance(solution: Solution) -> Array:
 
 
 def six_information(solution: Solution) -> Array:
-    """(6, 6) information of the data alone on (scale, offset), nuisances eliminated."""
+    """Information (6, 6) on scale and offset from the data alone, nuisances eliminated."""
     N = solution.information
     nuisance = np.linalg.inv(solution.covariance)[6:, 6:]
     # The nuisances keep their priors: the covariance of everything has them, the data do not.
     cross = N[:6, 6:]
     S = N[:6, :6] - cross @ np.linalg.solve(nuisance, cross.T)
-    back = np.linalg.inv(offset_jacobian(solution.theta))
+    back = np.linalg.inv(parameters_jacobian(solution.theta))
     out: Array = back.T @ S @ back
     return (out + out.T) / 2
-
-
-def offset_jacobian(theta: Array) -> Array:
-    """d(scale, offset) / d(scale, beta) at ``theta``; ``offset = -beta / scale``."""
-    scale, beta = theta[:3], theta[3:6]
-    J = np.zeros((6, 6))
-    J[range(3), range(3)] = 1.0
-    J[range(3, 6), range(3)] = beta / scale**2
-    J[range(3, 6), range(3, 6)] = -1.0 / scale
-    return J
 
 
 def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:
@@ -134,12 +144,13 @@ def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:
     window_sigma = spread / (2.0 * max(window, float(np.sqrt(spread)) / 2.0))
     return {
         "gps_delay_s": Estimate(
-            engine.point.delay + float(solution.theta[delay]), float(np.hypot(sigma[delay], 5e-4))
+            engine.point.delay + float(solution.theta[delay]),
+            float(np.hypot(sigma[delay], TIMING_FLOOR_S)),
         ),
         "gps_smoothing_window_s": Estimate(window, window_sigma),
         "imu_delay_s": Estimate(
             engine.point.attitude_delay + float(solution.theta[attitude]),
-            float(np.hypot(sigma[attitude], 5e-4)),
+            float(np.hypot(sigma[attitude], TIMING_FLOOR_S)),
         ),
     }
 
@@ -183,17 +194,17 @@ def _certificate(engine: Engine) -> Certificate | None:
     # A reboot or another file sets the clock back: windows of their own, on a clock that goes on.
     back = np.flatnonzero(np.diff(t) <= 0.0) + 1
     for i in back:
-        t[i:] += t[i - 1] - t[i] + 10.0
-    return certify(t, residual, gap=2.5)
+        t[i:] += t[i - 1] - t[i] + APART_S
+    return certify(t, residual, gap=LONGEST_FIX_GAP_S)
 
 
 def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, Drift | None]:
-    """Free drift over 60 s and over 10 s, parameters in force against the estimate."""
+    """Free drift over a long and a short horizon; ``before``, ``after`` (6,) are scale, beta."""
     chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
     states = list(engine.states)
     return (
-        free_drift(chain, states, (before, after), horizon_s=60.0),
-        free_drift(chain, states, (before, after), horizon_s=10.0, most=12),
+        free_drift(chain, states, (before, after), horizon_s=LONG_DRIFT_S, most=LONG_DRIFTS),
+        free_drift(chain, states, (before, after), horizon_s=SHORT_DRIFT_S, most=SHORT_DRIFTS),
     )
 
 

@@ -1,8 +1,11 @@
-"""How far velocity drifts when it is only integrated: the parameters in force against the estimate.
+"""Dead reckoning: how far velocity drifts when it is only integrated, for several calibrations.
 
-Starts from the filter's velocity at an epoch and integrates the accelerometer alone along the
-filter's attitude, so that what is left is the accelerometer's error and not the gyroscope's drift;
-compared with GPS where GPS is there to tell.
+It starts from the filter's velocity at an epoch and integrates
+
+    dv_n/dt = R_nb f_b + (0, 0, g) - (2 w_ie + w_en) x v_n
+
+along the filter's attitude, so that what is left is the accelerometer's error and not the
+gyroscope's drift; it is compared with GPS where GPS is there to tell.
 """
 
 from __future__ import annotations
@@ -12,18 +15,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.estimate.limits import FEWEST_INTERVALS, LONG_DRIFTS, SAME_EPOCH_S, WHOLE_SHARE
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
 from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.maths.small_turns import turn_by
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import NodeMaker
 
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Drift (m/s) per window at its end, and root mean square inside, for several sets of six."""
+    """Drift of dead reckoning for several calibrations, median over windows.
+
+    Attributes:
+        horizon_s: length of a window, s.
+        end: (sets,) length of the velocity error at a window's end, m/s.
+        rms: (sets,) root mean square of it inside, m/s.
+        windows: how many.
+    """
 
     horizon_s: float
     end: Array
@@ -37,14 +49,14 @@ def free_drift(
     sixes: Sequence[Array],
     *,
     horizon_s: float,
-    most: int = 6,
+    most: int = LONG_DRIFTS,
 ) -> Drift | None:
     """Integrate freely over windows spread over the flight.
 
     Args:
         chain: integrals between epochs (:func:`intervals`), in order of time.
         states: filter states at epochs.
-        sixes: sets of (6,) scale, beta to compare.
+        sixes: sets to compare, each (6,) scale (1) and beta (m/s^2), sensor axes.
         horizon_s: length of a window.
         most: windows at the most.
 
@@ -61,13 +73,14 @@ def free_drift(
     spacing = max(horizon_s, span / most)
     attitude = {round(state.t, 3): state.R_nb for state in states}
     for state in states:
-        if state.t < last + spacing:
+        # Epochs are on a grid: the sum must not decide by rounding.
+        if state.t < last + spacing - SAME_EPOCH_S:
             continue
-        k = int(np.searchsorted(start, state.t - 1e-3))
-        if k >= len(chain) or abs(start[k] - state.t) > 1e-3:
+        k = int(np.searchsorted(start, state.t - SAME_EPOCH_S))
+        if k >= len(chain) or abs(start[k] - state.t) > SAME_EPOCH_S:
             continue
-        stop = int(np.searchsorted(end, state.t + horizon_s + 1e-3, side="right"))
-        if stop - k < 3 or end[stop - 1] - state.t < 0.97 * horizon_s:
+        stop = int(np.searchsorted(end, state.t + horizon_s + SAME_EPOCH_S, side="right"))
+        if stop - k < FEWEST_INTERVALS or end[stop - 1] - state.t < WHOLE_SHARE * horizon_s:
             continue
         if np.any(np.abs(start[k + 1 : stop] - end[k : stop - 1]) > 1e-6):
             continue
@@ -114,7 +127,7 @@ def free_errors(
     Args:
         chain: integrals between epochs (:func:`intervals`), in order of time.
         states: filter states at epochs.
-        sixes: sets of (6,) scale, beta to compare.
+        sixes: sets to compare, each (6,) scale (1) and beta (m/s^2), sensor axes.
         horizon_s: length of a window.
     """
     start = np.array([x.start for x in chain])
@@ -123,14 +136,18 @@ def free_errors(
     times, errors = [np.zeros(0)], [np.zeros((len(sixes), 0))]
     reached = -np.inf
     for state in states:
-        k = int(np.searchsorted(start, state.t - 1e-3))
-        if state.t < reached - 1e-3 or k >= len(chain) or abs(start[k] - state.t) > 1e-3:
+        k = int(np.searchsorted(start, state.t - SAME_EPOCH_S))
+        if (
+            state.t < reached - SAME_EPOCH_S
+            or k >= len(chain)
+            or abs(start[k] - state.t) > SAME_EPOCH_S
+        ):
             continue
         stop = k + 1
         while (
             stop < len(chain)
             and abs(start[stop] - end[stop - 1]) < 1e-6
-            and end[stop] - state.t < horizon_s + 1e-3
+            and end[stop] - state.t < horizon_s + SAME_EPOCH_S
         ):
             stop += 1
         error = _errors(chain[k:stop], state, sixes, attitude)
@@ -152,15 +169,25 @@ def intervals(pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Integrals of one interval between epochs, body axes of its start."""
+    """Integrals of one interval between epochs, in body axes of its start.
+
+    Attributes:
+        start: s, boot clock, latency removed.
+        end: s.
+        turn: (3, 3) body axes at the end to those at the start.
+        by_scale: (3, 3) velocity gained per unit of each scale, m/s.
+        by_offset: (3, 3) velocity gained per unit of each beta, s.
+        velocity: (3,) of GPS at the end, NED, m/s; NaN where there is none.
+        latitude: there, rad.
+    """
 
     start: float
     end: float
     turn: Array
     by_scale: Array
     by_offset: Array
-    by_bias: Array
     velocity: Array
+    latitude: float
 
     @staticmethod
     def of_piece(segment: Segment, fixes: Fixes, point: Linearisation) -> list[Interval]:
@@ -179,8 +206,8 @@ class Interval:
                 nodes.P[k, -1],
                 by_scale[k],
                 whole[k] @ segment.R_bs,
-                whole[k],
                 fixes.v_n[k + 1],
+                float(fixes.latitude[k + 1]),
             )
             for k in range(len(t) - 1)
         ]
@@ -218,12 +245,14 @@ def _errors(
     for k, x in enumerate(chain):
         T = x.end - x.start
         # The bias turns the interval's increments by R(-b T) to first order.
+        turn_n = np.zeros(3)
         for i, six in enumerate(sixes):
-            v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:])
+            coriolis, turn_n = carried_and_turning(x.latitude, v[i])
+            v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:]) + coriolis * T
             v[i, 2] += STANDARD_GRAVITY * T
         at_end = attitude.get(round(x.end, 3))
         if at_end is None:
-            at_end = R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+            at_end = turn_by(-turn_n * T) @ R @ x.turn @ rotation_from_vector(-state.bias_b * T)
         R = at_end
         seen = np.isfinite(x.velocity)
         if seen[0]:

@@ -1,7 +1,7 @@
 """One accelerometer's estimator: buffered batches of flight, passes over them, one solution.
 
 Sums are only as good as the point about which latency, averaging span and noise were taken.  So
-the last minutes of flight are kept; after :attr:`EstimatorSettings.refine_at_s` of trusted
+the last minutes of flight are kept; after :attr:`CalibratorSettings.refine_at_s` of trusted
 flight, and when the recording ends, timing and noise are estimated from the buffer and the sums
 made anew from it.  Flight that has left the buffer stays in the sums as it was taken.
 """
@@ -10,12 +10,23 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.calibration_model import calibration_model, moved
+from onboard.core.estimate.limits import (
+    MOST_AGED,
+    MOST_STATES,
+    NEW_SHARE,
+    NOISE_ROUNDS,
+    ROUNDS,
+    STEADY,
+)
+from onboard.core.estimate.noise_search import NoiseSearch
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
-from onboard.core.filter.noise import NoiseLevels, distance, line_search, stencil, stepped
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochState, PassResult
 from onboard.core.filter.whitening import Uses
@@ -23,94 +34,30 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
 from onboard.core.model.linearisation import MOVING, Linearisation
-from onboard.core.model.nuisances import (
-    AntennaPlace,
-    AttitudeOffset,
-    GpsLatency,
-    GpsSmoothing,
-    GyroScale,
-    GyroTiming,
-    HeightLatency,
-    ImuDelay,
-    Six,
-)
 from onboard.core.model.regressors import Family, Model
 
-ROUNDS = 4
-"""Rounds of a refinement: latency is found to a millisecond in two or three."""
-NOISE_ROUNDS = 3
-"""Rounds that may begin a search for noise levels; each search takes two."""
-SETTLED = 0.15
-"""Levels closer than this (log ratio) are the same: only their order of magnitude matters."""
-MOST_STATES = 12000
-"""Epochs whose state is kept for certificates: 20 minutes at 10 Hz."""
-MOST_AGED = 24
-LONGEST_WINDOW_S = 0.45
-DELAY_RANGE_S = (-0.1, 0.45)
-ATTITUDE_DELAY_RANGE_S = (-0.15, 0.15)
-HEADING_RANGE_RAD = (-0.8, 0.8)
-STEADY = (5e-4, 2e-3, 5e-3, 0.02)
-"""Moves of :data:`MOVING` that are not worth another pass: s, s^2, s, rad."""
+
+class PassObserver(Protocol):
+    """Told of every pass whose sums count; an engine that has one keeps the traces of epochs."""
+
+    def begin(self) -> None:
+        """A pass begins: what was seen of the one before is void."""
+
+    def take(self, result: PassResult) -> None:
+        """A batch has gone through it."""
 
 
-def calibration_model(
-    point: Linearisation,
-    prior: Array | None = None,
-    settings: EstimatorSettings | None = None,
-    more: tuple[Family, ...] = (),
-) -> Model:
-    """The six, timing and nuisances about ``point``; ``prior`` is (6,) scale, beta.
+def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
+    """One batch through a pass.
 
-    ``more`` is other physics; a nuisance gives way to what is there instead of it.
+    Args:
+        made: the pass; its filter begins anew where it has gone without fixes for too long.
+        batch: flight.
+        coast_s: longest dead reckoning, s.
     """
-    needs = (settings or EstimatorSettings()).needs
-    centre = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) if prior is None else prior
-    always: tuple[Family, ...] = (
-        Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
-        GpsLatency(point.delay),
-        GpsSmoothing(point.window),
-        ImuDelay(point.attitude_delay),
-        HeightLatency(),
-        GyroTiming(),
-        GyroScale(),
-        AttitudeOffset(),
-        AntennaPlace(),
-    )
-    gone = {f.instead_of for f in more}
-    return Model([*(f for f in always if f.name not in gone), *more])
-
-
-def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
-    """The linearisation that ``theta`` asks for."""
-    i = model.index
-    square = point.window**2 + theta[i["window_squared"]]
-    return Linearisation(
-        scale=tuple(float(x) for x in theta[0:3]),  # type: ignore[arg-type] # three by construction
-        beta=tuple(float(x) for x in theta[3:6]),  # type: ignore[arg-type] # three by construction
-        delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
-        window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
-        attitude_delay=float(
-            np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
-        ),
-        heading=float(np.clip(point.heading + theta[i["heading"]], *HEADING_RANGE_RAD)),
-        skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
-        skew_from=point.skew_from,
-    )
-
-
-def _next_levels(
-    levels: NoiseLevels,
-    target: NoiseLevels | None,
-    members: tuple[NoiseLevels, ...] | None,
-    likelihoods: list[float],
-) -> tuple[NoiseLevels, NoiseLevels | None]:
-    """Levels from here on, and those to be tried next, from what a star or a line has shown."""
-    if members is None:
-        return levels, None
-    if target is not None:
-        return members[int(np.argmax(likelihoods))], None
-    found = stepped(levels, likelihoods)
-    return levels, None if distance(levels, found) < SETTLED else found
+    if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
+        made.restart()
+    return made.process(batch.segment, batch.fixes, batch.trusted)
 
 
 class Engine:
@@ -118,21 +65,35 @@ class Engine:
 
     def __init__(
         self,
-        settings: EstimatorSettings,
+        settings: CalibratorSettings,
         prior: Array | None = None,
         point: Linearisation | None = None,
         noise: NoiseLevels | None = None,
         uses: Uses | None = None,
         more: tuple[Family, ...] = (),
+        observer: PassObserver | None = None,
     ) -> None:
-        """Take the settings, the prior six (scale, beta), where to start, and more physics."""
+        """Take the settings and where to start.
+
+        Args:
+            settings: how it works.
+            prior: (6,) scale (1) and beta (m/s^2) before the flight, sensor axes.
+            point: first linearisation.
+            noise: first noise levels.
+            uses: measurements that the filter uses.
+            more: physics besides the calibration's own.
+            observer: is told of every pass whose sums count.
+        """
         self._more = more
+        self._observer = observer
         self.settings = settings
         self.prior = prior
         self.point = point or Linearisation()
         self.noise = noise or NoiseLevels()
         self.uses = uses or Uses()
         self.batches: list[Batch] = []
+        self.sample: Sequence[Sequence[Batch]] | None = None
+        """Runs of batches on which timing and noise are found; None: the whole buffer."""
         self.aged: list[Block] = []
         self.blocks: list[Block] = []
         self.refused: Counter[str] = Counter()
@@ -145,11 +106,19 @@ class Engine:
         self._frozen = False
         self.model = self._model()
         self._seed: Solution | None = None
-        self._pass = self._new_pass()
+        self._pass = self._counting_pass()
         self._solution: Solution | None = None
 
     def _model(self) -> Model:
-        return calibration_model(self.point, self.prior, self.settings, self._more)
+        return calibration_model(self.point, self.prior, self.settings.needs, self._more)
+
+    def _counting_pass(self) -> Pass:
+        """A pass whose sums will count: the observer sees it from its beginning."""
+        made = self._new_pass()
+        if self._observer is not None:
+            made.keep_traces = True
+            self._observer.begin()
+        return made
 
     def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
         """A pass whose gates know the last solution: an outlier at the start must not pass."""
@@ -188,17 +157,13 @@ class Engine:
         self._age()
 
     def _run(self, batch: Batch) -> None:
-        result = self.through(self._pass, batch)
+        result = through(self._pass, batch, self.settings.coast_s)
+        if self._observer is not None:
+            self._observer.take(result)
         self.blocks.append(result.block)
         self.refused.update(result.refused)
         self.states.extend(result.states)
         self._solution = None
-
-    def through(self, made: Pass, batch: Batch) -> PassResult:
-        """One batch through a pass; a filter that coasted too long begins anew."""
-        if batch.fresh or batch.fixes.t[0] - made.coasting_since > self.settings.coast_s:
-            made.restart()
-        return made.process(batch.segment, batch.fixes, batch.trusted)
 
     def _age(self) -> None:
         """Let flight leave the buffer; forget slowly what has left it."""
@@ -226,30 +191,40 @@ class Engine:
         if not self.batches or self._frozen:
             return
         self.tune(rounds, noise_rounds)
-        self._pass = self._new_pass()
+        self.once()
+        self._pass.release()
+        self._refined_s = self.trusted_s
+
+    def once(self, held: tuple[Array, Array] | None = None) -> None:
+        """Make the sums of the buffer anew, with timing and noise as they are.
+
+        Args:
+            held: estimate (m,) and covariance (m, m) for the gates; None: the last solution.
+        """
+        self._pass = self._counting_pass()
+        if held is not None:
+            self._pass.hold(*held)
         self.refused.clear()
         self.states.clear()
         self.blocks = []
         for batch in self.batches:
             self._run(batch)
-        self._pass.release()
-        self._refined_s = self.trusted_s
 
     def tune(self, rounds: int, noise_rounds: int) -> None:
-        """Estimate timing and noise; what sums there are belong to others from then on."""
-        target: NoiseLevels | None = None
+        """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
+
+        Args:
+            rounds: passes at the most.
+            noise_rounds: in how many of them a search for noise levels may begin.
+        """
+        search = NoiseSearch(noise_rounds)
         for turn in range(rounds):
-            members = None
-            if target is not None:
-                members = line_search(self.noise, target)
-            elif turn < noise_rounds:
-                members = stencil(self.noise)
-            made = self._new_pass(members)
-            self._seed = solve(self._over_buffer(made), self.model)
+            made = self._new_pass(search.members(turn, self.noise))
+            self._seed = solve(self._over_sample(made), self.model)
             point = moved(self.point, self.model, self._seed.theta)
             timed = point.near(self.point, STEADY)
-            levels, target = _next_levels(self.noise, target, members, made.log_likelihoods())
-            settled = target is None and distance(self.noise, levels) < SETTLED
+            levels = search.better(self.noise, made.log_likelihoods())
+            settled = search.settled(self.noise, levels)
             self._move(point, levels)
             if timed and settled:
                 break
@@ -260,12 +235,16 @@ class Engine:
         self.point, self.noise = point, levels
         self.model = self._model()
 
-    def _over_buffer(self, made: Pass) -> list[Block]:
-        return [self.through(made, batch).block for batch in self.batches]
+    def _over_sample(self, made: Pass) -> list[Block]:
+        out = []
+        for run in [self.batches] if self.sample is None else self.sample:
+            made.restart()
+            out += [through(made, batch, self.settings.coast_s).block for batch in run]
+        return out
 
     @property
     def brisk_s(self) -> float:
-        """Trusted flight faster than :attr:`EstimatorSettings.brisk_speed`, s."""
+        """Trusted flight faster than :attr:`CalibratorSettings.brisk_speed`, s."""
         fast = self.settings.brisk_speed
         return self.left_brisk_s + sum(c.seconds_above(fast) for c in self.batches)
 
@@ -301,7 +280,7 @@ class Engine:
         """End of a recording or a flight: refine once more if there is something new."""
         if not self.settings.refine:
             return
-        if self.latest > 0.05 * self.trusted_s and not self._frozen:
+        if self.latest > NEW_SHARE * self.trusted_s and not self._frozen:
             self.refine()
 
     @property

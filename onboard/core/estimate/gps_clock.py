@@ -56,20 +56,22 @@ RANGE_MS: Final = (1, 250)
 class FixClock:
     """What a latency against the recording's stamps means to the autopilot.
 
-    ``late`` (s): the stamps against the time from which the EKF counts back.  ``told`` (s): the
-    parameter in force, 0 if it is 0 or not known.  ``name``: of the parameter.  ``assumed`` (s):
-    lags of which the autopilot takes one; empty if its receiver is not known.
+    Attributes:
+        late: how much later the stamps are than the time from which the EKF counts back, s.
+        configured: the parameter in force, s; 0 if it is 0 or not known.
+        name: of the parameter.
+        assumed: lags of which the autopilot takes one, s; empty if its receiver is not known.
     """
 
     late: float = 0.0
-    told: float = 0.0
+    configured: float = 0.0
     name: str = "GPS1_DELAY_MS"
     assumed: tuple[float, ...] = ()
 
     @property
-    def told_on_stamp(self) -> float:
-        """What the autopilot is told, as a latency against the recording's stamps, s."""
-        return self.told + self.late
+    def configured_on_stamp(self) -> float:
+        """The configured latency, as one against the recording's stamps, s."""
+        return self.configured + self.late
 
     def setting(self, delay: float) -> float:
         """The parameter's value, ms, for a latency ``delay`` (s) against the stamps."""
@@ -83,7 +85,7 @@ class FixClock:
 
 def fix_clock(parameters: ParametersInForce, batches: Sequence[Batch]) -> FixClock:
     """The clock of the receiver in a flight."""
-    told, values = parameters.gps_delay_told, parameters.values
+    configured, values = parameters.gps_delay_configured, parameters.values
     late = [c.fixes.late[c.trusted] for c in batches if len(c.fixes.late)]
     every = np.concatenate(late) if late else np.zeros(0)
     kind = parameters.get("GPS1_TYPE", "GPS_TYPE", default=-1.0)
@@ -91,7 +93,7 @@ def fix_clock(parameters: ParametersInForce, batches: Sequence[Batch]) -> FixClo
     new = "GPS1_DELAY_MS" in values or "GPS_DELAY_MS" not in values
     return FixClock(
         float(every.mean()) if len(every) else 0.0,
-        told,
+        configured,
         "GPS1_DELAY_MS" if new else "GPS_DELAY_MS",
-        (told,) if told > 0.0 else assumed,
+        (configured,) if configured > 0.0 else assumed,
     )

@@ -1,4 +1,4 @@
-"""What a flight can and cannot tell about the six numbers, in percent and in plain words.
+"""What a flight can and cannot tell about the calibration parameters, in percent and in words.
 
 Input is the information that the data alone give (the 6x6 Schur complement of the sums) and
 what was known before (prior sigmas).  A number counts as observed when its posterior sigma
@@ -21,13 +21,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from onboard.core.estimate.limits import COUPLED, PRIOR_SHARE
 from onboard.core.estimate.result import SIX_NAMES, Coverage, SixFlags
 from onboard.core.maths.arrays import Array
 
-COUPLED: Final = 0.85
-"""Correlation from which two numbers are a pair: knowing one would halve the other's sigma."""
-
-_PRIOR_SHARE: Final = 0.5  # of the prior sigma: what the flight has to get below at least
 _ROUNDING: Final = 1e-9  # sigma and target may agree exactly
 
 
@@ -49,7 +46,7 @@ class Needs:
     def target(self) -> Array:
         """(6,) sigmas at which a number counts as observed."""
         needed = np.repeat([self.scale, self.offset], 3)
-        result: Array = np.minimum(needed, _PRIOR_SHARE * self.prior)
+        result: Array = np.minimum(needed, PRIOR_SHARE * self.prior)
         return result
 
 

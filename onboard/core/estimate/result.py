@@ -53,7 +53,10 @@ class DeadReckoning:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """How well the flight excites the six; ``per_parameter`` in percent, order of SIX_NAMES."""
+    """How well the flight excites the calibration parameters.
+
+    ``percent`` is that of the weakest; ``per_parameter`` are in percent, in the order of SIX_NAMES.
+    """
 
     percent: float
     per_parameter: Six

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from onboard.core.estimate.observability import Needs
-from onboard.core.gps.trust import TrustLimits
+from onboard.core.gps.limits import TrustLimits
 from onboard.core.inputs.assembly import AssemblySettings
 
 
 @dataclass(frozen=True, slots=True)
-class EstimatorSettings:
+class CalibratorSettings:
     """How the calibrator works.
 
     Attributes:

@@ -1,9 +1,9 @@
 """From sums to numbers: estimate, honest covariance, held-out residuals.
 
-The whitened rows are independent only as far as the noise model is right.  Residuals of real
-flights are coloured, so the inverse of the sums alone is optimistic; the scatter of the score
-(``b_i - N_i theta``) over blocks of the flight says by how much (Huber 1967, White 1980;
-clustered by time), and the data are weakened against the prior by that factor.
+Whitened innovations are independent only as far as the noise model is right.  Residuals of real
+flights are correlated, so the inverse of the sums alone is optimistic.  The scatter of the score
+(``b_i - N_i theta``) over blocks of the flight says by how much (cluster-robust variance, Huber
+1967, White 1980; clustered by time), and the variance of the data is inflated by that factor.
 """
 
 from __future__ import annotations
@@ -14,19 +14,17 @@ from functools import reduce
 
 import numpy as np
 
+from onboard.core.estimate.limits import (
+    FEWEST_BLOCKS,
+    FOLDS,
+    GRAM_DOUBT,
+    MOST_NOISE,
+    ONE_IN_A_THOUSAND,
+)
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model
-
-FOLDS = 8
-GRAM_DOUBT = 0.5
-"""Relative uncertainty of the noise that was taken out of the columns: its spectrum is a guess."""
-FEWEST_BLOCKS = 6
-ONE_IN_A_THOUSAND = 3.09
-"""Standard normal deviate that is exceeded once in a thousand times."""
-MOST_NOISE = 0.9
-"""Share of a column's information that noise may claim; past it there is nothing left to see."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +33,18 @@ class Solution:
 
     Attributes:
         theta: (m,) estimate with the prior.
-        covariance: (m, m) of it, inflated for coloured residuals.
-        information: (m, m) of the data alone, deflated by the same factor.
-        variance_inflation: factor on the variance, at least 1.
-        chi2: mean square of the whitened residual.
-        rows: number of rows behind it.
+        covariance: (m, m) of it, inflated for correlated residuals.
+        information: (m, m) of the data alone, divided by the same factor.
+        variance_inflation: factor on the variance of the data, at least 1.
+        nis: mean normalised innovation squared at ``theta``; 1 if the noise model is right.
+        rows: number of whitened innovations behind it.
     """
 
     theta: Array
     covariance: Array
     information: Array
     variance_inflation: float
-    chi2: float
+    nis: float
     rows: float
 
 
@@ -78,12 +76,12 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     )
     D = sums.N - G
     theta = np.linalg.solve(D + prior, sums.b + prior @ model.prior)
-    chi2 = sums.residual(theta) / max(sums.rows, 1.0)
-    variance_inflation = max(1.0, chi2, _cluster_factor(blocks, share, theta, D + prior, model))
+    nis = sums.residual(theta) / max(sums.rows, 1.0)
+    variance_inflation = max(1.0, nis, _cluster_factor(blocks, share, theta, D + prior, model))
     A = D / variance_inflation + prior
     theta = np.linalg.solve(A, sums.b / variance_inflation + prior @ model.prior)
     inverse = np.linalg.inv(A)
-    # Sandwich: the rows carry D + G of information, of which G is not signal.
+    # Sandwich: the innovations carry D + G of information, of which G is not signal.
     doubt = (GRAM_DOUBT * G) / variance_inflation
     spread = (D + G) / variance_inflation + prior + doubt @ np.diag(theta**2) @ doubt
     covariance = inverse @ spread @ inverse
@@ -94,7 +92,7 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
         (covariance + covariance.T) / 2,
         (information + information.T) / 2,
         variance_inflation,
-        chi2,
+        nis,
         sums.rows,
     )
 
@@ -104,10 +102,11 @@ def _cluster_factor(
 ) -> float:
     """How much wider the scatter of the blocks' scores is than the sums say.
 
-    Ratio of clustered to expected variance of each of the six: their mean while all could be one
-    noise, else the largest, for an offset that changes half-way shows in that offset alone.  What
-    is expected of a block is less than its information, for the fit has followed it.  1 while
-    there are fewer than :data:`FEWEST_BLOCKS`.
+    It is the ratio of clustered to expected variance of each calibration parameter: their mean
+    while all could be one noise, else the largest, for an offset that changes half-way shows in
+    that offset alone.  What is expected of a block is less than its information, because the fit
+    has followed it.  1 while there are fewer than
+    :data:`~onboard.core.estimate.limits.FEWEST_BLOCKS`.
     """
     if len(blocks) < FEWEST_BLOCKS or "six" not in model.slices:
         return 1.0

@@ -76,7 +76,7 @@ class Pass:
         return self._running
 
     @property
-    def coasting_since(self) -> float:
+    def dead_reckoning_since(self) -> float:
         """Time of the last epoch whose velocity was accepted, s."""
         return self._last_velocity_t
 

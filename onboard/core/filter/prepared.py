@@ -19,7 +19,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import Around, Intervals, NodeMaker
-from onboard.core.model.regressors import Model, SegmentColumns
+from onboard.core.model.regressors import Model, SegmentRegressors
 from onboard.core.model.smoothing import mean_weights
 
 
@@ -77,7 +77,7 @@ def prepare(
     start, end, measured = _subdivide(epoch_t)
     intervals = maker.intervals(start, end)
     around = maker.around(epoch_t, point.window)
-    regressors = model.columns(intervals, around)
+    regressors = model.regressors(intervals, around)
     return Prepared(
         _steps(intervals, regressors),
         measured,
@@ -99,7 +99,7 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
     return np.array(start), np.array(end), np.array(measured)
 
 
-def _steps(intervals: Intervals, regressors: SegmentColumns) -> list[Step]:
+def _steps(intervals: Intervals, regressors: SegmentRegressors) -> list[Step]:
     force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
     mean_turn = np.einsum("ki,kiab->kab", intervals.weight, intervals.P)
     return [
@@ -123,7 +123,7 @@ def _epochs(
     trusted: NDArray[np.bool_],
     point: Linearisation,
     around: Around,
-    c: SegmentColumns,
+    c: SegmentRegressors,
 ) -> list[Epoch]:
     R_att, near = point.attitude(segment, around.now.t)
     kappa = mean_weights(around.offset, point.window)

@@ -11,7 +11,7 @@ PSI      attitude error, NED rotation vector      random walk (gyroscope)
 BIAS     gyroscope bias, body, rad/s              random walk
 ATT      slow error of the recorded attitude      Gauss-Markov
 CH       wander of GPS height, m                  random walk
-CV       coloured GPS velocity error, m/s         Gauss-Markov
+CV       correlated GPS velocity error, m/s       Gauss-Markov
 =======  =======================================  =============================
 """
 

@@ -32,10 +32,11 @@ from onboard.core.filter.limits import (
     SYMMETRY_UPDATES,
 )
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.readings import Reading, innovations, kinds_of, reading
+from onboard.core.filter.readings import innovations, kinds_of, reading
 from onboard.core.filter.regressor_noise import RegressorNoise
 from onboard.core.filter.state import ATT, BIAS, CH, CV, PSI, STATES, H, V
 from onboard.core.filter.variances import Variances
+from onboard.core.filter.whitened import Whitened, nothing, whiten
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
 from onboard.core.maths.small_turns import skew_of, turn_by
@@ -68,20 +69,6 @@ class Uses:
     recorded_attitude: bool = False
     earth: bool = True
     gates: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class _Whitened:
-    """Innovations before (``E`` (B, r, m + 1)) and after whitening, and the gain's two factors."""
-
-    kinds: str
-    read: Reading
-    E: Array
-    y: Array
-    h: Array
-    gain: Array
-    whitener: Array
-    L: Array
 
 
 class WhiteningFilter:
@@ -242,7 +229,7 @@ class WhiteningFilter:
                 )
             if refusal is None:
                 self._take(made, theta)
-                return self._given(epoch.t, made, theta, refused, off)
+                return made.innovations(epoch.t, theta, refused, off)
             refused.append(refusal.name)
             if refusal.renewed:
                 self._renew(refusal.name)
@@ -251,7 +238,7 @@ class WhiteningFilter:
                 n = kinds.count("v")
                 off = made.E[0, :n, 0] - made.E[0, :n, 1:] @ theta
             kinds = kinds.replace(letter, "")
-        return self._nothing(epoch.t, refused, off) if refused else None
+        return nothing(len(self.bank), self.m, epoch.t, refused, off) if refused else None
 
     def expected_velocity(
         self, epoch: Epoch, theta: Array, covariance: Array
@@ -277,20 +264,11 @@ class WhiteningFilter:
         D = E[:, 1:]
         return E[:, 0] - D @ theta, S + D @ covariance @ D.T
 
-    def _whitened(self, epoch: Epoch, theta: Array, kinds: str) -> _Whitened:
-        """Innovations of these kinds, times the inverse Cholesky factor of their covariance."""
-        read = reading(kinds)
+    def _whitened(self, epoch: Epoch, theta: Array, kinds: str) -> Whitened:
         both = innovations(self._X, self._P, self.R_nb, epoch, theta, kinds)
-        E, HP = both[:, :, : self.m + 1], both[:, :, self.m + 1 :]
-        S = HP.take(read.first, axis=2) + HP.take(read.second, axis=2)
-        _diagonal(S)[:] += self._variances.reading[:, read.noise]
-        L: Array = np.linalg.cholesky(S)
-        whitener: Array = np.linalg.inv(L)
-        W = whitener @ both
-        y, h, gain = W[:, :, 0], W[:, :, 1 : self.m + 1], W[:, :, self.m + 1 :]
-        return _Whitened(kinds, read, E, y, h, gain, whitener, L)
+        return whiten(both, self._variances.reading, kinds)
 
-    def _take(self, made: _Whitened, theta: Array) -> None:
+    def _take(self, made: Whitened, theta: Array) -> None:
         """Update mean, regressors and covariance; turn the attitude by what was found."""
         back = np.swapaxes(made.gain, -1, -2)
         self._X[:, :, :1] += back @ made.y[:, :, None]
@@ -308,42 +286,6 @@ class WhiteningFilter:
         psi = self._X[0, PSI, 0] + self._X[0, PSI, 1:] @ theta
         self.R_nb = turn_by(psi) @ self.R_nb
         self._X[:, PSI, 0] -= psi
-
-    def _given(
-        self, t: float, made: _Whitened, theta: Array, refused: Sequence[str], off: Array
-    ) -> WhitenedInnovations:
-        n = made.kinds.count("v")
-        first, regressors = made.E[0, :n, 0], made.E[0, :n, 1:]
-        return WhitenedInnovations(
-            t=t,
-            y=made.y,
-            h=made.h,
-            log_det=2.0 * np.log(np.diagonal(made.L, axis1=1, axis2=2)).sum(axis=1),
-            velocities=n,
-            height="h" in made.kinds,
-            innovation=first - regressors @ theta,
-            raw_innovation=first,
-            raw_columns=regressors,
-            refused=tuple(refused),
-            refused_by=off,
-        )
-
-    def _nothing(self, t: float, refused: Sequence[str], off: Array) -> WhitenedInnovations:
-        """All that the epoch has measured was refused."""
-        B = len(self.bank)
-        return WhitenedInnovations(
-            t=t,
-            y=np.zeros((B, 0)),
-            h=np.zeros((B, 0, self.m)),
-            log_det=np.zeros(B),
-            velocities=0,
-            height=False,
-            innovation=np.zeros(0),
-            raw_innovation=np.zeros(0),
-            raw_columns=np.zeros((0, self.m)),
-            refused=tuple(refused),
-            refused_by=off,
-        )
 
     def _renew(self, reference: str) -> None:
         """What a reference (``height`` or ``attitude``) differs by is unknown from here on."""

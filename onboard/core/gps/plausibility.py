@@ -8,9 +8,9 @@ moving receiver that repeats itself to the last digit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.gps.limits import PlausibilityLimits
 from onboard.core.inputs.samples import GpsFix
 
 _METRES_PER_RADIAN = 6.371e6  # of latitude; a check at the 1 % level needs no ellipsoid
@@ -24,32 +24,11 @@ class Contradiction(Enum):
     FROZEN = "moving, and yet the same fix again"
 
 
-@dataclass(frozen=True, slots=True)
-class PlausibilityLimits:
-    """Limits; across flights of small aircraft with healthy receivers none was reached.
-
-    ``acceleration`` (m/s^2) and ``jump`` (m/s): a change of velocity between fixes dt apart is
-    impossible beyond ``jump + acceleration dt`` (healthy: up to 23 m/s^2 at 5 Hz).
-    ``drift`` (m/s) is how far the mean velocity from positions over ``baseline`` (s) may be
-    from that of the velocities (healthy: up to 1.3), plus ``drift_acceleration`` times the
-    longest step, for what happens between two fixes of a slow receiver.  ``frozen_after`` (s)
-    and ``frozen_speed`` (m/s): identical fixes for that long above that speed.
-    """
-
-    acceleration: float = 30.0
-    jump: float = 3.0
-    baseline: float = 1.0
-    drift: float = 2.5
-    drift_acceleration: float = 2.0
-    frozen_after: float = 0.9
-    frozen_speed: float = 2.0
-
-
 class FixPlausibility:
     """Compares each fix of one receiver with the ones before it."""
 
-    def __init__(self, limits: PlausibilityLimits = PlausibilityLimits()) -> None:
-        self._limits = limits
+    def __init__(self, limits: PlausibilityLimits | None = None) -> None:
+        self._limits = limits or PlausibilityLimits()
         self.reset()
 
     def reset(self) -> None:

@@ -12,13 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.inputs.limits import AS_DENSE
 from onboard.core.inputs.tracks import ImuTrack
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.interpolation import Hermite
-
-AS_DENSE = 1.25
-"""A gyroscope whose samples are sparser than this against the accelerometer's shows less of the
-motion than the accelerometer's own."""
 
 
 def rates_at(track: ImuTrack, at: Array, longest_gap: float) -> Array | None:

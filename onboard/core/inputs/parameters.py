@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import board_rotation, is_axis_aligned
+from onboard.core.maths.board_orientation import board_rotation, is_axis_aligned
 
 DEFAULT_FILTER_HZ = 20.0
 
@@ -91,13 +91,13 @@ class ParametersInForce:
 
     @property
     def antenna(self) -> Array:
-        """(3,) place of the GPS antenna as it was told, body axes, m."""
+        """(3,) configured position of the GPS antenna, body axes, m."""
         return np.array(
             [self.get(f"GPS1_POS_{a}", f"GPS_POS1_{a}", default=0.0) for a in "XYZ"], dtype=float
         )
 
     def lever_arm(self, imu: int) -> Array:
-        """(3,) from the accelerometer to the antenna as both were told, body axes, m."""
+        """(3,) configured lever arm: from the accelerometer to the antenna, body axes, m."""
         own = np.array([self.get(f"INS_POS{imu}_{a}", default=0.0) for a in "XYZ"])
         out: Array = self.antenna - own
         return out
@@ -114,6 +114,6 @@ class ParametersInForce:
         return filter_delay(gyro) - self.imu_delay
 
     @property
-    def gps_delay_told(self) -> float:
-        """What the autopilot is told of the receiver's latency, s (0: not told)."""
+    def gps_delay_configured(self) -> float:
+        """Configured latency of the receiver, s (0: not configured)."""
         return 1e-3 * self.get("GPS1_DELAY_MS", "GPS_DELAY_MS", default=0.0)

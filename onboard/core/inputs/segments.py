@@ -8,17 +8,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import interpolate_rotation
 from onboard.core.maths.interpolation import Hermite
-
-LONGEST_FIX_GAP_S = 2.5
-"""Receivers report at 1 Hz or faster: longer without a fix is an outage, not trusted flight."""
-DENSE_S = 0.15
-"""Attitude samples this close together can be interpolated: between sparser ones a vehicle turns
-in ways that they do not show."""
-NEAR_S = 0.02
-
 
 Signal: TypeAlias = tuple[Array, Array]
 """A slow signal: times (j,), s, and values (j,) or (j, 3)."""
@@ -34,10 +27,15 @@ SLOW_SIGNALS = {
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
-    """GPS epochs with even times; ``v_n`` (n, 3) has NaN down where there is no vertical speed.
+    """GPS epochs with even times.
 
-    ``late`` (n,): how much later they are stamped than the time from which the autopilot counts the
-    receiver's latency, s; empty where that is not known to differ.
+    Attributes:
+        t: (n,) s, boot clock, latency not removed.
+        v_n: (n, 3) velocity, NED, m/s; NaN down where the receiver has no vertical speed.
+        height: (n,) above mean sea level, m.
+        latitude: (n,) rad.
+        late: (n,) how much later they are stamped than the time from which the autopilot counts the
+            receiver's latency, s; empty where that is not known to differ.
     """
 
     t: Array
@@ -69,7 +67,7 @@ class Segment:
         R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
         R_bs: (3, 3) board orientation.
         slow: other signals by name: times (j,) and values (j,) or (j, 3).
-        lever_arm_b: (3,) from the accelerometer to the GPS antenna as it was told, m.
+        lever_arm_b: (3,) configured lever arm, accelerometer to GPS antenna, body axes, m.
     """
 
     t: Array
@@ -107,7 +105,14 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Some seconds of flight.  ``fresh`` if the filter must not continue from the one before."""
+    """Some seconds of flight.
+
+    Attributes:
+        segment: samples that cover the fixes and what is needed around them.
+        fixes: n epochs; the first is the last of the batch before, unless ``fresh``.
+        trusted: (n,) whether the receiver is to be believed there.
+        fresh: the filter must not continue from the batch before.
+    """
 
     segment: Segment
     fixes: Fixes

@@ -10,6 +10,8 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.even_times import even_times
+from onboard.core.inputs.limits import BEFORE_NEXT_S, HIGHRES_S
 from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array, Vector3
@@ -56,7 +58,7 @@ class ImuTrack:
         t = sample.t
         if sample.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t
-        elif sample.source is ImuSource.RAW_IMU and t - self.highres_t < 0.5:
+        elif sample.source is ImuSource.RAW_IMU and t - self.highres_t < HIGHRES_S:
             return False
         if not t > self.last:
             self.refused["imu_late" if t < self.last else "imu_repeated"] += 1
@@ -193,7 +195,7 @@ class FixTrack:
         )
         if np.isfinite(self._last_even) and len(t) > 1:
             # The first was the last of before: its time must not move under the filter's feet.
-            t[0] = min(self._last_even, t[1] - 1e-3)
+            t[0] = min(self._last_even, t[1] - BEFORE_NEXT_S)
         if len(t):
             self._last_even = float(t[-1])
         self._fixes = self._fixes[max(n - 1, 0) :]
@@ -203,58 +205,3 @@ class FixTrack:
         """Forget all fixes (reboot)."""
         self._fixes.clear()
         self._last_even = -np.inf
-
-
-def even_times(t: Array, t_receiver: Array | None) -> Array:
-    """De-jittered epoch times on the boot clock.
-
-    Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
-    own time the stamps are its clock plus a straight line (offset and drift); without it the
-    epoch numbers are recovered from the commonest interval.  A line is fitted robustly over the
-    batch; stamps that are even already stay as they are.
-
-    Args:
-        t: (n,) stamps, s, increasing.
-        t_receiver: (n,) receiver times, s, or None.
-
-    Returns:
-        (n,) strictly increasing times.
-    """
-    n = len(t)
-    if n < 5:
-        return t.copy()
-    if t_receiver is not None and np.all(np.diff(t_receiver) > 0):
-        clock = t_receiver - t_receiver[0]
-    else:
-        period = float(np.median(np.diff(t)))
-        if period <= 0.0:
-            return t.copy()
-        count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
-        # The median of jittered intervals is off by a millisecond, which adds up over a batch:
-        # good enough to number the epochs, not to say when they were.
-        period = float(np.polyfit(count, t - t[0], 1)[0])
-        # Whole milliseconds: receivers run at 1, 2, 4, 5, 8, 10 ... Hz.
-        period = (
-            round(period * 1e3) * 1e-3 if abs(period * 1e3 - round(period * 1e3)) < 0.3 else period
-        )
-        clock = count * period
-    offset = t - t[0] - clock
-    if float(np.ptp(offset)) < 2e-3:
-        return t.copy()
-    if float(np.ptp(offset)) > 0.3:
-        # Not one grid: gaps that are no whole periods, or a clock that was set.
-        return t.copy()
-    x = clock - clock.mean()
-    weight = np.ones(n)
-    line = np.zeros(n)
-    for _ in range(4):
-        mean = float(np.average(offset, weights=weight))
-        spread = float(weight @ (x * x))
-        # A crystal is good to 1e-4: over one batch the slope is noise, unless it is long.
-        slope = float(np.clip(weight @ (x * (offset - mean)) / spread, -2e-4, 2e-4))
-        line = mean + slope * x
-        residual = np.abs(offset - line)
-        scale = max(float(np.median(residual)), 1e-4)
-        weight = 1.0 / np.maximum(1.0, residual / (2.0 * scale))
-    even: Array = t[0] + clock + line
-    return even

@@ -1,10 +1,9 @@
-"""The earth under the vehicle: WGS-84 shape, normal gravity, rotation, and what they do to v_n.
+"""The earth under the vehicle: WGS-84 shape, rotation, and what they do to v_n.
 
-Sources: NIMA TR8350.2 (2000), *World Geodetic System 1984*, tables 3.1 and 3.4 and section 4,
-for the constants and gravity; P. D. Groves, *Principles of GNSS, Inertial, and Multisensor
-Integrated Navigation Systems* (2nd ed. 2013), chapters 2 and 5, for the rates and the
-navigation equation.  Latitude and longitude in rad, heights in m above the ellipsoid
-(heights above mean sea level do: 100 m of geoid are 3e-4 m/s^2 of gravity).
+Sources: NIMA TR8350.2 (2000), *World Geodetic System 1984*, table 3.1, for the constants;
+P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems* (2nd
+ed. 2013), chapters 2 and 5, for the rates and the navigation equation.  Latitude and longitude in
+rad, heights in m above the ellipsoid (heights above mean sea level do: radii change by 1e-5).
 """
 
 from __future__ import annotations
@@ -24,12 +23,6 @@ ECCENTRICITY_SQUARED: Final = FLATTENING * (2 - FLATTENING)
 """e^2 of the first eccentricity."""
 EARTH_RATE: Final = 7.292115e-5
 """Angular rate of the earth, rad/s (TR8350.2 table 3.1)."""
-GRAVITY_EQUATOR: Final = 9.7803253359
-"""Normal gravity on the ellipsoid at the equator, m/s^2 (TR8350.2 table 3.4)."""
-GRAVITY_POLE: Final = 9.8321849378
-"""Normal gravity on the ellipsoid at the poles, m/s^2 (TR8350.2 table 3.4)."""
-CENTRIFUGAL_RATIO: Final = 0.00344978650684
-"""m = w^2 a^2 b / GM (TR8350.2 table 3.4)."""
 STANDARD_GRAVITY: Final = 9.80665
 """What ArduPilot's EKF and SITL integrate with, everywhere (3rd CGPM, 1901), m/s^2."""
 
@@ -48,24 +41,6 @@ def radii_of_curvature(latitude: ArrayLike) -> tuple[Array, Array]:
     transverse = SEMI_MAJOR_AXIS / np.sqrt(w)
     meridian = transverse * (1 - ECCENTRICITY_SQUARED) / w
     return np.asarray(meridian), np.asarray(transverse)
-
-
-def normal_gravity(latitude: ArrayLike, height: ArrayLike = 0.0) -> Array:
-    """Somigliana's formula with the height series (TR8350.2 equations 4-1 and 4-3).
-
-    Args:
-        latitude: (...) rad.
-        height: (...) m.
-
-    Returns:
-        (...) m/s^2, positive down.  Real gravity is within about 1e-3 of it.
-    """
-    s2 = np.sin(np.asarray(latitude, dtype=np.float64)) ** 2
-    h = np.asarray(height, dtype=np.float64) / SEMI_MAJOR_AXIS
-    k = (1 - FLATTENING) * GRAVITY_POLE / GRAVITY_EQUATOR - 1
-    surface = GRAVITY_EQUATOR * (1 + k * s2) / np.sqrt(1 - ECCENTRICITY_SQUARED * s2)
-    factor = 1 - 2 * (1 + FLATTENING + CENTRIFUGAL_RATIO - 2 * FLATTENING * s2) * h + 3 * h**2
-    return np.asarray(surface * factor)
 
 
 def earth_rate_n(latitude: ArrayLike) -> Array:
@@ -129,38 +104,3 @@ def carried_and_turning(latitude: float, v_n: Array) -> tuple[Array, Array]:
     x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
     carried = np.array([z * east - y * down, x * down - z * north, y * north - x * east])
     return carried, np.array([EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2]])
-
-
-def displacement_n(
-    latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike, origin: tuple[float, float, float]
-) -> Array:
-    """North, east, down from ``origin`` along the surface of the earth.
-
-    The third component is minus the difference in *height*, as the integral of ``v_d`` is: it
-    does not sink below the horizon as a tangent plane's would (0.8 m at 3 km).
-
-    Args:
-        latitude: (...) rad.
-        longitude: (...) rad.
-        height: (...) m.
-        origin: latitude (rad), longitude (rad), height (m).
-
-    Returns:
-        (..., 3) m.  North and east on a sphere depend on the path: the integral of ``v_n``
-        differs by about north times east times tan(latitude) / 6.4e6 m.
-    """
-    lat = np.asarray(latitude, dtype=np.float64)
-    lon = np.asarray(longitude, dtype=np.float64)
-    h = np.asarray(height, dtype=np.float64)
-    middle = 0.5 * (lat + origin[0])
-    mean_height = 0.5 * (h + origin[2])
-    meridian, transverse = radii_of_curvature(middle)
-    eastward = np.remainder(lon - origin[1] + np.pi, 2 * np.pi) - np.pi
-    return np.stack(
-        [
-            (meridian + mean_height) * (lat - origin[0]),
-            (transverse + mean_height) * np.cos(middle) * eastward,
-            origin[2] - h,
-        ],
-        axis=-1,
-    )

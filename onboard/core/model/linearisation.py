@@ -1,4 +1,4 @@
-"""Where the problem is taken to be linear: timing, and the six that turn forces into rows."""
+"""Where the problem is taken to be linear: timing, and the calibration in force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The columns that are always there: the six numbers, timing, and what would hide in them."""
+"""Regressors that are always there: calibration parameters, timing, and their nuisances."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "hea
 THIRD_MOMENT = 1e-3
 """Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
 ANTENNA_SIGMA = 0.05
-"""Prior sigma of the antenna's place, m.  A person with a ruler knows neither where in its housing
-an antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where nothing was
-told, the two are a hand's breadth apart even on a small vehicle.  What is more is an effect.  On
-flights with turns 2 cm and 15 cm give the six the same sigmas within a few per cent."""
+"""Prior sigma of an error of the lever arm, m.  A person with a ruler knows neither where in its
+housing an antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where
+nothing is configured, the two are a hand's breadth apart even on a small vehicle.  What is more is
+an effect.  On flights with turns 2 cm and 15 cm give the calibration parameters the same sigmas
+within a few per cent."""
 
 
 class Six(Family):
@@ -119,8 +120,8 @@ class GpsSmoothing(Family):
         return Direct(body=body, ned=ned)
 
 
-class AntennaPlace(Family):
-    """Antenna some centimetres away from where it was told to be: a nuisance.
+class LeverArmError(Family):
+    """Antenna some centimetres away from where it is configured to be: a nuisance.
 
     Held at nothing, a centimetre ``r`` is taken for something else.  Forwards or sideways, in turns
     at a rate ``w``, its acceleration is that of an offset ``w^2 r``.  Upwards, with the force of a

@@ -29,7 +29,7 @@ class Signals:
         t: S, s.
         w_b: (*S, 3) angular rate less the bias estimate, rad/s.
         raw_s: (*S, 3) raw specific force, sensor axes, m/s^2.
-        f_b: (*S, 3) specific force by the six of the linearisation, body axes, m/s^2.
+        f_b: (*S, 3) specific force by the calibration of the linearisation, body axes, m/s^2.
         segment: where slow signals are looked up.
     """
 
@@ -71,7 +71,7 @@ class Intervals:
         """``integral P x dtau`` and ``integral (T - tau) P x dtau``.
 
         Args:
-            x_b: (K, M + 1, 3, m) columns in body axes at each node.
+            x_b: (K, M + 1, 3, m) m regressors in body axes at each node.
 
         Returns:
             Two arrays (K, 3, m) in the body axes of each interval's start.
@@ -172,7 +172,7 @@ def _chain(turns: Array) -> Array:
 
 
 class NodeMaker:
-    """Makes nodes from one segment, for one gyroscope bias and one set of six."""
+    """Makes nodes from one segment, for one gyroscope bias and one calibration."""
 
     def __init__(
         self, segment: Segment, bias_b: Array, six: Array, *, recorded_attitude: bool = False

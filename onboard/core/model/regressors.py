@@ -1,4 +1,4 @@
-"""Columns of the whitened criterion: how each unknown enters what is measured.
+"""Regressors: how each unknown enters what is measured.
 
 A *family* is a few unknowns of one piece of physics.  It says, for one unit of each unknown, what
 it adds to the predicted measurement, by any of these ways (all linear):
@@ -54,12 +54,12 @@ NOTHING = Direct()
 
 
 class Family:
-    """A piece of physics: unknowns and their columns.  Subclasses override what applies.
+    """A piece of physics: unknowns and their regressors.  Subclasses override what applies.
 
     Attributes:
         name: of the family, unique in a model.
-        unknowns: in the order of their columns.
-        instead_of: name of a nuisance that has the same columns and gives way to this family.
+        unknowns: in the order of their regressors.
+        instead_of: name of a nuisance that has the same regressors and gives way to this family.
     """
 
     name: str = ""
@@ -67,7 +67,7 @@ class Family:
     unknowns: tuple[Unknown, ...] = ()
 
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
-        """True if the recording has the signals that the columns need."""
+        """True if the recording has the signals that the regressors need."""
         return True
 
     def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:  # noqa: ARG002
@@ -106,10 +106,20 @@ class Family:
 
 
 @dataclass(frozen=True, slots=True)
-class SegmentColumns:
-    """All columns of K intervals (index k: from epoch k to k + 1) and K + 1 epochs, m unknowns.
+class SegmentRegressors:
+    """Regressors of K intervals (index k: from epoch k to k + 1) and K + 1 epochs, m unknowns.
 
-    Interval arrays are in body axes of the interval's start, epoch arrays as in :class:`Direct`.
+    Attributes:
+        force1: (K, 3, m) velocity gained, body axes of the interval's start, m/s per unit.
+        force2: (K, 3, m) the same integrated to the interval's end, m per unit.
+        turn: (K, 3, m) turn of the attitude, body axes of the interval's start, rad per unit.
+        velocity_body: (K + 1, 3, m) direct to the GPS velocity, body axes, m/s per unit.
+        velocity_ned: (K + 1, 3, m) the same in NED.
+        position_body: (K + 1, 3, m) direct to the GPS position, body axes, m per unit.
+        position_ned: (K + 1, 3, m) the same in NED.
+        along_velocity: (K + 1, m) the same as multiples of the velocity, s per unit.
+        attitude_body: (K + 1, 3, m) direct to the recorded attitude, body axes, rad per unit.
+        attitude_ned: (K + 1, 3, m) the same in NED.
     """
 
     force1: Array
@@ -125,7 +135,17 @@ class SegmentColumns:
 
 
 class Model:
-    """An ordered set of families: which column is whose."""
+    """An ordered set of families: which unknown is whose.
+
+    Attributes:
+        families: in order.
+        unknowns: of all families, m, numbered in their order.
+        slices: of the unknowns, by the name of their family.
+        size: m.
+        index: of an unknown, by its name.
+        prior: (m,) means before the flight, each in its unit.
+        prior_sigma: (m,) standard deviations of them.
+    """
 
     def __init__(self, families: Sequence[Family]) -> None:
         """Take the families; their unknowns are numbered in this order."""
@@ -155,7 +175,7 @@ class Model:
         }
         return replace(segment, slow=segment.slow | remembered) if remembered else segment
 
-    def columns(self, intervals: Intervals, around: Around) -> SegmentColumns:
+    def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:
         """Evaluate every family on one segment."""
         K, M1 = intervals.signals.t.shape
         m, epochs = self.size, len(around.now.t)
@@ -188,7 +208,7 @@ class Model:
                     along[:, s] = d.along_velocity
         force1, force2 = intervals.integrals(force)
         turn = intervals.integrals(rate)[0] if turning else np.zeros((K, 3, m))
-        return SegmentColumns(
+        return SegmentRegressors(
             force1,
             force2,
             turn,

@@ -24,10 +24,11 @@ import msgspec
 
 from onboard import __version__
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.estimate.calibrator import Advanced, Calibrator, FlightEnded, Restarted
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.events import Advanced, FlightEnded, Restarted
 from onboard.core.estimate.result import Calibration, Six, Status
-from onboard.core.estimate.settings import EstimatorSettings
-from onboard.core.gps.trust import WindowClosed, WindowOpened
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.gps.distrust import WindowClosed, WindowOpened
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.daemon.learning.examiner import Examiner
 from onboard.daemon.learning.flight import JudgedFlight, compared_now, decode, encode
@@ -93,7 +94,7 @@ class Learner:
     def __init__(
         self,
         store: Store,
-        settings: EstimatorSettings,
+        settings: CalibratorSettings,
         *,
         clock: Callable[[], float],
         wall_clock: Callable[[], float],

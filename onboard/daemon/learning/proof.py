@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
@@ -14,7 +14,7 @@ from onboard.daemon.learning.meaning import carried, hand_on
 class ProofFlight:
     """Learns what is flown between arming and disarming, and nothing else."""
 
-    def __init__(self, settings: EstimatorSettings) -> None:
+    def __init__(self, settings: CalibratorSettings) -> None:
         self._settings = settings
         self._calibrator: Calibrator | None = None
         self._ground = Ground()

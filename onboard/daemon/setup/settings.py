@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from onboard.core.estimate.settings import EstimatorSettings
-from onboard.core.gps.trust import TrustLimits
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.gps.limits import TrustLimits
 from onboard.daemon.setup import configuration
 from onboard.daemon.setup.recording import RollingRecorder
 from onboard.mavlink.endpoint import Endpoint
@@ -33,7 +33,7 @@ def policy_settings(push: configuration.PushSettings) -> PolicySettings:
     )
 
 
-def estimator_settings(estimator: configuration.EstimatorSettings) -> EstimatorSettings:
+def estimator_settings(estimator: configuration.EstimatorSettings) -> CalibratorSettings:
     """[estimator]."""
     trust = replace(
         TrustLimits(),
@@ -43,7 +43,7 @@ def estimator_settings(estimator: configuration.EstimatorSettings) -> EstimatorS
         duration=estimator.window_s or None,
     )
     return replace(
-        EstimatorSettings(),
+        CalibratorSettings(),
         minimum_s=estimator.minimum_trusted_s,
         buffer_s=estimator.buffer_s,
         memory_s=estimator.memory_s,

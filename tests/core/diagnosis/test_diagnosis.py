@@ -7,7 +7,7 @@ import pytest
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.recordings.opening import open_recording
 
 pytestmark = pytest.mark.recordings
@@ -19,7 +19,7 @@ def answers(recordings):
 
 
 def diagnosed(recordings, name):
-    made = Calibrator(EstimatorSettings(buffer_s=3600.0, refine=False))
+    made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
     for sample in open_recording(recordings / "sitl" / f"{name}.tlog").samples():
         made.feed(sample)
     made.finish()

@@ -5,7 +5,7 @@ import pytest
 
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.mount_tilt import TRIM_RAD, MountTilt, attitude_cure, levelled
@@ -35,7 +35,7 @@ def spec(*effects, **parameters):
 
 def diagnosed(flown):
     decoder = Decoder(system=1, component=1)
-    made = Calibrator(EstimatorSettings(buffer_s=3600.0, refine=False))
+    made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
     for _, message in fly_messages(flown):
         for sample in decoder.decode(message):
             made.feed(sample)

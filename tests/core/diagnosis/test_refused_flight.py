@@ -12,9 +12,10 @@ from onboard.core.diagnosis.records import Mismatch, Verdict
 from onboard.core.diagnosis.timing_effects import _of_latency
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import FixClock
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, Reason, TrustWindow
+from onboard.core.gps.distrust import Distrust
+from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
@@ -41,7 +42,7 @@ def flagged(seed, gps, complaint, *effects, duration=200.0):
         gps=gps,
         effects=effects,
     )
-    made, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):
             made.feed(complaining(sample, *complaint) if isinstance(sample, EkfHealth) else sample)
@@ -119,7 +120,7 @@ def test_the_window_remembers_when_it_refused_and_why():
             window.feed(EkfHealth(t, EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0)))
         window.feed(GpsFix(t, 1, 3, 0.5, 0.5, 10.0, 0.0, 0.0, satellites=12))
     (refusal,) = window.refusals
-    assert refusal.reason is Reason.EKF_GPS_GLITCH
+    assert refusal.reason is Distrust.EKF_GPS_GLITCH
     # Until the recovery time of five seconds has passed.
     assert (refusal.start, refusal.end) == pytest.approx((5.0, 12.8), abs=0.21)
 
@@ -164,7 +165,7 @@ def test_what_the_driver_assumes_by_itself_is_not_advised():
     cure, parameters = _of_latency(0.19, FixClock(assumed=(0.2,)))
     assert parameters == {}
     assert cure.startswith("none")
-    _, parameters = _of_latency(0.19, FixClock(told=0.1, assumed=(0.1,)))
+    _, parameters = _of_latency(0.19, FixClock(configured=0.1, assumed=(0.1,)))
     assert parameters == {"GPS1_DELAY_MS": 190.0}
 
 

@@ -8,7 +8,7 @@ import pytest
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import GpsTruth, random_imus
@@ -26,7 +26,7 @@ def diagnosed(vehicle, seed, *effects, duration=150.0, imus=None, gps=PROMPT):
         gps=gps,
         effects=effects,
     )
-    calibrator, decoder = Calibrator(EstimatorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    calibrator, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):
             calibrator.feed(sample)

@@ -5,14 +5,14 @@ import pytest
 
 from onboard.core.estimate.agreement import CHI_SQUARE_6_999, STRANGER, passes_for_it
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, fly_messages
 
-ONCE = EstimatorSettings(refine=False)
+ONCE = CalibratorSettings(refine=False)
 OURS = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.2, -0.15, 0.3))
 ANOTHER = ImuTruth(scale=(0.99, 1.01, 0.995), offset=(-0.1, 0.2, -0.2))
 PRIOR = np.diag([0.03**2] * 3 + [0.5**2] * 3)

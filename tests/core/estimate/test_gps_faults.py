@@ -10,7 +10,7 @@ from benchmarks.recorded import Flight, moving_span, recorded, simulated
 from benchmarks.robustness import outcomes
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Status
-from onboard.core.gps.trust import Reason, WindowClosed
+from onboard.core.gps.distrust import Distrust, WindowClosed
 from onboard.core.inputs.samples import GpsFix, ImuSample
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
@@ -83,7 +83,7 @@ def test_the_last_answer_outlives_gps(flight, fault):
                 assert isinstance(sample, ImuSample) or fault is NO_FIX
                 closed.append(event)
     assert not made.trust.is_open
-    assert closed[-1].reason is (Reason.GPS_GAP if fault is SILENT else Reason.NO_FIX)
+    assert closed[-1].reason is (Distrust.GPS_GAP if fault is SILENT else Distrust.NO_FIX)
     assert closed[-1].t == pytest.approx(last, abs=0.5)
     made.finish()
     got = made.calibration(1)

@@ -9,10 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onboard.core.estimate.calibrator import Calibrator, Restarted
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.events import Restarted
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
-from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack, even_times
+from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
@@ -20,7 +22,7 @@ from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, fly_messages
 
 SCALE, OFFSET = (1.02, 0.985, 1.015), (0.2, -0.15, 0.3)
-ONCE = EstimatorSettings(refine=False)
+ONCE = CalibratorSettings(refine=False)
 IN_FORCE = dict(zip(parameter_names(1).six, (1.0,) * 3 + (0.1,) * 3, strict=True))
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from onboard.core.estimate.calibrator import Calibrator, Restarted
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.events import Restarted
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
 from onboard.core.inputs.tracks import untruncated

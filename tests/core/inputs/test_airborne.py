@@ -7,7 +7,7 @@ import pytest
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Status
-from onboard.core.estimate.settings import EstimatorSettings
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.airborne import Ground, still
 from onboard.core.inputs.samples import (
     AttitudeSample,
@@ -19,7 +19,7 @@ from onboard.core.inputs.samples import (
 from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages
 
-SHORT = EstimatorSettings(refine=False, buffer_s=100.0)
+SHORT = CalibratorSettings(refine=False, buffer_s=100.0)
 STAND_S = 600.0
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from onboard.core.maths import frames
+from onboard.core.maths import board_orientation, frames
 
 ROUNDING = 1e-12
 angle = st.floats(-np.pi, np.pi)
@@ -118,19 +118,23 @@ def test_interpolation_turns_at_constant_rate_and_holds_at_the_ends():
 def test_every_board_orientation_is_a_rotation_and_the_90_degree_ones_are_exact():
     aligned = set()
     for value in range(44):
-        R = frames.board_rotation(value)
+        R = board_orientation.board_rotation(value)
         assert R is not None
         assert np.allclose(R @ R.T, np.eye(3), atol=ROUNDING)
         assert np.linalg.det(R) == pytest.approx(1)
-        if frames.is_axis_aligned(R):
+        if board_orientation.is_axis_aligned(R):
             aligned.add(tuple(R.astype(int).ravel()))
             assert set(np.unique(R)) <= {-1.0, 0.0, 1.0}
     assert len(aligned) == 24  # all rotations of the cube are in the list
 
 
 def test_board_orientations_that_the_autopilot_documents_as_the_same():
-    assert np.array_equal(frames.board_rotation(26), frames.board_rotation(14))
-    assert np.array_equal(frames.board_rotation(27), frames.board_rotation(10))
+    assert np.array_equal(
+        board_orientation.board_rotation(26), board_orientation.board_rotation(14)
+    )
+    assert np.array_equal(
+        board_orientation.board_rotation(27), board_orientation.board_rotation(10)
+    )
 
 
 @pytest.mark.parametrize(
@@ -145,31 +149,31 @@ def test_board_orientations_that_the_autopilot_documents_as_the_same():
     ],
 )
 def test_board_orientation_takes_sensor_to_body(value, f_s, f_b):
-    assert np.array_equal(frames.board_rotation(value) @ f_s, f_b)
+    assert np.array_equal(board_orientation.board_rotation(value) @ f_s, f_b)
 
 
 def test_board_orientation_with_odd_angles_uses_the_real_ones():
-    R = frames.board_rotation(38)
+    R = board_orientation.board_rotation(38)
     assert R is not None
     assert R[2, 0] == pytest.approx(-0.93232380, abs=1e-7)
     assert R[0, 2] == pytest.approx(-0.91844638, abs=1e-7)
-    assert not frames.is_axis_aligned(R)
+    assert not board_orientation.is_axis_aligned(R)
 
 
 @pytest.mark.parametrize("value", [-1, 44, 99, 100, 101, 102, 103, 2.5, float("nan"), float("inf")])
 def test_unknown_board_orientation_is_none(value):
-    assert frames.board_rotation(value) is None
+    assert board_orientation.board_rotation(value) is None
 
 
 def test_custom_board_orientation_needs_its_angles():
-    R = frames.board_rotation(101.0, custom=(0.0, 0.0, np.pi / 2))
+    R = board_orientation.board_rotation(101.0, custom=(0.0, 0.0, np.pi / 2))
     assert np.allclose(R, about(2, np.pi / 2), atol=ROUNDING)
-    assert frames.is_axis_aligned(R)
+    assert board_orientation.is_axis_aligned(R)
 
 
 def test_a_projection_or_a_shear_is_not_axis_aligned():
-    assert not frames.is_axis_aligned(np.array([[1, 0, 0], [1, 0, 0], [0, 0, 1.0]]))
-    assert not frames.is_axis_aligned(frames.rotation_from_euler(0, 0, 1e-6))
+    assert not board_orientation.is_axis_aligned(np.array([[1, 0, 0], [1, 0, 0], [0, 0, 1.0]]))
+    assert not board_orientation.is_axis_aligned(frames.rotation_from_euler(0, 0, 1e-6))
 
 
 @given(st.floats(-1.4, 1.4), st.floats(-1.2, 1.2), angle)

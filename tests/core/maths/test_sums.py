@@ -144,3 +144,61 @@ def test_numbers_that_are_none_are_refused(number, place):
     data[at : at + 8] = struct.pack("<d", number)
     with pytest.raises(StateError):
         NormalSums.from_bytes(bytes(data))
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_shifts_add_up_and_go_through_sums(seed):
+    rng = np.random.default_rng(seed)
+    one, two = summed(*rows(seed, 12)), summed(*rows(seed ^ 1, 9))
+    a, b = rng.normal(size=M), rng.normal(size=M)
+    assert_same(one.shifted(a).shifted(b), one.shifted(a + b), rtol=1e-9)
+    assert_same((one + two).shifted(a), one.shifted(a) + two.shifted(a), rtol=1e-9)
+    assert_same(one.shifted(a).shifted(-a), one, rtol=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+@settings(max_examples=40, deadline=None)
+def test_forgetting_weighs_every_innovation_alike(seed, weight):
+    h, y = rows(seed, 25)
+    root = np.sqrt(weight)
+    light = summed(root * h, root * y)
+    faded = summed(h, y).scaled(weight)
+    np.testing.assert_allclose(faded.N, light.N, atol=1e-12)
+    np.testing.assert_allclose(faded.b, light.b, atol=1e-12)
+    assert faded.s == pytest.approx(light.s)
+    assert faded.rows == pytest.approx(25 * weight)
+
+
+def test_members_of_a_bank_are_summed_each_for_itself():
+    rng = np.random.default_rng(9)
+    bank, other = BankSums(3, M), BankSums(3, M)
+    alone = [NormalSums.zeros(M) for _ in range(3)]
+    for epoch in range(6):
+        h, y = rng.normal(size=(3, 4, M)), rng.normal(size=(3, 4))
+        log_det = rng.normal(size=3)
+        (bank if epoch % 2 else other).add(y, h, log_det)
+        for i in range(3):
+            N, b = h[i].T @ h[i], h[i].T @ y[i]
+            one = NormalSums(N, b, np.zeros((M, M)), float(y[i] @ y[i]), 4, float(log_det[i]))
+            alone[i] = alone[i] + one
+    bank += other
+    for i in range(3):
+        assert_same(bank.member(i), alone[i])
+
+
+def test_the_likelihood_of_a_member_is_that_of_a_gaussian():
+    """Unknowns integrated out: a dense normal density of the innovations, prior included."""
+    h, y = rows(12, 20)
+    prior, sigma = np.full(M, 0.3), np.linspace(0.5, 2.0, M)
+    got = []
+    for scale in (1.0, 2.0):
+        bank = BankSums(1, M)
+        bank.add(y[None] / scale, h[None] / scale, np.array([2.0 * 20 * np.log(scale)]))
+        got.append(bank.log_likelihoods(prior, sigma)[0])
+    dense = []
+    for scale in (1.0, 2.0):
+        S = scale**2 * np.eye(20) + h @ np.diag(sigma**2) @ h.T
+        r = y - h @ prior
+        dense.append(-0.5 * (np.linalg.slogdet(S)[1] + r @ np.linalg.solve(S, r)))
+    assert got[0] - got[1] == pytest.approx(dense[0] - dense[1], rel=1e-9)

@@ -78,7 +78,7 @@ def made():
 
 
 def columns(made, family):
-    return Model([family]).columns(*made)
+    return Model([family]).regressors(*made)
 
 
 @pytest.mark.parametrize("j", range(6))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from onboard.core.estimate.engine import calibration_model, moved
+from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.core.model.linearisation import MOVING, Linearisation

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.segments import Segment
-from onboard.core.inputs.tracks import even_times, untruncated
+from onboard.core.inputs.tracks import untruncated
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
 from onboard.core.model.quadrature import NodeMaker, rotation_increments, simpson_weights

@@ -13,12 +13,12 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.model.nuisances import (
-    AntennaPlace,
     AttitudeOffset,
     GpsLatency,
     GpsSmoothing,
     GyroScale,
     ImuDelay,
+    LeverArmError,
     Six,
 )
 from onboard.core.model.quadrature import NodeMaker
@@ -75,7 +75,7 @@ def nodes_of(f_read):
 def columns_of(family, f_read=F):
     intervals, around = nodes_of(f_read)
     assert family.available(around.now)
-    return Model([family]).columns(intervals, around)
+    return Model([family]).regressors(intervals, around)
 
 
 def gained(a_b):
@@ -209,7 +209,7 @@ def test_a_receiver_that_averages(window):
     np.testing.assert_allclose(got, numeric, atol=0.05 * np.abs(numeric).max())
 
 
-@pytest.mark.parametrize("family", [GpsLeverArm(ORIGIN), AntennaPlace()])
+@pytest.mark.parametrize("family", [GpsLeverArm(ORIGIN), LeverArmError()])
 def test_an_antenna_away_from_the_imu_swings(family):
     got = columns_of(family)
     e = 1e-3

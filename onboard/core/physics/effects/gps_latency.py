@@ -30,7 +30,7 @@ class GpsLatency(Effect):
     def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
         """The whole delay, where it is another one than the autopilot was told."""
         delay = standing.timing["gps_delay_s"]
-        off = abs(delay.value - standing.clock.told_on_stamp)
+        off = abs(delay.value - standing.clock.configured_on_stamp)
         if off <= cls.least or off <= SURE * delay.sigma:
             return None
         size = {"delay": Quantity(delay.value, delay.sigma, "s")}
@@ -54,7 +54,7 @@ class GpsLatency(Effect):
             said = f"none: {clock.name} is 0, for which this receiver's driver takes {taken} ms"
             return Cure(said)
         words = cls.cure
-        if not clock.told and clock.assumed:
+        if not clock.configured and clock.assumed:
             words += f" (0 stands for {taken} ms, by its driver)"
         if round(1e3 * clock.late):
             words += (

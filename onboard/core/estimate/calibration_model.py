@@ -1,0 +1,85 @@
+"""The model of an ordinary flight, and how its linearisation follows what was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.estimate.limits import (
+    ATTITUDE_DELAY_RANGE_S,
+    DELAY_RANGE_S,
+    HEADING_RANGE_RAD,
+    LONGEST_WINDOW_S,
+)
+from onboard.core.estimate.observability import Needs
+from onboard.core.maths.arrays import Array
+from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.nuisances import (
+    AttitudeOffset,
+    GpsLatency,
+    GpsSmoothing,
+    GyroScale,
+    GyroTiming,
+    HeightLatency,
+    ImuDelay,
+    LeverArmError,
+    Six,
+)
+from onboard.core.model.regressors import Family, Model
+
+NOMINAL = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+"""Scale (1) and beta (m/s^2) of an accelerometer of which nothing is known."""
+
+
+def calibration_model(
+    point: Linearisation,
+    prior: Array | None = None,
+    needs: Needs | None = None,
+    more: tuple[Family, ...] = (),
+) -> Model:
+    """Calibration parameters, timing and nuisances about ``point``.
+
+    Args:
+        point: linearisation.
+        prior: (6,) scale (1) and beta (m/s^2), sensor axes; None: nothing is known.
+        needs: prior sigmas of them.
+        more: other physics; a nuisance gives way to what is there instead of it.
+    """
+    needs = needs or Needs()
+    centre = np.array(NOMINAL) if prior is None else prior
+    always: tuple[Family, ...] = (
+        Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
+        GpsLatency(point.delay),
+        GpsSmoothing(point.window),
+        ImuDelay(point.attitude_delay),
+        HeightLatency(),
+        GyroTiming(),
+        GyroScale(),
+        AttitudeOffset(),
+        LeverArmError(),
+    )
+    gone = {f.instead_of for f in more}
+    return Model([*(f for f in always if f.name not in gone), *more])
+
+
+def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
+    """The linearisation that a solution asks for, inside the range of what is possible.
+
+    Args:
+        point: the linearisation that the solution is about.
+        model: its model.
+        theta: (m,) its unknowns.
+    """
+    i = model.index
+    square = point.window**2 + theta[i["window_squared"]]
+    return Linearisation(
+        scale=tuple(float(x) for x in theta[0:3]),  # type: ignore[arg-type] # three by construction
+        beta=tuple(float(x) for x in theta[3:6]),  # type: ignore[arg-type] # three by construction
+        delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
+        window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
+        attitude_delay=float(
+            np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
+        ),
+        heading=float(np.clip(point.heading + theta[i["heading"]], *HEADING_RANGE_RAD)),
+        skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
+        skew_from=point.skew_from,
+    )

@@ -1,0 +1,91 @@
+"""What was learned before the last start, until a flight agrees with it or contradicts it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+from onboard.core.estimate.agreement import agrees
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import MOST_SAVED, MOST_WAITING
+from onboard.core.estimate.saving import SavedEngine, dump, load
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.blocks import Seconds, merged
+
+
+class EarlierSums:
+    """Saved sums by accelerometer, waiting for a flight that agrees with them."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[int, list[SavedEngine]] = {}
+
+    def __iter__(self) -> Iterator[int]:
+        """Accelerometers that have some, in order."""
+        return iter(sorted(self._waiting))
+
+    def lay_aside(self, data: bytes) -> None:
+        """Keep what :meth:`to_bytes` gave.
+
+        Raises:
+            StateError: damaged, or of another version.
+        """
+        for saved in load(data):
+            self._waiting.setdefault(saved.imu, []).append(saved)
+
+    def forget(self, imu: int) -> None:
+        """What was learned of one accelerometer is known to be wrong."""
+        self._waiting.pop(imu, None)
+
+    def judge(self, imu: int, engine: Engine, device_id: float | None) -> Counter[str]:
+        """Add sums of before to an engine, drop them, or let them wait on.
+
+        Args:
+            imu: which accelerometer.
+            engine: has flown since.
+            device_id: the accelerometer's INS_ACCn_ID, if it was reported.
+
+        Returns:
+            What was done, by name.
+        """
+        done: Counter[str] = Counter()
+        for saved in self._waiting.pop(imu, []):
+            if None not in (device_id, saved.device_id) and device_id != saved.device_id:
+                done["saved_of_another_sensor"] += 1
+                continue
+            # Sums of a sensor that said who it is wait until this one has said it, too.
+            opinion = agrees(engine, saved) if device_id == saved.device_id else None
+            if opinion is None:
+                waiting = self._waiting.setdefault(imu, [])
+                waiting.append(saved)
+                del waiting[:-MOST_WAITING]
+            elif opinion:
+                done["restored"] += 1
+                engine.restore(saved.blocks, saved.point, saved.seconds)
+            else:
+                done["saved_contradicted"] += 1
+        return done
+
+    def to_bytes(self, engines: Mapping[int, Engine], parameters: ParametersInForce) -> bytes:
+        """The engines' sums, and those that still wait: a flight that says too little loses none.
+
+        Args:
+            engines: by accelerometer.
+            parameters: in force, for the identifiers of the sensors.
+        """
+        saved = []
+        for imu, engine in sorted(engines.items()):
+            blocks = merged(engine.all_blocks, MOST_SAVED)
+            if blocks:
+                saved.append(
+                    SavedEngine(
+                        imu,
+                        parameters.device_id(imu),
+                        tuple(float(x) for x in engine.model.prior[:6]),
+                        engine.point,
+                        engine.noise,
+                        Seconds(engine.trusted_s, engine.brisk_s),
+                        tuple(blocks),
+                    )
+                )
+        saved.extend(e for waiting in self._waiting.values() for e in waiting)
+        return dump(saved)

@@ -1,0 +1,73 @@
+"""The engines of all accelerometers, and what was learned of each before."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+
+from onboard.core.estimate.earlier import EarlierSums
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.segments import Batch
+
+
+class Engines:
+    """One engine an accelerometer, made when the first flight of it comes in.
+
+    Attributes:
+        earlier: sums of before the last start, until a flight agrees with them.
+    """
+
+    def __init__(
+        self, settings: CalibratorSettings, parameters: ParametersInForce, only: Collection[int]
+    ) -> None:
+        """Take the settings, the parameters in force, and the accelerometers (none: all)."""
+        self._settings = settings
+        self._parameters = parameters
+        self._only = frozenset(only)
+        self._engines: dict[int, Engine] = {}
+        self.earlier = EarlierSums()
+
+    def __iter__(self) -> Iterator[int]:
+        """Accelerometers that are estimated, in order."""
+        return iter(sorted(self._engines))
+
+    def __getitem__(self, imu: int) -> Engine:
+        return self._engines[imu]
+
+    @property
+    def known(self) -> set[int]:
+        """Accelerometers of which anything was learned, now or before."""
+        return {*self._engines, *self.earlier}
+
+    def add(self, batches: Mapping[int, list[Batch]]) -> float | None:
+        """Process batches of flight by accelerometer; time of the last fix in them, s."""
+        newest: float | None = None
+        for imu, made in batches.items():
+            if self._only and imu not in self._only:
+                continue
+            for batch in made:
+                if imu not in self._engines:
+                    prior = self._parameters.six(imu).as_linear()
+                    self._engines[imu] = Engine(self._settings, prior)
+                self._engines[imu].add(batch)
+                end = float(batch.fixes.t[-1])
+                newest = end if newest is None else max(newest, end)
+        return newest
+
+    def refine(self) -> Counter[str]:
+        """A flight is over: refine, and add sums of before that it agrees with; what was done."""
+        done: Counter[str] = Counter()
+        for imu, engine in self._engines.items():
+            engine.finish()
+            done += self.earlier.judge(imu, engine, self._parameters.device_id(imu))
+        return done
+
+    def forget(self, imu: int) -> bool:
+        """Forget the engine of one accelerometer; False if there was none."""
+        return self._engines.pop(imu, None) is not None
+
+    def to_bytes(self) -> bytes:
+        """Sums of every accelerometer, to go on with after a restart."""
+        return self.earlier.to_bytes(self._engines, self._parameters)

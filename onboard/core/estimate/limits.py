@@ -1,0 +1,116 @@
+"""Every number of this room that decides something, with where it comes from.
+
+Provenance in brackets: *probability* (of a false alarm), *physics*, *data sheet*, *cost* (more buys
+nothing), or *tuned* (on simulated flights: to be derived).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Linearisation (calibration_model): the range in which timing is looked for.
+
+LONGEST_WINDOW_S: Final = 0.45
+"""Longest averaging span of a receiver, s: what the nodes around a fix resolve, less a margin
+[cost; real receivers ask for 0.5 to 0.6, to be widened with the nodes]."""
+DELAY_RANGE_S: Final = (-0.1, 0.45)
+"""Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
+ATTITUDE_DELAY_RANGE_S: Final = (-0.15, 0.15)
+"""Lateness of the recorded attitude, s [physics: beyond it streams are not of one vehicle]."""
+HEADING_RANGE_RAD: Final = (-0.8, 0.8)
+"""Error of the recorded heading, rad [physics: past it an EKF does not align]."""
+
+# Refinement (engine).
+
+ROUNDS: Final = 4
+"""Rounds of a refinement: latency is found to a millisecond in two or three [cost]."""
+NOISE_ROUNDS: Final = 3
+"""Rounds that may begin a search for noise levels; each search takes two [cost]."""
+SETTLED_LOG_RATIO: Final = 0.15
+"""Noise levels closer than this are the same: only their order of magnitude matters [cost]."""
+STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
+"""Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
+worth another pass [cost]."""
+NEW_SHARE: Final = 0.05
+"""Share of a flight that must be new for another refinement at its end [cost]."""
+MOST_STATES: Final = 12000
+"""Epochs whose state is kept for certificates: 20 minutes at 10 Hz [cost]."""
+MOST_AGED: Final = 24
+"""Blocks of flight that has left the buffer: enough for folds and clusters [cost]."""
+
+# Streams (calibrator).
+
+OTHER_CLOCK_S: Final = 60.0
+"""s; no stream lags the inertial one by more: what does is of another source, or garbage
+[physics]."""
+AHEAD_OF_IMU_S: Final = 5.0
+"""s; nor is one further ahead: taken in, a single such stamp would make all that follow late
+[physics]."""
+
+# What is kept across restarts (saved_sums, agreement).
+
+MOST_SAVED: Final = 16
+"""Blocks that are saved: enough for folds and clusters [cost]."""
+MOST_WAITING: Final = 4
+"""Sums of earlier starts that wait for a flight that agrees with them, the latest [cost]."""
+CHI_SQUARE_6_999: Final = 22.46
+"""Exceeded once in a thousand times by a chi-square of six degrees of freedom [probability]."""
+STRANGER: Final = 0.01
+"""Probability with which another sensor may pass for this one [probability]."""
+
+# Solution.
+
+FOLDS: Final = 8
+"""Folds of the cross-validation [cost]."""
+GRAM_DOUBT: Final = 0.5
+"""Relative uncertainty of the noise that was taken out of the regressors: its spectrum is a guess
+[cost]."""
+FEWEST_BLOCKS: Final = 6
+"""Fewer blocks do not tell a cluster's scatter [cost]."""
+ONE_IN_A_THOUSAND: Final = 3.09
+"""Standard normal deviate that is exceeded once in a thousand times [probability]."""
+MOST_NOISE: Final = 0.9
+"""Share of a direction's information that noise may claim; past it there is nothing left to see
+[cost]."""
+
+# Calibration record.
+
+SCALE_FLOOR: Final = 5e-4
+OFFSET_FLOOR: Final = 1e-3
+"""Sigmas of a scale (1) and an offset (m/s^2) that no flight goes below: what the model does not
+know (filters, interpolation, clocks) [cost]."""
+TIMING_FLOOR_S: Final = 5e-4
+"""The same of a delay, s: half of the milliseconds that streams are stamped with [physics]."""
+FEWEST_OBSERVED: Final = 3
+"""Parameters that a flight must have observed to be called a calibration [tuned]."""
+CONTRADICTION: Final = 6.0
+"""Inflation of the variance past which blocks of one flight ask for different parameters
+[tuned]."""
+APART_S: Final = 10.0
+"""s; put between the flights of two boots, so that no window spans both [cost: any
+number above the longest gap]."""
+
+# Observability.
+
+COUPLED: Final = 0.85
+"""Correlation from which two numbers are a pair: knowing one would halve the other's sigma
+[probability]."""
+PRIOR_SHARE: Final = 0.5
+"""Share of the prior's sigma that a flight has to get below for a number to be observed
+[probability]."""
+
+# Dead reckoning.
+
+LONG_DRIFT_S: Final = 60.0
+"""Horizon of the drift that a person is told, s [a GPS outage as pilots think of it]."""
+SHORT_DRIFT_S: Final = 10.0
+"""Horizon of the velocity residual, s [the length of a batch]."""
+LONG_DRIFTS: Final = 6
+SHORT_DRIFTS: Final = 12
+"""Windows of either at the most [cost]."""
+SAME_EPOCH_S: Final = 1e-3
+"""Times closer than this are one epoch: streams are stamped in milliseconds [physics]."""
+WHOLE_SHARE: Final = 0.97
+"""Share of a horizon that a window must reach [cost]."""
+FEWEST_INTERVALS: Final = 3
+"""Intervals between fixes that a window must have [cost]."""

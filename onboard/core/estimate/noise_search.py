@@ -1,0 +1,45 @@
+"""The search for noise levels, pass by pass: a stencil, a line search along its step, and again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.estimate.limits import SETTLED_LOG_RATIO
+from onboard.core.filter.noise import NoiseLevels, distance, line_search, stencil, stepped
+
+
+class NoiseSearch:
+    """Says which levels a filter bank should try next, and which are the best so far."""
+
+    def __init__(self, rounds: int) -> None:
+        """Take the number of passes, from the first on, that may begin a stencil."""
+        self._rounds = rounds
+        self._target: NoiseLevels | None = None
+        self._members: tuple[NoiseLevels, ...] | None = None
+
+    def members(self, turn: int, levels: NoiseLevels) -> tuple[NoiseLevels, ...] | None:
+        """Levels of the bank in pass number ``turn``; None: only those that hold now."""
+        self._members = None
+        if self._target is not None:
+            self._members = line_search(levels, self._target)
+        elif turn < self._rounds:
+            self._members = stencil(levels)
+        return self._members
+
+    def better(self, levels: NoiseLevels, log_likelihoods: Sequence[float]) -> NoiseLevels:
+        """Levels from here on, from what the bank of :meth:`members` has shown."""
+        target, self._target = self._target, None
+        if self._members is None:
+            return levels
+        if target is not None:
+            return self._members[int(np.argmax(log_likelihoods))]
+        found = stepped(levels, log_likelihoods)
+        if distance(levels, found) >= SETTLED_LOG_RATIO:
+            self._target = found
+        return levels
+
+    def settled(self, before: NoiseLevels, now: NoiseLevels) -> bool:
+        """Whether there is nothing more to try, and the levels have not moved."""
+        return self._target is None and distance(before, now) < SETTLED_LOG_RATIO

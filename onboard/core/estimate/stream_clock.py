@@ -1,0 +1,41 @@
+"""The boot clock as the inertial stream carries it, against which other stamps are judged."""
+
+from __future__ import annotations
+
+import math
+
+from onboard.core.estimate.limits import AHEAD_OF_IMU_S, OTHER_CLOCK_S
+from onboard.core.inputs.boot_time import began_anew
+
+
+class StreamClock:
+    """Newest and first time of the inertial samples, s on the boot clock."""
+
+    __slots__ = ("first", "newest")
+
+    def __init__(self) -> None:
+        self.newest = -math.inf
+        self.first = math.inf
+
+    def hear(self, t: float) -> None:
+        """An inertial sample has come."""
+        self.newest = max(self.newest, t)
+        if not math.isfinite(self.first):
+            self.first = t
+
+    def restart(self) -> float:
+        """The clock begins anew; its last time before that."""
+        ended, self.newest = self.newest, -math.inf
+        return ended
+
+    def went_back(self, t: float) -> bool:
+        """True if an inertial stamp says that the autopilot has started again."""
+        return began_anew(t, self.newest)
+
+    def is_ahead(self, t: float) -> bool:
+        """True for a stamp that the inertial stream is too far from reaching."""
+        return math.isfinite(self.newest) and t - self.newest > AHEAD_OF_IMU_S
+
+    def is_other(self, t: float) -> bool:
+        """True for a stamp of another clock (another source, or garbage)."""
+        return math.isfinite(self.newest) and abs(t - self.newest) > OTHER_CLOCK_S

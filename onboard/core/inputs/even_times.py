@@ -1,0 +1,75 @@
+"""Times of fixes without the jitter of their stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.inputs.limits import (
+    CRYSTAL,
+    EVEN_ALREADY_S,
+    FEWEST_EVEN,
+    LEAST_JITTER_S,
+    NO_GRID_S,
+    REWEIGHTINGS,
+    WHOLE_MS,
+)
+from onboard.core.maths.arrays import Array
+
+
+def even_times(t: Array, t_receiver: Array | None) -> Array:
+    """De-jittered epoch times on the boot clock.
+
+    Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
+    own time the stamps are its clock plus a straight line (offset and drift); without it the
+    epoch numbers are recovered from the commonest interval.  A line is fitted robustly over the
+    batch; stamps that are even already stay as they are.
+
+    Args:
+        t: (n,) stamps, s, increasing.
+        t_receiver: (n,) receiver times, s, or None.
+
+    Returns:
+        (n,) strictly increasing times, s.
+    """
+    if len(t) < FEWEST_EVEN:
+        return t.copy()
+    clock = _clock(t, t_receiver)
+    if clock is None:
+        return t.copy()
+    offset = t - t[0] - clock
+    if not EVEN_ALREADY_S <= float(np.ptp(offset)) <= NO_GRID_S:
+        return t.copy()
+    even: Array = t[0] + clock + _robust_line(clock - clock.mean(), offset)
+    return even
+
+
+def _clock(t: Array, t_receiver: Array | None) -> Array | None:
+    """(n,) receiver time since the first epoch, s; None if the stamps show none."""
+    if t_receiver is not None and np.all(np.diff(t_receiver) > 0):
+        since: Array = t_receiver - t_receiver[0]
+        return since
+    period = float(np.median(np.diff(t)))
+    if period <= 0.0:
+        return None
+    count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
+    # The median of jittered intervals is off by a millisecond, which adds up over a batch:
+    # good enough to number the epochs, not to say when they were.
+    period = float(np.polyfit(count, t - t[0], 1)[0])
+    whole = round(period * 1e3)
+    counted: Array = count * (whole * 1e-3 if abs(period * 1e3 - whole) < WHOLE_MS else period)
+    return counted
+
+
+def _robust_line(x: Array, y: Array) -> Array:
+    """(n,) straight line through ``y`` at ``x`` (both (n,), s), outliers weighted down."""
+    weight, line = np.ones(len(x)), np.zeros(len(x))
+    for _ in range(REWEIGHTINGS):
+        mean = float(np.average(y, weights=weight))
+        spread = float(weight @ (x * x))
+        # Over one batch the slope is noise, unless it is long.
+        slope = float(np.clip(weight @ (x * (y - mean)) / spread, -CRYSTAL, CRYSTAL))
+        line = mean + slope * x
+        residual = np.abs(y - line)
+        scale = max(float(np.median(residual)), LEAST_JITTER_S)
+        weight = 1.0 / np.maximum(1.0, residual / (2.0 * scale))
+    return line

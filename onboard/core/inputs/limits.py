@@ -1,0 +1,83 @@
+"""Every number of this room that decides something, with where it comes from.
+
+Provenance in brackets: *physics*, *data sheet*, *cost* (more buys nothing), or *tuned* (on flights:
+to be derived).  The ranges of possible samples stand in :mod:`onboard.core.inputs.range_checks`,
+those of standing still in :mod:`onboard.core.inputs.airborne`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+LONGEST_FIX_GAP_S: Final = 2.5
+"""s; receivers report at 1 Hz or faster and may miss one: longer without a fix is an outage, not
+trusted flight [data sheet]."""
+
+# What is needed around a fix (assembly).
+
+REACH_S: Final = 0.8
+"""s; inertial samples are needed this long before a fix's stamp: latency and half the averaging
+span [physics: the longest latency 0.45, the nodes' 0.25, and a margin]."""
+REACH_MARGIN_S: Final = 0.1
+"""s; by which samples are taken from earlier than that, for even times move a little [cost]."""
+AHEAD_S: Final = 0.4
+"""s; and this long after it [physics: a negative latency 0.1, the nodes' 0.25, and a margin]."""
+AFTER_S: Final = 0.3
+"""s; without which after the last fix of a piece nothing of it is taken [as before]."""
+KEPT_S: Final = 0.3
+"""s; samples are kept this much longer than they reach [cost]."""
+SLOW_KEPT_S: Final = 1.0
+"""s; and those of slow signals so much longer still [cost]."""
+
+# Cutting (assembly).
+
+IMU_GAP_S: Final = 0.25
+"""s; attitude changes too much over a longer gap to be interpolated [physics]."""
+FEWEST_SAMPLES: Final = 8
+"""Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
+FEWEST_FIXES: Final = 3
+"""Fixes of a batch: two intervals [cost]."""
+SILENT_S: Final = 2.0
+"""s; an accelerometer that is so far behind the newest is not waited for [cost]."""
+LEAST_WAITING_S: Final = 0.5
+"""s of flight without which there is nothing to cut at the end of a flight [cost]."""
+LEAST_LAG_S: Final = 2e-4
+"""s; a gyroscope's lag below it is nothing: a hundredth of a sample [cost]."""
+TEMPERATURE_EVERY: Final = 10
+"""Inertial samples of which one temperature is kept [cost]."""
+
+# Interpolation (segments, gyroscopes).
+
+DENSE_S: Final = 0.15
+"""s; attitude samples this close together can be interpolated: between sparser ones a vehicle turns
+in ways that they do not show [physics]."""
+NEAR_S: Final = 0.02
+"""s; and at this distance a sample speaks for itself [physics]."""
+AS_DENSE: Final = 1.25
+"""A gyroscope whose samples are sparser than this against the accelerometer's shows less of the
+motion than the accelerometer's own [cost]."""
+
+# Streams (tracks).
+
+HIGHRES_S: Final = 0.5
+"""s after a HIGHRES_IMU during which RAW_IMU, the coarser of the two, is not taken [cost]."""
+
+# Even times of fixes (even_times).
+
+FEWEST_EVEN: Final = 5
+"""Fixes: fewer do not show a grid [cost]."""
+WHOLE_MS: Final = 0.3
+"""ms; a period this near to a whole millisecond is one: receivers run at 1, 2, 4, 5, 8, 10 Hz
+[data sheet]."""
+EVEN_ALREADY_S: Final = 2e-3
+"""s; stamps that jitter by less are left alone [physics: they are whole milliseconds]."""
+NO_GRID_S: Final = 0.3
+"""s; more is no jitter: gaps that are no whole periods, or a clock that was set [physics]."""
+CRYSTAL: Final = 2e-4
+"""Largest drift between two clocks: a crystal is good to 1e-4 [data sheet]."""
+LEAST_JITTER_S: Final = 1e-4
+"""s; scale below which the robust fit does not tell outliers [cost]."""
+REWEIGHTINGS: Final = 4
+"""Rounds of the robust fit [cost]."""
+BEFORE_NEXT_S: Final = 1e-3
+"""s; a time that must not move stays at least so far before the next [cost]."""

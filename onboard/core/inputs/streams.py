@@ -1,0 +1,121 @@
+"""Every stream's track in one place: where samples wait until a batch of flight is complete."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from onboard.core.inputs.limits import SILENT_S, SLOW_KEPT_S
+from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.samples import (
+    AirData,
+    AttitudeSample,
+    ImuSample,
+    ImuSource,
+    Throttle,
+    Vibration,
+)
+from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
+from onboard.core.maths.arrays import Array
+
+
+class Streams:
+    """Tracks of all streams.
+
+    Attributes:
+        imus: inertial samples by accelerometer.
+        recorded: the recorded attitude as reported: roll, pitch, yaw, rad.
+        slow: signals that only a diagnosis looks at, by name.
+        fixes: of the receiver that is watched.
+        over_mavlink: whether inertial samples came by MAVLink, not from a log.
+    """
+
+    __slots__ = ("_R_bs", "fixes", "imus", "over_mavlink", "recorded", "slow")
+
+    def __init__(self) -> None:
+        self.imus: dict[int, ImuTrack] = {}
+        self.recorded = SlowTrack()
+        self.slow: dict[str, SlowTrack] = {}
+        self.fixes = FixTrack()
+        self.over_mavlink = False
+        self._R_bs: tuple[float, Array | None] = (0.0, None)
+
+    def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
+        """Take an inertial sample, raw by the parameters in force now."""
+        track = self.imus.get(sample.imu)
+        if track is None:
+            track = self.imus[sample.imu] = ImuTrack()
+        orientation = parameters.get("AHRS_ORIENTATION", default=0.0)
+        if orientation != self._R_bs[0]:
+            self._R_bs = (orientation, parameters.R_bs)
+        self.over_mavlink = sample.source is not ImuSource.LOG
+        track.add(sample, parameters.six(sample.imu), self._R_bs[1])
+
+    def attitude(self, sample: AttitudeSample) -> None:
+        """Take a recorded attitude."""
+        angles = (sample.roll, sample.pitch, sample.yaw)
+        # All three exactly zero: an estimator that has not begun.
+        if angles != (0.0, 0.0, 0.0):
+            self.recorded.add(sample.t, angles)
+
+    def signal(self, sample: Vibration | Throttle | AirData) -> None:
+        """Take a signal that only a diagnosis looks at."""
+        if isinstance(sample, Vibration):
+            name = "vibration" if sample.imu is None else f"vibration_{sample.imu}"
+            self._add(name, sample.t, sample.level)
+            if sample.clipping:
+                self._add("clipping", sample.t, tuple(float(n) for n in sample.clipping))
+        elif isinstance(sample, Throttle):
+            self._add("throttle", sample.t, (sample.throttle,))
+        elif sample.airspeed is not None:
+            self._add("airspeed", sample.t, (sample.airspeed,))
+
+    def _add(self, name: str, t: float, x: tuple[float, ...]) -> None:
+        self.slow.setdefault(name, SlowTrack()).add(t, x)
+
+    @property
+    def live(self) -> dict[int, ImuTrack]:
+        """Tracks of the accelerometers that still report."""
+        newest = max((track.last for track in self.imus.values()), default=-np.inf)
+        return {i: x for i, x in self.imus.items() if newest - x.last < SILENT_S}
+
+    def refused(self, imu: int) -> Counter[str]:
+        """What was refused, by name."""
+        out = Counter(self.fixes.refused)
+        # A fix repeated by a faster stream is the normal case, not a loss.
+        del out["gps_repeated"]
+        if imu in self.imus:
+            out.update(self.imus[imu].refused)
+        return out
+
+    def slow_arrays(self, imu: int) -> dict[str, tuple[Array, Array]]:
+        """Times (j,) and values (j,) or (j, d) of slow signals, vibration of this accelerometer."""
+        every = {name: s.arrays() for name, s in self.slow.items() if len(s) > 1}
+        flat = {n: (a, x[:, 0] if x.shape[1] == 1 else x) for n, (a, x) in every.items()}
+        own = f"vibration_{imu}"
+        if own in flat:
+            flat["vibration"] = flat[own]
+        return flat
+
+    def forget_imu(self, imu: int) -> None:
+        """Forget what waits of one accelerometer, but not what was refused of it."""
+        if imu in self.imus:
+            refused = self.imus[imu].refused
+            self.imus[imu] = ImuTrack()
+            self.imus[imu].refused = refused
+
+    def clear(self) -> None:
+        """Forget all that waits (reboot)."""
+        for imu in self.imus:
+            self.forget_imu(imu)
+        self.recorded = SlowTrack()
+        self.slow.clear()
+        self.fixes.clear()
+
+    def drop_before(self, t: float) -> None:
+        """Forget what is older than ``t``, s; of slow signals what is older by a little more."""
+        for track in self.imus.values():
+            track.drop_before(t)
+        for slow in (self.recorded, *self.slow.values()):
+            slow.drop_before(t - SLOW_KEPT_S)

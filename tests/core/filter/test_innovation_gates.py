@@ -1,0 +1,108 @@
+"""Innovation gates: how often they refuse what is right, and when they believe again."""
+
+import math
+
+import numpy as np
+import pytest
+
+from onboard.core.filter import innovation_gates
+from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates
+from onboard.core.filter.limits import (
+    GATE_ATTITUDE,
+    GATE_HEIGHT,
+    GATE_VELOCITY,
+    PATIENCE_S,
+    RECOVERY_FIXES,
+    RECOVERY_S,
+)
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.maths.chi_square import survival
+
+LEVELS = NoiseLevels(velocity=0.1, velocity_colour=0.05)
+NONE = np.zeros(2)
+
+
+def judged(gates, t, kinds, y, h=None, C=None):
+    """Verdict on whitened innovations ``y`` about an estimate that is zero."""
+    h = np.zeros((len(y), 2)) if h is None else h
+    E = np.column_stack([0.1 * y, 0.1 * h])
+    return gates.judge(t, kinds, E, y, h, NONE, np.zeros((2, 2)) if C is None else C)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "name"), [("vvv", "velocity"), ("h", "height"), ("aaa", "attitude")]
+)
+def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name):
+    """Innovations drawn from the filter's model, the estimate's own uncertainty included."""
+    n = len(kinds)
+    limit = {1: 3.841, 3: 7.815}[n]  # 0.95 quantiles: often enough to be counted
+    monkeypatch.setattr(
+        innovation_gates,
+        "GATES",
+        (("v", "velocity", limit), ("h", "height", limit), ("a", "attitude", limit)),
+    )
+    rng = np.random.default_rng(2)
+    gates = InnovationGates(LEVELS)
+    C = np.array([[0.4, 0.1], [0.1, 0.3]])
+    root = np.linalg.cholesky(C)
+    draws, refused = 4000, 0
+    for _ in range(draws):
+        gates.forget()
+        h = rng.normal(size=(n, 2))
+        y = rng.normal(size=n) + h @ (root @ rng.normal(size=2))
+        verdict = judged(gates, 0.0, kinds, y, h, C)
+        assert verdict in (None, GateRefusal(name))
+        refused += verdict is not None
+    assert refused / draws == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / draws))
+
+
+def test_the_limits_have_the_probabilities_that_are_claimed():
+    assert survival(GATE_VELOCITY, 3) == pytest.approx(1.4e-6, rel=0.05)
+    assert survival(GATE_VELOCITY, 2) == pytest.approx(3e-7, rel=0.05)
+    assert survival(GATE_HEIGHT, 1) == pytest.approx(4.3e-8, rel=0.05)
+    assert survival(GATE_ATTITUDE, 3) == pytest.approx(5.9e-13, rel=0.05)
+
+
+def test_an_uncertain_estimate_widens_the_gate():
+    y, h = np.array([8.0, 0.0, 0.0]), np.eye(3, 2)
+    assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h) == GateRefusal("velocity")
+    assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h, 10.0 * np.eye(2)) is None
+
+
+def test_the_first_impossible_kind_is_named():
+    gates = InnovationGates(LEVELS)
+    y = np.array([0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 9.0])
+    assert judged(gates, 0.0, "vvvhaaa", y) == GateRefusal("height")
+
+
+def test_velocity_is_believed_again_after_it_was_steady_for_long_enough():
+    gates = InnovationGates(LEVELS)
+    assert judged(gates, 0.0, "vvv", np.array([9.0, 0.0, 0.0])) == GateRefusal("velocity")
+    t = [0.2 * k for k in range(1, 20)]
+    believed = [at for at in t if judged(gates, at, "vvv", np.zeros(3)) is None]
+    assert believed[0] >= 0.2 + RECOVERY_S - 1e-9
+    assert believed[0] >= 0.2 * RECOVERY_FIXES
+    assert believed[0] < 0.2 + RECOVERY_S + 0.21
+
+
+def test_velocity_that_jumps_inside_a_wide_gate_is_not_believed():
+    gates = InnovationGates(LEVELS)
+    judged(gates, 0.0, "vvv", np.array([9.0, 0.0, 0.0]))
+    h, wide = np.eye(3, 2), 1e3 * np.eye(2)
+    for k in range(1, 30):
+        jumping = np.array([20.0 * (-1) ** k, 0.0, 0.0])
+        assert judged(gates, 0.2 * k, "vvv", jumping, h, wide) == GateRefusal("recovery")
+
+
+@pytest.mark.parametrize(("kinds", "name"), [("h", "height"), ("aaa", "attitude")])
+def test_what_stays_off_is_a_new_reference(kinds, name):
+    gates = InnovationGates(LEVELS)
+    y = np.full(len(kinds), 9.0)
+    verdicts = [judged(gates, 0.5 * k, kinds, y) for k in range(20)]
+    first = next(k for k, v in enumerate(verdicts) if v.renewed)
+    assert 0.5 * first == PATIENCE_S[name]
+    # What is right in between counts from anew.
+    gates.forget()
+    judged(gates, 0.0, kinds, y)
+    assert judged(gates, 1.0, kinds, np.zeros(len(kinds))) is None
+    assert not judged(gates, PATIENCE_S[name] + 0.5, kinds, y).renewed
