@@ -1,5 +1,7 @@
 """What the messages mean is told by parameters: nothing is learned before they are known."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from onboard.core.estimate.settings import EstimatorSettings
@@ -34,13 +36,14 @@ def late(message):
 
 async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
-    now, told = 0.0, False
+    now, there = (
+        0.0,
+        SimpleNamespace(identity=Identity(1), introduced=False, judging=False, in_flight=False),
+    )
     learning = Learning(
         Learner(Store(directory), EstimatorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
-        judging=lambda: False,
-        identity=lambda: Identity(1),
-        ready=lambda: told,
+        there=there,
         clock=lambda: now,
         wall_clock=lambda: now,
         save_every_s=1e9,
@@ -49,8 +52,8 @@ async def learned(flight, directory, *, told_at):
     held = [m for t, m in flight if late(m)]
     due = 1.0
     for now, message in flight:
-        if not told and now >= told_at:
-            told = True
+        if not there.introduced and now >= told_at:
+            there.introduced = True
             for parameter in held:
                 learning.take(parameter)
         if not late(message):

@@ -263,7 +263,7 @@ async def test_only_the_chosen_accelerometers_are_written(document, daemon, port
 async def test_what_a_ground_station_changes_is_seen(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         await until(lambda: "INS_ACC3_ID" in service.snapshot().parameters)
-        await until(lambda: service._parameters.complete)
+        await until(lambda: service.parts.parameters.complete)
         vehicle.set_by_other("INS_ACCOFFS_X", 0.5)
         await until(lambda: service.snapshot().parameters["INS_ACCOFFS_X"] == 0.5)
         assert service.snapshot().counters["parameters_changed"] == 1
@@ -415,7 +415,7 @@ async def test_a_tick_that_fails_feeds_no_watchdog_and_ends_the_service(document
     def broken(_now):
         raise ArithmeticError("tick")
 
-    service._observed.condition = broken
+    service.parts.observed.condition = broken
     with pytest.raises(BaseExceptionGroup) as caught:
         await service.run()
     assert caught.group_contains(ArithmeticError)

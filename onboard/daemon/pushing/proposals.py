@@ -18,8 +18,9 @@ are written, or none.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from onboard.core.estimate.result import Status
 from onboard.core.maths.accelerometer import SixParameters
@@ -70,11 +71,33 @@ class Proposal:
     held_back: Mapping[str, str] = field(default_factory=dict)
 
 
+class Refusals(Protocol):
+    """Where refusals outlive the service."""
+
+    def refusals(self) -> Mapping[int, str]:
+        """What is refused, by accelerometer, and why."""
+
+    def refused(self, imu: int, why: str) -> None:
+        """A refusal begins, or ends (then with nothing to say)."""
+
+
 class Proposals:
-    """The current proposals and what people said about them."""
+    """The current proposals and what people said about them.
+
+    Args:
+        settings: of the policy.
+        approval: whether a person has to approve each push.
+        imus: the accelerometers that may be written; empty for all.
+        refusals: where refusals are remembered; None: nowhere.
+    """
 
     def __init__(
-        self, settings: PolicySettings, *, approval: bool, imus: tuple[int, ...] = ()
+        self,
+        settings: PolicySettings,
+        *,
+        approval: bool,
+        imus: tuple[int, ...] = (),
+        refusals: Refusals | None = None,
     ) -> None:
         self.settings = settings
         self.approval = approval
@@ -85,8 +108,9 @@ class Proposals:
         """Accelerometer of the transaction under way: its values change by our own doing."""
         self._imus = imus
         self._standing: dict[int, Standing] = {}
-        self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
-        """Called when a refusal begins, or ends (then with nothing to say)."""
+        self._refusals = refusals
+        for imu, why in (refusals.refusals() if refusals is not None else {}).items():
+            self.standing(imu).refused = why
         self._flight: JudgedFlight | None = None
 
     def update(
@@ -204,12 +228,8 @@ class Proposals:
         standing.approved = None
         if standing.refused != why:
             standing.refused = why
-            self.on_refusal(imu, why)
-
-    def restore(self, refusals: Mapping[int, str]) -> None:
-        """What was refused before the service started."""
-        for imu, why in refusals.items():
-            self.standing(imu).refused = why
+            if self._refusals is not None:
+                self._refusals.refused(imu, why)
 
     def succeeded(self, imu: int, values: Sequence[float]) -> None:
         """A transaction completed: its approval is used up; ``values`` are the six now."""
@@ -245,7 +265,8 @@ class Proposals:
         """It is refused no longer."""
         if self.standing(imu).refused:
             self.standing(imu).refused = ""
-            self.on_refusal(imu, "")
+            if self._refusals is not None:
+                self._refusals.refused(imu, "")
 
     def view(self) -> tuple[ProposalView, ...]:
         """For the snapshot."""
