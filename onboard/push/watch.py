@@ -47,7 +47,7 @@ class PushWatch:
     """Judges one completed push.
 
     Args:
-        pushed: its journal entry (:meth:`onboard.push.journal.Journal.unwatched`).
+        pushed: its journal entry (:meth:`onboard.push.journal.Journal.last_completed`).
         settings: limits.
         in_flight_since: when it was written, if the vehicle was flying.
     """

@@ -15,6 +15,7 @@ import msgspec
 
 from onboard.core.estimate.result import Calibration, Six
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.daemon.learning.meaning import in_force
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
@@ -84,6 +85,30 @@ def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calib
         held_out_before=nan if live is None else live.held_out_before,
         velocity_rms_before=nan if live is None else live.velocity_rms_before,
     )
+
+
+def known_now(
+    flight: JudgedFlight | None,
+    answers: Mapping[int, Calibration],
+    parameters: ParametersInForce,
+    *,
+    unjudged: bool,
+) -> dict[int, Calibration]:
+    """What is known of each accelerometer: as its flight was judged, or as it is estimated since.
+
+    Args:
+        flight: the last one that was judged, None if none was.
+        answers: the estimator's own.
+        parameters: in force now.
+        unjudged: a flight has begun since, of which the estimator knows more.
+    """
+    judged = {}
+    for imu, found in (flight.diagnosed if flight else {}).items():
+        now = in_force(parameters.values, imu)
+        if now is not None:
+            judged[imu] = compared_now(found.calibration, answers.get(imu), now)
+    both = {**judged, **answers} if unjudged else {**answers, **judged}
+    return dict(sorted(both.items()))
 
 
 def encode(flight: JudgedFlight) -> bytes:

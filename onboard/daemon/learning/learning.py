@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import ParamSpec, Protocol, TypeVar
 
 from onboard.core.inputs.samples import ParameterValue, Sample
-from onboard.daemon.learning.learner import Identity, Learned, Learner
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.learner import Learned, Learner
 from onboard.daemon.learning.worker import Worker
 from onboard.daemon.view.notices import Notices
 from onboard.errors import StateError

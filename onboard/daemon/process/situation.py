@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from onboard.daemon.learning.learner import Identity
+from onboard.daemon.learning.identity import Identity
 from onboard.daemon.pushing.parameters import ParameterWatch
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness

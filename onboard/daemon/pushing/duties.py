@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.view.notices import Notices
 from onboard.push.entries import Planned, Recovery, Result, Verdict, Watched
+from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import Outcome, Reason
 
 
@@ -61,6 +63,18 @@ class Duties:
             if verdict is not None and verdict.verdict is Verdict.WORSE:
                 self._proposals.refuse(imu, f"after the last push {verdict.sentence}")
 
+    def judge(self, verdicts: Sequence[Watched]) -> bool:
+        """Write down and tell what flights say of pushes; whether any did."""
+        for verdict in verdicts:
+            self._ledger.append(verdict)
+            self._ledger.counters[f"verdict_{verdict.verdict.value}"] += 1
+            self._notices.post(
+                f"push_{verdict.verdict.value}",
+                f"the flight after the push: {verdict.sentence}",
+                warning=verdict.verdict is Verdict.WORSE,
+            )
+        return bool(verdicts)
+
     def audit(self, values: Mapping[str, float], confirmed: Collection[str]) -> None:
         """Once after each start of the autopilot: whether what was pushed is still there.
 
@@ -78,6 +92,11 @@ class Duties:
             else:
                 text = f"IMU {imu}: the autopilot has the values of the last push"
                 self._notices.post("push_stored", text)
+
+    def against(self, condition: VehicleCondition) -> str:
+        """Objections to the way back at this moment; the policy 'never' is none."""
+        settings = replace(self._proposals.settings, mode=Mode.LANDED)
+        return "; ".join(refusal.sentence for refusal in moment(condition, settings))
 
     def take_up(self, now: float) -> Recovery | None:
         """The first open transaction whose pause is over and whose vehicle may be there."""

@@ -26,7 +26,6 @@ from onboard.core.estimate.result import Status
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
-from onboard.daemon.view.snapshot import ChangeView, ProposalView
 from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.diagnosed import Diagnosed
@@ -267,25 +266,6 @@ class Proposals:
             self.standing(imu).refused = ""
             if self._refusals is not None:
                 self._refusals.refused(imu, "")
-
-    def view(self) -> tuple[ProposalView, ...]:
-        """For the snapshot."""
-        return tuple(
-            ProposalView(
-                imu=imu,
-                changes=tuple(
-                    ChangeView(
-                        name=c.name, before=c.before, after=c.wanted, sigma=c.sigma, kept=c.kept
-                    )
-                    for c in proposal.plan.changes
-                ),
-                held_back=dict(proposal.held_back),
-                approved=self.standing(imu).approved is not None,
-                rejected=bool(self.standing(imu).refused),
-                approvable=approvable(proposal.held_back),
-            )
-            for imu, proposal in self.current.items()
-        )
 
     def _physics(self, imu: int, *, diagnosing: bool) -> dict[str, str]:
         """What the diagnosis says against it, unless a person has approved in spite of it."""

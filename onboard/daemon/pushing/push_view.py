@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.proposals import Proposals
-from onboard.daemon.view.snapshot import JudgedView, PushView
+from onboard.daemon.pushing.proposals import Proposals, approvable
+from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
 from onboard.daemon.view.state import WAITING
 from onboard.daemon.view.written import written_view
 from onboard.push.entries import Purpose
@@ -37,7 +37,7 @@ def push_view(
         approval_needed=any(names <= WAITING for names in waiting),
         state=state if transaction is None else transaction.state.value,
         active_imu=None if transaction is None else transaction.plan.imu,
-        proposals=proposals.view(),
+        proposals=proposal_views(proposals),
         last_outcome=None if last is None else told(last),
         can_roll_back=tuple(ledger.all_in_force()),
         judged=judged,
@@ -50,3 +50,21 @@ def told(outcome: Outcome) -> str:
     what = "push" if outcome.purpose is Purpose.PUSH else "roll-back"
     how = outcome.result.value.replace("_", " ")
     return f"IMU {outcome.plan.imu}: {what} {how}: {outcome.sentence}"
+
+
+def proposal_views(proposals: Proposals) -> tuple[ProposalView, ...]:
+    """The proposals that there are, by accelerometer."""
+    return tuple(
+        ProposalView(
+            imu=imu,
+            changes=tuple(
+                ChangeView(name=c.name, before=c.before, after=c.wanted, sigma=c.sigma, kept=c.kept)
+                for c in proposal.plan.changes
+            ),
+            held_back=dict(proposal.held_back),
+            approved=proposals.standing(imu).approved is not None,
+            rejected=bool(proposals.standing(imu).refused),
+            approvable=approvable(proposal.held_back),
+        )
+        for imu, proposal in proposals.current.items()
+    )

@@ -9,7 +9,6 @@ from __future__ import annotations
 import uuid
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import msgspec
 
@@ -27,9 +26,9 @@ from onboard.errors import RefusedError
 from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
 from onboard.mavlink.dialect import Message
 from onboard.push.course import TransactionSettings
-from onboard.push.entries import Purpose, Recovery, Result, Support, Verdict, Watched
+from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
-from onboard.push.policy import Mode, VehicleCondition, moment
+from onboard.push.policy import VehicleCondition
 from onboard.push.signals import LinkLost, Outcome, Reason, Rebooted, VehicleReport
 from onboard.push.transaction import PushTransaction
 
@@ -151,15 +150,7 @@ class Pusher:
 
     def judge(self, verdicts: Sequence[Watched]) -> None:
         """What the flight after a push says; one that made it worse is taken back."""
-        for verdict in verdicts:
-            self._ledger.append(verdict)
-            self._counts[f"verdict_{verdict.verdict.value}"] += 1
-            self._notices.post(
-                f"push_{verdict.verdict.value}",
-                f"the flight after the push: {verdict.sentence}",
-                warning=verdict.verdict is Verdict.WORSE,
-            )
-        if verdicts:
+        if self._duties.judge(verdicts):
             self._read_ledger()
 
     def close(self) -> None:
@@ -184,7 +175,7 @@ class Pusher:
             raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
         if self.busy or self._ledger.open:
             raise RefusedError("another transaction is under way")
-        against = self._against_now()
+        against = self._duties.against(self._condition)
         if against:
             raise RefusedError(against)
         imu = chosen[0]
@@ -203,23 +194,14 @@ class Pusher:
             judged=tuple(self._witness.judged.values()),
         )
 
-    # What earlier transactions ask for
-
-    def _against_now(self) -> str:
-        """Objections to the way back at this moment; the policy 'never' is none."""
-        settings = replace(self._proposals.settings, mode=Mode.LANDED)
-        return "; ".join(refusal.sentence for refusal in moment(self._condition, settings))
-
     def _read_ledger(self) -> None:
         self._duties.read(busy=self.busy, in_flight_since=self._in_flight_since)
-
-    # Beginning and end of a transaction
 
     def _start_what_is_due(self, now: float) -> None:
         """Unfinished business first, then the way back, then what is proposed."""
         duties = self._duties
         if duties.unfinished or duties.condemned:
-            if self._against_now():
+            if self._duties.against(self._condition):
                 return
             if duties.unfinished:
                 recovery = duties.take_up(now)
@@ -243,6 +225,10 @@ class Pusher:
         what = "push" if purpose is Purpose.PUSH else "roll-back"
         self._notices.post(f"{purpose.value}_begins", f"IMU {plan.imu}: {what} begins")
         self._in_flight_since = now if in_flight else None
+        support: Support | None = None  # what the push rests on
+        if purpose is Purpose.PUSH and self._flight is not None:
+            approved = self._proposals.standing(plan.imu).approved is not None
+            support = msgspec.structs.replace(self._flight.support, approved=approved)
         self._run(
             PushTransaction(
                 plan,
@@ -252,7 +238,7 @@ class Pusher:
                 allow_armed=in_flight,
                 purpose=purpose,
                 settings=PATIENCE,
-                support=self._support(plan.imu) if purpose is Purpose.PUSH else None,
+                support=support,
             ),
             now,
         )
@@ -273,13 +259,6 @@ class Pusher:
             ),
             now,
         )
-
-    def _support(self, imu: int) -> Support | None:
-        """What the push that begins rests on."""
-        if self._flight is None:
-            return None
-        approved = self._proposals.standing(imu).approved is not None
-        return msgspec.structs.replace(self._flight.support, approved=approved)
 
     def _run(self, transaction: PushTransaction, now: float) -> None:
         self._proposals.writing = transaction.plan.imu

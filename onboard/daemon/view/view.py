@@ -55,70 +55,78 @@ def imu_view(
             compared with, nothing is known yet of the residual with them.
     """
     c = calibration
-    certificate = c.certificate
-    drift = c.dead_reckoning
-    names = parameter_names(c.imu).six
-    values = c.scale + c.offset
     in_force = _in_force(c, parameters or {})
     current = in_force == c.in_force_scale + c.in_force_offset
-
-    def before(value: float) -> float | None:
-        return finite(value) if current else None
-
     return ImuView(
         imu=c.imu,
         status=c.status.value,
         state=state_of(c, circumstances),
-        calibration=CalibrationView(
-            scale=_three(c.scale),
-            offset=_three(c.offset),
-            scale_sigma=_three(c.scale_sigma),
-            offset_sigma=_three(c.offset_sigma),
-            parameters={
-                name: value
-                for name, value in zip(names, values, strict=True)
-                if math.isfinite(value)
-            },
-            observable=c.observable,
-            note=c.note,
-        ),
+        calibration=_calibration_view(c),
         in_force_scale=_three(in_force[:3]),
         in_force_offset=_three(in_force[3:]),
         parameters_known=c.parameters_known,
         timing={name: _number(estimate) for name, estimate in c.timing.items()},
         trusted_s=c.trusted_s,
         rejected=c.rejected,
-        whitened_rms_before=before(c.whitened_rms_before),
+        whitened_rms_before=finite(c.whitened_rms_before) if current else None,
         whitened_rms_after=finite(c.whitened_rms_after),
-        held_out_before=before(c.held_out_before),
+        held_out_before=finite(c.held_out_before) if current else None,
         held_out_after=finite(c.held_out_after),
-        velocity_rms_before_m_s=before(c.velocity_rms_before),
+        velocity_rms_before_m_s=finite(c.velocity_rms_before) if current else None,
         velocity_rms_after_m_s=finite(c.velocity_rms_after),
-        coverage=CoverageView(
-            percent=c.coverage.percent,
-            per_parameter=dict(zip(SIX_NAMES, c.coverage.per_parameter, strict=True)),
-            weakest=c.coverage.weakest,
-            advice=c.coverage.advice,
-        ),
-        certificate=None
-        if certificate is None
-        else {
-            "window_s": finite(certificate.window_s),
-            "residual_l2": finite(certificate.residual_l2),
-            "acceleration_bound_m_s2": finite(certificate.acceleration_bound),
-            "uniform_bound_m_s": finite(certificate.uniform_bound),
-            "observed_max_m_s": finite(certificate.observed_max),
-        },
-        dead_reckoning=None
-        if drift is None
-        else {
-            "horizon_s": finite(drift.horizon_s),
-            "drift_before_m_s": before(drift.drift_before),
-            "drift_after_m_s": finite(drift.drift_after),
-            "windows": drift.windows,
-        },
+        coverage=_coverage_view(c),
+        certificate=_certificate_view(c),
+        dead_reckoning=_dead_reckoning_view(c, current=current),
         temperature=None if c.temperature is None else _number(c.temperature),
     )
+
+
+def _calibration_view(c: Calibration) -> CalibrationView:
+    named = zip(parameter_names(c.imu).six, c.scale + c.offset, strict=True)
+    return CalibrationView(
+        scale=_three(c.scale),
+        offset=_three(c.offset),
+        scale_sigma=_three(c.scale_sigma),
+        offset_sigma=_three(c.offset_sigma),
+        parameters={name: value for name, value in named if math.isfinite(value)},
+        observable=c.observable,
+        note=c.note,
+    )
+
+
+def _coverage_view(c: Calibration) -> CoverageView:
+    return CoverageView(
+        percent=c.coverage.percent,
+        per_parameter=dict(zip(SIX_NAMES, c.coverage.per_parameter, strict=True)),
+        weakest=c.coverage.weakest,
+        advice=c.coverage.advice,
+    )
+
+
+def _certificate_view(c: Calibration) -> dict[str, float | None] | None:
+    certificate = c.certificate
+    if certificate is None:
+        return None
+    return {
+        "window_s": finite(certificate.window_s),
+        "residual_l2": finite(certificate.residual_l2),
+        "acceleration_bound_m_s2": finite(certificate.acceleration_bound),
+        "uniform_bound_m_s": finite(certificate.uniform_bound),
+        "observed_max_m_s": finite(certificate.observed_max),
+    }
+
+
+def _dead_reckoning_view(c: Calibration, *, current: bool) -> dict[str, float | None] | None:
+    """Drift without GPS; ``current``: the values in force are those that it was computed for."""
+    drift = c.dead_reckoning
+    if drift is None:
+        return None
+    return {
+        "horizon_s": finite(drift.horizon_s),
+        "drift_before_m_s": finite(drift.drift_before) if current else None,
+        "drift_after_m_s": finite(drift.drift_after),
+        "windows": drift.windows,
+    }
 
 
 def _in_force(c: Calibration, parameters: Mapping[str, float]) -> Six:
