@@ -6,9 +6,9 @@ import pytest
 
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.daemon.learning import learning as learning_module
+from onboard.daemon.learning.handover import Learning
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
-from onboard.daemon.learning.learning import Learning
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.codec import Codec

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from onboard.core.estimate.result import Calibration, Six
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.daemon.learning.meaning import in_force
 from onboard.mavlink.parameter_messages import to_float32
@@ -49,6 +50,15 @@ class JudgedFlight:
     def diagnosed(self) -> dict[int, Diagnosed]:
         """What was found, by accelerometer."""
         return {imu: judged.diagnosed for imu, judged in self.imus.items()}
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether it was too short, or too quiet, for any of its accelerometers."""
+        return all(
+            found.verdict == Verdict.INSUFFICIENT.value
+            and found.calibration.status is not Status.CALIBRATED
+            for found in self.diagnosed.values()
+        )
 
     def outdated(self) -> JudgedFlight:
         """The same after a gap in which the board may have been changed for another."""

@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Advanced, Calibrator, FlightEnded, Restarted
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.estimate.settings import EstimatorSettings
@@ -37,7 +36,7 @@ from onboard.daemon.learning.proof import ProofFlight, answers
 from onboard.daemon.learning.shelf import Shelf
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.snapshot import TrustView
-from onboard.daemon.view.view import trust_view
+from onboard.daemon.view.trust import trust_view
 from onboard.errors import StateError
 
 SOLVING_SHARE = 0.005
@@ -239,12 +238,7 @@ class Learner:
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what the diagnosis said; a flight that says nothing takes nothing away."""
         self._unjudged = False
-        silent = all(
-            d.verdict == Verdict.INSUFFICIENT.value
-            and d.calibration.status is not Status.CALIBRATED
-            for d in flight.diagnosed.values()
-        )
-        if silent and self._flight is not None:
+        if flight.says_nothing and self._flight is not None:
             self._tell(
                 "flight_too_short", "the flight says too little: what was known before stays"
             )

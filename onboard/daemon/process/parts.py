@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Self
 
 from onboard.daemon.learning.diagnoses import Diagnoses
+from onboard.daemon.learning.handover import Learning
 from onboard.daemon.learning.learner import Learner
-from onboard.daemon.learning.learning import Learning
 from onboard.daemon.learning.store import Store
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.situation import Situation

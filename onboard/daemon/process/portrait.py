@@ -10,9 +10,13 @@ from onboard import __version__
 from onboard.daemon.outlets.outlets import Outlets
 from onboard.daemon.process.contact import Life
 from onboard.daemon.process.parts import Parts
+from onboard.daemon.view.accelerometers import imu_view
+from onboard.daemon.view.journal_lines import journal_view
+from onboard.daemon.view.link_health import link_view
+from onboard.daemon.view.numbers import finite_values
 from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
 from onboard.daemon.view.state import INFO, Circumstances, next_step
-from onboard.daemon.view.view import NO_TRUST, finite_values, imu_view, journal_view, link_view
+from onboard.daemon.view.trust import NO_TRUST
 from onboard.push.policy import VehicleCondition
 
 JOURNAL_SHOWN = 50

@@ -16,7 +16,7 @@ from onboard.push.policy import Mode
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """Looks at the parts that know; what :class:`onboard.daemon.learning.learning.There` asks."""
+    """Looks at the parts that know; what :class:`onboard.daemon.learning.handover.There` asks."""
 
     link: Link
     board: Board
