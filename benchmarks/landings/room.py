@@ -19,6 +19,7 @@ from unittest import mock
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from onboard.daemon.learning import handover
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection
