@@ -70,7 +70,7 @@ class Service:
         self.stopped_by: signal.Signals | None = None
         self.ready = asyncio.Event()
         self._life = Life()
-        self._contact = Contact(self.parts, self._life)
+        self.contact = Contact(self.parts, self._life)
         self._outlets = Outlets(configuration, self, self.notices, clock=clock)
         self._portrait = Portrait(self.parts, self._outlets, self._life, wall_clock)
         self._notifier = Notifier.from_environment()
@@ -124,7 +124,7 @@ class Service:
         self.stop()
 
     async def _startup(self, group: asyncio.TaskGroup) -> None:
-        self.link.subscribe_events(self._contact.on_link_event)
+        self.link.subscribe_events(self.contact.on_link_event)
         self.link.subscribe(self.on_message, Decoder.names)
         for participant in self.parts.participants:
             self.link.attach(participant)
@@ -155,7 +155,7 @@ class Service:
         parts = self.parts
         condition = parts.observed.condition(now)
         parts.traffic.tick(now)
-        self._contact.tell_of_recovery(now)
+        self.contact.tell_of_recovery(now)
         parts.pusher.judge(parts.witness.report(condition, now))
         self.learning.tell_of_lag(now)
         learned = self.learning.learned
