@@ -188,7 +188,7 @@ async def day(hours: float) -> Day:
     with tempfile.TemporaryDirectory() as folder:
         document = {"state": {"directory": folder}, "http": {"enabled": False}}
         service = Service(from_mapping(document, source="benchmark"), clock=clock)
-        service.on_link_event(now, AutopilotFound(Autopilot(1, 1, 1, 3)))
+        service.contact.on_link_event(now, AutopilotFound(Autopilot(1, 1, 1, 3)))
         flight = Path(folder) / "flight.tlog"
         in_a_process(record_landed, str(flight), FLIGHT_S, RATES).join()
         flights = max(5, round(hours * 3600.0 / FLIGHT_S))

@@ -19,7 +19,7 @@ from unittest import mock
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from onboard.daemon.learning import learning
+from onboard.daemon.learning import handover
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection
@@ -207,7 +207,7 @@ class Room:
         """While this lasts a service gets this room's line and worker."""
         with (
             mock.patch.object(connection, "open_transport", self._open),
-            mock.patch.object(learning, "Worker", self._employ),
+            mock.patch.object(handover, "Worker", self._employ),
         ):
             yield
 

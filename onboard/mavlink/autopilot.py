@@ -115,7 +115,7 @@ LinkEvent: TypeAlias = (
 
 
 class Participant(Protocol):
-    """A sans-IO protocol that the link drives: streams, time synchronisation, parameters.
+    """A sans-IO protocol that the link drives: streams, parameters, the board's identity.
 
     The link calls ``start`` when the autopilot is found and again after it rebooted or came
     back, ``feed`` with each message of ``names`` and ``poll`` ten times a second; messages

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import random
 import time
-from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
 from onboard.errors import LinkError
@@ -43,7 +42,6 @@ HEARTBEAT_TIMEOUT_S = 5.0
 """Five heartbeats missed; ArduPilot's own measure for losing a ground station."""
 FAILOVER_S = 1.5
 """Silence on the endpoint in use after which another one that hears the autopilot takes over."""
-ITERATOR_LIMIT = 10_000
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 
 
@@ -83,7 +81,6 @@ class Link:
         self.boot_clock = BootClock()
         self.echoed = 0
         self.standby = 0
-        self.iterator_dropped = 0
         self._expected_system = system
         self._recorder = recorder
         self._clock = clock
@@ -147,31 +144,6 @@ class Link:
         self.subscribe(feed, participant.names)
         if self.autopilot is not None:
             participant.start(self.autopilot.system, self.autopilot.component, self._clock())
-
-    async def messages(self, names: Iterable[str]) -> AsyncIterator[tuple[float, Message]]:
-        """Iterate over (receive time, message); the oldest are dropped when nobody keeps up."""
-        queue: deque[tuple[float, Message]] = deque(maxlen=ITERATOR_LIMIT)
-        ready = asyncio.Event()
-
-        def put(now: float, message: Message) -> None:
-            if len(queue) == ITERATOR_LIMIT:
-                self.iterator_dropped += 1
-            queue.append((now, message))
-            ready.set()
-
-        self.subscribe(put, names)
-        try:
-            while True:
-                await ready.wait()
-                while queue:
-                    yield queue.popleft()
-                ready.clear()
-        finally:
-            self._unsubscribe(put)
-
-    def _unsubscribe(self, handler: Handler) -> None:
-        for number, handlers in self._handlers.items():
-            self._handlers[number] = tuple(h for h in handlers if h is not handler)
 
     # Life
 

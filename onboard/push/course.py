@@ -16,6 +16,7 @@ from typing import TypeAlias
 
 from onboard.errors import PushError
 from onboard.mavlink.parameters import ClientSettings, ParameterClient, ParameterOutput
+from onboard.push import limits
 from onboard.push.entries import (
     Closed,
     Entry,
@@ -41,9 +42,9 @@ class TransactionSettings:
     """``settle_s`` must exceed the longest delay of the link; ``limit_s`` is for the way to new."""
 
     client: ClientSettings = field(default_factory=ClientSettings)
-    settle_s: float = 2.0
-    limit_s: float = 60.0
-    undo_rounds: int = 3
+    settle_s: float = limits.SETTLE_S
+    limit_s: float = limits.TRANSACTION_S
+    undo_rounds: int = limits.UNDO_ROUNDS
 
 
 class Course:

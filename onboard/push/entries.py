@@ -21,7 +21,7 @@ class Result(Enum):
 
     ``COMPLETED``, ``ROLLED_BACK`` and ``ABORTED`` (nothing was written) are final.
     ``INTERRUPTED`` and ``OTHER_VEHICLE`` leave it open: it is to be resumed when the
-    autopilot, or the right one, is there again.  ``ABANDONED``: a person gave it up.
+    autopilot, or the right one, is there again.
     """
 
     COMPLETED = "completed"
@@ -29,7 +29,6 @@ class Result(Enum):
     ABORTED = "aborted"
     INTERRUPTED = "interrupted"
     OTHER_VEHICLE = "other_vehicle"
-    ABANDONED = "abandoned"
 
 
 class Purpose(Enum):

@@ -143,11 +143,6 @@ class Journal:
         """
         return tuple(self._recovery(name) for name in self._open_transactions())
 
-    def abandon(self, transaction: str, sentence: str, at: float) -> None:
-        """Give up an open transaction (the airframe is gone): a person's decision."""
-        entry = Closed(transaction, Result.ABANDONED, Result.ABANDONED.value, sentence, {})
-        self.append(entry, at)
-
     def last_completed(self, imu: int) -> Planned | None:
         """The push of this accelerometer that is in force: what a roll-back takes back.
 
@@ -171,12 +166,6 @@ class Journal:
         """Accelerometers that are held back until a person approves, and why."""
         last = {e.imu: e.sentence for _, e in self._lines if isinstance(e, Refused)}
         return {imu: sentence for imu, sentence in last.items() if sentence}
-
-    def unwatched(self) -> tuple[Planned, ...]:
-        """Pushes in force on which no flight has given its verdict yet."""
-        seen = {e.transaction for _, e in self._lines if isinstance(e, Watched)}
-        last = (self.last_completed(imu) for imu in range(1, 6))
-        return tuple(p for p in last if p is not None and p.transaction not in seen)
 
     def _plans(self) -> dict[str, Planned]:
         return {e.transaction: e for _, e in self._lines if isinstance(e, Planned)}

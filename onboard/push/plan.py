@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import Self, cast
 
 import numpy as np
 
@@ -35,11 +35,10 @@ from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import to_float32
+from onboard.push import limits
 from onboard.push.conditioning import condition
 
 GRAVITY = 9.80665
-UNCHANGED = 1.2e-7
-"""Below FLT_EPSILON ArduPilot takes two floats for equal and may not store the difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +92,16 @@ class Baseline:
     held_out_after: float | None
     velocity_rms_before: float | None
     velocity_rms_after: float | None = None
+
+    @classmethod
+    def of(cls, calibration: Calibration) -> Self:
+        """What the calibration that a plan is made from says; not finite is not known."""
+        return cls(
+            _finite(calibration.held_out_before),
+            _finite(calibration.held_out_after),
+            _finite(calibration.velocity_rms_before),
+            _finite(calibration.velocity_rms_after),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +191,8 @@ def propose(
     *,
     system_id: int,
     board: str = "",
-    scale_bounds: tuple[float, float] = (0.8, 1.2),
-    offset_bound: float = 3.5,
+    scale_bounds: tuple[float, float] = limits.SCALE_BOUNDS,
+    offset_bound: float = limits.OFFSET_BOUND,
 ) -> PushPlan:
     """Plan for one accelerometer; ``current`` holds the autopilot's values by name.
 
@@ -212,7 +221,7 @@ def propose(
     changes = []
     for i, name in enumerate(names.six):
         low, high = scale_bounds if i < 3 else (-offset_bound, offset_bound)
-        stays = held[i] or abs(wanted[i] - before[i]) < UNCHANGED
+        stays = held[i] or abs(wanted[i] - before[i]) < limits.UNCHANGED
         changes.append(
             Change(
                 name=name,
@@ -228,12 +237,7 @@ def propose(
         vehicle=Vehicle(system_id, current[names.device_id], board),
         imu=calibration.imu,
         changes=tuple(changes),
-        baseline=Baseline(
-            _finite(calibration.held_out_before),
-            _finite(calibration.held_out_after),
-            _finite(calibration.velocity_rms_before),
-            _finite(calibration.velocity_rms_after),
-        ),
+        baseline=Baseline.of(calibration),
         contradiction=result.contradiction,
         contradiction_limit=result.limit,
     )
@@ -241,7 +245,7 @@ def propose(
 
 def offset_is_zero(offset: tuple[float, ...]) -> bool:
     """Whether ArduPilot may take this offset vector for "never calibrated"."""
-    return all(abs(o) < UNCHANGED for o in offset)
+    return all(abs(o) < limits.UNCHANGED for o in offset)
 
 
 def _finite(value: float) -> float | None:

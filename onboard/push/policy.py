@@ -28,6 +28,7 @@ import numpy as np
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.inputs.airborne import grounded
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.push import limits
 from onboard.push.plan import GRAVITY, Change, PushPlan, offset_is_zero
 
 ALLOWED = frozenset(name for imu in range(1, 6) for name in parameter_names(imu).six)
@@ -87,17 +88,17 @@ class PolicySettings:
     """Limits; offsets in m/s^2.  ``improvement``: held-out RMS must fall to this share."""
 
     mode: Mode = Mode.LANDED
-    disarmed_s: float = 5.0
-    scale_min: float = 0.8
-    scale_max: float = 1.2
-    offset_max: float = 3.5
-    scale_sigma_max: float = 0.005
-    offset_sigma_max: float = 0.05
-    improvement: float = 0.97
-    in_flight_scale_step: float = 0.005
-    in_flight_offset_step: float = 0.05
-    significance: float = 2.0
-    arming_threshold: float = 0.75
+    disarmed_s: float = limits.DISARMED_S
+    scale_min: float = limits.SCALE_BOUNDS[0]
+    scale_max: float = limits.SCALE_BOUNDS[1]
+    offset_max: float = limits.OFFSET_BOUND
+    scale_sigma_max: float = limits.SCALE_SIGMA_MAX
+    offset_sigma_max: float = limits.OFFSET_SIGMA_MAX
+    improvement: float = limits.IMPROVEMENT
+    in_flight_scale_step: float = limits.IN_FLIGHT_SCALE_STEP
+    in_flight_offset_step: float = limits.IN_FLIGHT_OFFSET_STEP
+    significance: float = limits.SIGNIFICANCE
+    arming_threshold: float = limits.ARMING_THRESHOLD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

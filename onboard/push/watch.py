@@ -24,30 +24,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.estimate.result import Calibration
+from onboard.push import limits
 from onboard.push.entries import Planned, Verdict, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.signals import VehicleReport
 
 Array = NDArray[np.float64]
 
-SAME = 1e-6
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WatchSettings:
     """``margin``: share by which a residual may grow; ``evidence``: of a residual sum, clear."""
 
-    minimum_s: float = 60.0
-    margin: float = 0.1
-    evidence: float = 9.0
-    ekf_s: float = 30.0
+    minimum_s: float = limits.JUDGED_AFTER_S
+    margin: float = limits.RESIDUAL_MARGIN
+    evidence: float = limits.CLEAR_EVIDENCE
+    ekf_s: float = limits.EKF_WATCHED_S
 
 
 class PushWatch:
     """Judges one completed push.
 
     Args:
-        pushed: its journal entry (:meth:`onboard.push.journal.Journal.unwatched`).
+        pushed: its journal entry (:meth:`onboard.push.journal.Journal.last_completed`).
         settings: limits.
         in_flight_since: when it was written, if the vehicle was flying.
     """
@@ -84,7 +83,7 @@ class PushWatch:
         if flown.trusted_s < self._settings.minimum_s:
             return None
         in_force = np.array(flown.in_force_scale + flown.in_force_offset)
-        if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > SAME:
+        if np.max(np.abs(in_force - plan.six_wanted().as_vector())) > limits.SAME:
             return self._say(Verdict.SUPERSEDED, "somebody has changed the parameters since")
         self._flown = flown
         worse = self._residual_worse(flown)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from onboard.daemon.pushing.proposals import Proposal, Proposals, approvable
+from onboard.daemon.pushing.push_view import proposal_views
 from onboard.errors import RefusedError
 from onboard.push.plan import propose
 from onboard.push.policy import PolicySettings
@@ -40,6 +41,6 @@ def test_nothing_to_change_is_not_approved_as_about_to_be_written(despite):
     held_back = dict.fromkeys(("approval", "nothing_to_change", "not_diagnosed"), "because")
     pushing = propose(calibration(), parameters(), system_id=1)
     proposals.current = {1: Proposal(pushing, held_back)}
-    assert not proposals.view()[0].approvable
+    assert not proposal_views(proposals)[0].approvable
     with pytest.raises(RefusedError, match=r"^nothing waits for approval$"):
         proposals.approve((1,), despite_diagnosis=despite)

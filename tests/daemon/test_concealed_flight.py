@@ -67,7 +67,7 @@ async def test_an_antenna_that_nobody_told_of_is_found_and_said_and_spoils_nothi
         )
         finding = await asyncio.wait_for(station.read(191, "OBC_FINDING"), 60.0)
         assert finding == FINDINGS["gps_lever_arm"]
-        planned = service._journal.last_completed(1).plan
+        planned = service.parts.journal.last_completed(1).plan
         assert six(autopilot) == pytest.approx(list(planned.wanted.values()), abs=1e-7)
         for change, truth in zip(planned.changes, TRUE_SIX, strict=True):
             assert abs(change.wanted - truth) < 4.0 * change.sigma

@@ -26,7 +26,7 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
     async with daemon(in_a_hurry) as service, flying(port) as (autopilot, _, station_port):
         # A list of parameters is read in real time, however fast the rest is.
         autopilot.parameters.load({"SIM_SPEEDUP": 1.0})
-        await until(lambda: service._parameters.complete)
+        await until(lambda: service.parts.parameters.complete)
         autopilot.parameters.load({"SIM_SPEEDUP": SPEEDUP})
         await until(lambda: autopilot.flying)
         await until(lambda: service.snapshot().imus)
@@ -57,7 +57,7 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         assert np.all(np.abs(error[:3]) < 0.01)
         assert np.all(np.abs(error[3:]) < 0.05)
         # What the autopilot has now is what was proposed, and better than what it had.
-        planned = service._journal.last_completed(1).plan
+        planned = service.parts.journal.last_completed(1).plan
         assert six(autopilot) == pytest.approx(list(planned.wanted.values()), abs=1e-7)
         pushed_error = six(autopilot) - TRUE_SIX
         assert np.all(np.abs(pushed_error) < 4.0 * sigma)

@@ -9,7 +9,8 @@ from onboard.core.estimate.result import Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
 from onboard.daemon.learning import examiner as examiner_module
-from onboard.daemon.learning.learner import Identity, Learner
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import ImuTruth

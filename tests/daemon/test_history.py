@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from onboard.daemon.view.accelerometers import imu_view
 from onboard.daemon.view.history import ROWS_MAX, SAVE_S, History, Ring, Row
-from onboard.daemon.view.view import imu_view
 from tests.daemon.blank_snapshot import blank_snapshot
 from tests.daemon.daemons import calibration
 

@@ -1,11 +1,13 @@
 """What the messages mean is told by parameters: nothing is learned before they are known."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.daemon.learning import learning as learning_module
-from onboard.daemon.learning.learner import Identity, Learner
-from onboard.daemon.learning.learning import Learning
+from onboard.daemon.learning import handover
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.codec import Codec
@@ -34,13 +36,14 @@ def late(message):
 
 async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
-    now, told = 0.0, False
+    now, there = (
+        0.0,
+        SimpleNamespace(identity=Identity(1), introduced=False, judging=False, in_flight=False),
+    )
     learning = Learning(
         Learner(Store(directory), CalibratorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
-        judging=lambda: False,
-        identity=lambda: Identity(1),
-        ready=lambda: told,
+        there=there,
         clock=lambda: now,
         wall_clock=lambda: now,
         save_every_s=1e9,
@@ -49,8 +52,8 @@ async def learned(flight, directory, *, told_at):
     held = [m for t, m in flight if late(m)]
     due = 1.0
     for now, message in flight:
-        if not told and now >= told_at:
-            told = True
+        if not there.introduced and now >= told_at:
+            there.introduced = True
             for parameter in held:
                 learning.take(parameter)
         if not late(message):
@@ -73,6 +76,6 @@ async def test_what_came_before_the_parameters_is_learned_as_they_say(flight, tm
 async def test_parameters_that_never_come_are_not_waited_for_for_ever(
     flight, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(learning_module, "PARAMETERS_S", 5.0)
+    monkeypatch.setattr(handover, "PARAMETERS_S", 5.0)
     without = await learned(flight, tmp_path, told_at=1e9)
     assert without.trusted_s > 30.0

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.inputs.samples import ParameterValue
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.learning.learner import Identity, Learner
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.meaning import all_in_force, carried, hand_on
 from onboard.daemon.learning.store import Store
 

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from onboard.daemon.process.notify import Notifier, watchdog_interval
+from onboard.daemon.process.notify import Notifier
 
 
 @pytest.fixture
@@ -33,25 +33,3 @@ def test_abstract_sockets_are_understood():
 @pytest.mark.parametrize("address", [None, "", "nowhere/at/all"])
 def test_without_a_manager_nothing_happens(address):
     Notifier(address).send(READY="1")
-
-
-@pytest.mark.parametrize(
-    ("usec", "pid", "expected"),
-    [
-        ("30000000", None, 30.0),
-        ("30000000", "own", 30.0),
-        ("30000000", "1", None),
-        ("0", None, None),
-        ("soon", None, None),
-        (None, None, None),
-    ],
-)
-def test_the_watchdog_interval_is_the_managers_and_for_this_process(
-    monkeypatch, usec, pid, expected
-):
-    for name, value in (("WATCHDOG_USEC", usec), ("WATCHDOG_PID", pid)):
-        if value is None:
-            monkeypatch.delenv(name, raising=False)
-        else:
-            monkeypatch.setenv(name, str(os.getpid()) if value == "own" else value)
-    assert watchdog_interval() == expected

@@ -14,7 +14,7 @@ import pytest
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import ImuSample
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.learning import learning
+from onboard.daemon.learning import handover
 from onboard.daemon.process import portrait
 from onboard.daemon.process import service as service_module
 from onboard.daemon.process.service import Service
@@ -263,7 +263,7 @@ async def test_only_the_chosen_accelerometers_are_written(document, daemon, port
 async def test_what_a_ground_station_changes_is_seen(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         await until(lambda: "INS_ACC3_ID" in service.snapshot().parameters)
-        await until(lambda: service._parameters.complete)
+        await until(lambda: service.parts.parameters.complete)
         vehicle.set_by_other("INS_ACCOFFS_X", 0.5)
         await until(lambda: service.snapshot().parameters["INS_ACCOFFS_X"] == 0.5)
         assert service.snapshot().counters["parameters_changed"] == 1
@@ -415,7 +415,7 @@ async def test_a_tick_that_fails_feeds_no_watchdog_and_ends_the_service(document
     def broken(_now):
         raise ArithmeticError("tick")
 
-    service._observed.condition = broken
+    service.parts.observed.condition = broken
     with pytest.raises(BaseExceptionGroup) as caught:
         await service.run()
     assert caught.group_contains(ArithmeticError)
@@ -436,7 +436,7 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
     document, daemon, port, monkeypatch
 ):
     release = threading.Event()
-    monkeypatch.setattr(learning, "STEP_LIMIT_S", 0.1)
+    monkeypatch.setattr(handover, "STEP_LIMIT_S", 0.1)
     async with daemon(document) as service, Vehicle(port):
         await until(lambda: service.learning.learned is not None)
         service.learning._learner.learn = lambda *_, **__: release.wait(30.0)
@@ -453,8 +453,8 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
 
 async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port, monkeypatch):
     release = threading.Event()
-    monkeypatch.setattr(learning, "BEHIND_S", 0.3)
-    monkeypatch.setattr(learning, "CAUGHT_UP_S", 0.29)
+    monkeypatch.setattr(handover, "BEHIND_S", 0.3)
+    monkeypatch.setattr(handover, "CAUGHT_UP_S", 0.29)
     monkeypatch.setattr(portrait, "BEHIND_WORTH_SAYING_S", 0.29)
 
     def said(service, kind):

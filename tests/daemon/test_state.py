@@ -8,9 +8,9 @@ import math
 import pytest
 
 from onboard.core.estimate.result import Coverage, Status
+from onboard.daemon.view.accelerometers import imu_view
 from onboard.daemon.view.snapshot import ChangeView, ProposalView
 from onboard.daemon.view.state import NAMES, Circumstances, next_step, state_of
-from onboard.daemon.view.view import imu_view
 from tests.daemon.daemons import calibration
 
 SENTENCES = {

@@ -30,16 +30,16 @@ def notices(service, kind):
 async def ticks(service, number):
     """Let the service judge so many times."""
     count = 0
-    judged = service._pusher.consider
+    judged = service.parts.pusher.consider
 
     def counted(*args, **kwargs):
         nonlocal count
         count += 1
         return judged(*args, **kwargs)
 
-    service._pusher.consider = counted
+    service.parts.pusher.consider = counted
     await until(lambda: count >= number)
-    service._pusher.consider = judged
+    service.parts.pusher.consider = judged
 
 
 async def crashed_in_the_middle(document, vehicle):
@@ -87,7 +87,7 @@ async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, da
             await ticks(service, 20)
             assert service.snapshot().counters["resumed"] == 1
             vehicle.mute_after_sets = None
-            service._pusher._not_before.clear()  # the pause is over
+            service.parts.pusher._duties.not_before.clear()  # the pause is over
             await until(lambda: service.snapshot().push.state == "idle")
             assert "rolled back" in service.snapshot().push.last_outcome
 
@@ -197,7 +197,7 @@ async def test_a_diagnosis_is_of_one_sensor_and_of_no_other(document, daemon, po
         vehicle.armed = False
         vehicle.parameters["INS_ACC_ID"] = 4711.0
         async with daemon(document) as again:
-            await until(lambda: again._parameters.complete)
+            await until(lambda: again.parts.parameters.complete)
             await ticks(again, 20)
             assert again.snapshot().push.proposals == ()
             assert vehicle.sets == []
@@ -211,7 +211,7 @@ async def test_a_new_flight_ends_what_was_kept(document, daemon, port):
             await until(lambda: held_back(service).keys() == {"armed"})
         async with daemon(document) as again:  # the vehicle is flying when it starts
             await until(lambda: again.snapshot().link.armed)
-            await until(lambda: again._parameters.complete)
+            await until(lambda: again.parts.parameters.complete)
             vehicle.armed = False
             await until(lambda: again.snapshot().link.armed is False)
             await ticks(again, 20)
@@ -241,5 +241,5 @@ async def test_what_a_person_has_refused_stays_refused_after_a_restart(document,
             await again.approve((1,))
             await until(lambda: again.snapshot().push.can_roll_back == (1,))
         async with daemon(document) as third:
-            await until(lambda: third._parameters.complete)
-            assert third._journal.refusals() == {}
+            await until(lambda: third.parts.parameters.complete)
+            assert third.parts.journal.refusals() == {}

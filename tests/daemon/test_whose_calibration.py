@@ -23,7 +23,7 @@ async def learned_but_not_written(service, vehicle):
 
 
 async def settled(service, number=20):
-    await until(lambda: service.learning.identified and service._parameters.complete)
+    await until(lambda: service.learning.identified and service.parts.parameters.complete)
     await ticks(service, number)
 
 
@@ -106,7 +106,7 @@ async def test_a_person_who_has_read_why_it_waits_may_approve(document, daemon, 
             await settled(again)
             await again.approve((1,))
             await until(lambda: again.snapshot().push.can_roll_back == (1,))
-            (planned,) = [e for _, e in again._journal.entries if isinstance(e, Planned)]
+            (planned,) = [e for _, e in again.parts.journal.entries if isinstance(e, Planned)]
             assert planned.support.approved
             assert planned.plan.vehicle.board == vehicle.board
 
@@ -148,7 +148,7 @@ async def test_what_a_ground_station_sets_during_a_push_stays(document, daemon, 
         vehicle.set_by_other("INS_ACCOFFS_Y", 1.25)
         await until(lambda: service.snapshot().push.last_outcome is not None)
         assert "rolled back" in service.snapshot().push.last_outcome
-        service._proposals.standing(1).not_before = 0.0  # the pause of 30 s is over
+        service.parts.proposals.standing(1).not_before = 0.0  # the pause of 30 s is over
         vehicle.sets.clear()
         await ticks(service, 20)
         assert vehicle.sets == []

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.view.view import imu_view
+from onboard.daemon.view.accelerometers import imu_view
 from onboard.daemon.view.written import LATEST_SHOWN, written_view
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.entries import Closed, Planned, Purpose, Result, Verdict, Watched

@@ -4,7 +4,7 @@ import contextlib
 
 import pytest
 
-from onboard.daemon.learning import learning
+from onboard.daemon.learning import handover
 from onboard.daemon.process import service as service_module
 from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
@@ -18,7 +18,7 @@ from tests.gcs.router import Router
 def impatient(monkeypatch):
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
     monkeypatch.setattr(service_module, "TICK_S", 0.05)
-    monkeypatch.setattr(learning, "BATCH_S", 0.02)
+    monkeypatch.setattr(handover, "BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 

@@ -31,7 +31,6 @@ from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.endpoint import Endpoint, EndpointError
 from onboard.mavlink.link import HEARTBEAT_TIMEOUT_S, Link
 from onboard.mavlink.streams import StreamRequest, Streams
-from onboard.mavlink.timesync import TimeSync
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 from tests.mavlink.virtual_time import virtual_time
 
@@ -265,24 +264,15 @@ class TestTraffic:
             assert link.echoed == 1
 
     @virtual_time
-    async def test_messages_iterate_in_order_with_their_receive_times(self, air):
+    async def test_handlers_get_messages_in_order_with_their_receive_times(self, air):
         async with running() as link:
-
-            async def collect():
-                out = []
-                async for now, message in link.messages(["ATTITUDE"]):
-                    out.append((round(now, 3), message.time_boot_ms))
-                    if len(out) == 3:
-                        return out
-                return out
-
-            task = asyncio.create_task(collect())
-            await asyncio.sleep(0.0)
+            out = []
+            link.subscribe(lambda now, m: out.append((round(now, 3), m.time_boot_ms)), ["ATTITUDE"])
             start = asyncio.get_running_loop().time()
             for i in range(3):
                 air.transports[0].say(attitude(i))
                 await asyncio.sleep(0.5)
-            assert await task == [(round(start + 0.5 * i, 3), i) for i in range(3)]
+            assert out == [(round(start + 0.5 * i, 3), i) for i in range(3)]
 
     @virtual_time
     async def test_a_handler_that_fails_ends_the_link_with_its_error(self, air):
@@ -320,23 +310,17 @@ class TestTraffic:
 
 class TestParticipants:
     @virtual_time
-    async def test_streams_and_time_synchronisation_are_driven_and_restarted(self, air):
-        streams, timesync = Streams([StreamRequest("ATTITUDE", 50.0)]), TimeSync()
-        booted_at = 0.0
+    async def test_they_are_driven_and_after_a_reboot_restarted(self, air):
+        streams = Streams([StreamRequest("ATTITUDE", 50.0)])
         asked = []
 
         def autopilot(message):
-            loop = asyncio.get_running_loop()
             if message.get_type() == "COMMAND_LONG":
                 asked.append(message.param1)
                 yield mavlink.MAVLink_command_ack_message(message.command, 0, 0, 0, 1, 191)
-            elif message.get_type() == "TIMESYNC":
-                tc1 = round((loop.time() - booted_at) * 1e9)
-                yield mavlink.MAVLink_timesync_message(tc1, message.ts1)
 
         async with running() as link:
             link.attach(streams)
-            link.attach(timesync)
             transport = air.transports[0]
             transport.answer = autopilot
             await asyncio.sleep(5.0)
@@ -344,14 +328,10 @@ class TestParticipants:
             await beat(transport, 3, attitude(50_000))
             assert asked == [30.0]
             assert streams.report()[0].granted == 50.0
-            assert timesync.offset == pytest.approx(0.0, abs=1e-6)
-            booted_at = asyncio.get_running_loop().time()
             transport.say(attitude(10))
             transport.say(attitude(30))
-            assert timesync.offset is None
             await beat(transport, 3)
             assert asked == [30.0, 30.0]
-            assert timesync.offset == pytest.approx(-booted_at, abs=1e-6)
 
 
 async def test_over_real_udp():

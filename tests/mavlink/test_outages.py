@@ -54,7 +54,7 @@ async def connecting(endpoint, air, directory, monkeypatch):
     clock = asyncio.get_running_loop().time
     configuration = {"link": {"endpoints": [endpoint]}, "state": {"directory": str(directory)}}
     service = Service(from_mapping(configuration, source="test"), clock=clock, wall_clock=clock)
-    service.link.subscribe_events(service.on_link_event)
+    service.link.subscribe_events(service.contact.on_link_event)
     task = asyncio.create_task(service.link.run())
     try:
         yield service
@@ -167,10 +167,10 @@ async def test_heartbeats_that_come_and_go_are_told_of_once(tmp_path, monkeypatc
         for _ in range(30):
             await air.beat(3.0)
             await asyncio.sleep(9.0)
-            service._tell_of_recovery(asyncio.get_running_loop().time())
+            service.contact.tell_of_recovery(asyncio.get_running_loop().time())
         for _ in range(30):
             await air.beat(1.0)
-            service._tell_of_recovery(asyncio.get_running_loop().time())
+            service.contact.tell_of_recovery(asyncio.get_running_loop().time())
     assert service.counters["autopilot_silent"] == 30
     said = [r.getMessage() for r in caplog.records if "heartbeat" in r.getMessage()]
     assert len(said) == 2

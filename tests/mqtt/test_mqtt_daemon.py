@@ -6,7 +6,7 @@ import json
 import jsonschema
 import pytest
 
-from onboard.daemon.learning import learning
+from onboard.daemon.learning import handover
 from onboard.daemon.mqtt import schema
 from onboard.daemon.process import service as service_module
 from onboard.daemon.pushing import pusher as pusher_module
@@ -23,7 +23,7 @@ TOPICS = ("state", "calibration", "event", "availability", "command/reply")
 def hurry(monkeypatch):
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
     monkeypatch.setattr(service_module, "TICK_S", 0.05)
-    monkeypatch.setattr(learning, "BATCH_S", 0.02)
+    monkeypatch.setattr(handover, "BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
-from onboard.push.plan import UNCHANGED
+from onboard.push.limits import UNCHANGED
 from onboard.push.signals import LinkLost, Rebooted, VehicleReport
 from tests.push.pushing import NEW, OLD, CrashError, PushWorld, Weather, make_plan
 

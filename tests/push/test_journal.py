@@ -123,9 +123,9 @@ def test_torn_anywhere_only_the_torn_line_is_lost(tmp_path_factory, cut):
     with Journal(path) as journal:
         assert [e for _, e in journal.entries] == entries[:whole]
         assert journal.damaged == 0
-        journal.append(closed("a", Result.ABANDONED), 5.0)
+        journal.append(closed("a", Result.ABORTED), 5.0)
     found, _, damaged = read(path)
-    assert found == [*entries[:whole], closed("a", Result.ABANDONED)]
+    assert found == [*entries[:whole], closed("a", Result.ABORTED)]
     assert damaged == 0
 
 
@@ -249,7 +249,6 @@ class TestWhatIsInForce:
     def test_nothing_yet(self, path):
         with Journal(path) as journal:
             assert journal.last_completed(1) is None
-            assert journal.unwatched() == ()
 
     def test_the_last_completed_push(self, path):
         write(path, story("a") + story("b") + story("c", result=Result.ROLLED_BACK))
@@ -261,22 +260,9 @@ class TestWhatIsInForce:
         write(path, story("a") + story("back", purpose=Purpose.ROLL_BACK))
         with Journal(path) as journal:
             assert journal.last_completed(1) is None
-            assert journal.unwatched() == ()
 
     def test_roll_back_that_failed_leaves_the_push_in_force(self, path):
         back = story("back", purpose=Purpose.ROLL_BACK, result=Result.ROLLED_BACK)
         write(path, story("a") + back)
         with Journal(path) as journal:
             assert journal.last_completed(1).transaction == "a"
-
-    def test_watched_once(self, path):
-        write(path, [*story("a"), *story("b", imu=2), Watched("a", Verdict.KEPT, "fine")])
-        with Journal(path) as journal:
-            assert [p.transaction for p in journal.unwatched()] == ["b"]
-
-    def test_given_up_by_a_person(self, path):
-        write(path, story("a")[:-1])
-        with Journal(path) as journal:
-            journal.abandon("a", "the airframe is gone", 5.0)
-            assert journal.recover() == ()
-            assert journal.last_completed(1) is None

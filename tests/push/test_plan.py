@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.errors import PushError
 from onboard.push.conditioning import condition
-from onboard.push.plan import GRAVITY, UNCHANGED, Change, PushPlan, Vehicle, offset_is_zero, propose
+from onboard.push.limits import UNCHANGED
+from onboard.push.plan import GRAVITY, Change, PushPlan, Vehicle, offset_is_zero, propose
 from tests.autopilot_parameters import float32
 from tests.push.calibrations import OFFSET, SCALE, calibration, covariance, current
 from tests.push.pushing import make_plan

@@ -3,7 +3,7 @@ import pytest
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import SendParamSet, ValueReceived
 from onboard.push.entries import Closed, Planned, Purpose, ReadBack, Result, Writing, audit
-from onboard.push.plan import UNCHANGED
+from onboard.push.limits import UNCHANGED
 from onboard.push.signals import (
     Cancelled,
     JournalWritten,

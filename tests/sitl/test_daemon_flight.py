@@ -57,7 +57,7 @@ async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, mo
             await sitl.land()
             await until(lambda: 1 in service.snapshot().push.can_roll_back)
 
-            planned = service._journal.last_completed(1).plan
+            planned = service.parts.journal.last_completed(1).plan
             now = np.array([await sitl.parameter(name) for name in SIX])
             assert now == pytest.approx(list(planned.wanted.values()), abs=1e-6)
             for change, truth in zip(planned.changes, TRUTH, strict=True):

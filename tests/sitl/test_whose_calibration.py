@@ -67,7 +67,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
             await daemons.until(lambda: service.snapshot().link.armed is False)
             await daemons.until(lambda: service.snapshot().uptime_s > 30.0)
             assert held_back(service) == {}
-            assert not any(isinstance(entry, Planned) for _, entry in service._journal.entries)
+            assert not any(isinstance(entry, Planned) for _, entry in service.parts.journal.entries)
 
         # Back on the first board, which has not flown since: it waits, until a person approves.
         async with daemons.running(document(sitl, tmp_path, disarmed_s=0.0)) as service:
@@ -98,7 +98,9 @@ async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, tmp_path)
             )
             await sitl.set_parameter("INS_ACCOFFS_Y", theirs)
             await daemons.until(lambda: "unconfirmed" in held_back(service).get(1, {}))
-            service._proposals.standing(1).not_before = 0.0  # the pause after a failure is over
+            service.parts.proposals.standing(
+                1
+            ).not_before = 0.0  # the pause after a failure is over
             end = service.snapshot().uptime_s + 40.0
             await daemons.until(lambda: service.snapshot().uptime_s > end)
             assert await sitl.parameter("INS_ACCOFFS_Y") == theirs

@@ -6,8 +6,8 @@ import uuid
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from onboard.daemon.view.journal_lines import diagnosis_in_words
 from onboard.daemon.view.notices import Notices
-from onboard.daemon.view.view import diagnosis_in_words
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Entry, Found
 

@@ -13,8 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from onboard.core.estimate.result import Calibration, Six
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.daemon.learning.meaning import in_force
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
@@ -48,6 +50,15 @@ class JudgedFlight:
     def diagnosed(self) -> dict[int, Diagnosed]:
         """What was found, by accelerometer."""
         return {imu: judged.diagnosed for imu, judged in self.imus.items()}
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether it was too short, or too quiet, for any of its accelerometers."""
+        return all(
+            found.verdict == Verdict.INSUFFICIENT.value
+            and found.calibration.status is not Status.CALIBRATED
+            for found in self.diagnosed.values()
+        )
 
     def outdated(self) -> JudgedFlight:
         """The same after a gap in which the board may have been changed for another."""
@@ -84,6 +95,30 @@ def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calib
         held_out_before=nan if live is None else live.held_out_before,
         velocity_rms_before=nan if live is None else live.velocity_rms_before,
     )
+
+
+def known_now(
+    flight: JudgedFlight | None,
+    answers: Mapping[int, Calibration],
+    parameters: ParametersInForce,
+    *,
+    unjudged: bool,
+) -> dict[int, Calibration]:
+    """What is known of each accelerometer: as its flight was judged, or as it is estimated since.
+
+    Args:
+        flight: the last one that was judged, None if none was.
+        answers: the estimator's own.
+        parameters: in force now.
+        unjudged: a flight has begun since, of which the estimator knows more.
+    """
+    judged = {}
+    for imu, found in (flight.diagnosed if flight else {}).items():
+        now = in_force(parameters.values, imu)
+        if now is not None:
+            judged[imu] = compared_now(found.calibration, answers.get(imu), now)
+    both = {**judged, **answers} if unjudged else {**answers, **judged}
+    return dict(sorted(both.items()))
 
 
 def encode(flight: JudgedFlight) -> bytes:

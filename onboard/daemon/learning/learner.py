@@ -22,8 +22,6 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from onboard import __version__
-from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Advanced, FlightEnded, Restarted
 from onboard.core.estimate.result import Calibration, Six, Status
@@ -31,26 +29,19 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.distrust import WindowClosed, WindowOpened
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.daemon.learning.examiner import Examiner
-from onboard.daemon.learning.flight import JudgedFlight, compared_now, decode, encode
+from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
-from onboard.daemon.learning.meaning import all_in_force, carried, hand_on, in_force, matters
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.meaning import all_in_force, carried, hand_on, matters
 from onboard.daemon.learning.proof import ProofFlight, answers
+from onboard.daemon.learning.shelf import Shelf
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.snapshot import TrustView
-from onboard.daemon.view.view import trust_view
+from onboard.daemon.view.trust import trust_view
 from onboard.errors import StateError
 
 SOLVING_SHARE = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """Who answers on the link; ``board`` is its unique id in hex, empty if it tells none."""
-
-    system_id: int
-    autopilot: str = "ardupilot"
-    board: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +90,7 @@ class Learner:
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
     ) -> None:
-        self._store = store
+        self._shelf = Shelf(store)
         self._settings = settings
         self._clock = clock
         self._wall_clock = wall_clock
@@ -139,13 +130,13 @@ class Learner:
             return
         calibrator = Calibrator(self._settings)
         kept = None
-        if before is not None and not _surely_another(before, there):
+        if before is not None and not there.surely_not(before):
             calibrator.lay_aside(self._calibrator.to_bytes())
             kept = self._flight
         if before != there:
             if before is not None:
-                self._save_quietly(before)
-            loaded = self._load(calibrator)
+                self._shelve(before)
+            loaded = self._take_from_shelf(calibrator)
             kept = kept or loaded
         self._begin(calibrator, values)
         self._flight = None if kept is None else kept.outdated()
@@ -157,21 +148,22 @@ class Learner:
         """The autopilot rebooted or was silent: from here on it may be another board."""
         self._before_gap = all_in_force(self._calibrator.parameters.values)
 
-    def _load(self, calibrator: Calibrator) -> JudgedFlight | None:
+    def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
         """Lay what is on the disk beside this calibrator; the last flight that was judged."""
         if self._identity is None:
             return None
         try:
-            saved = self._store.load(self._identity.system_id, self._identity.board)
-            if saved is None:
-                return None
-            calibrator.lay_aside(saved.sums)
+            return self._shelf.load(self._identity, calibrator)
         except StateError as error:
-            self._counters["state_refused"] += 1
             self._tell("state_refused", f"starting from nothing: {error}", warning=True)
             return None
-        self._counters["state_resumed"] += 1
-        return decode(saved.flight) if saved.flight else None
+
+    def _shelve(self, whose: Identity) -> None:
+        """Before another board takes over; a disk that does not take it costs that board's sums."""
+        try:
+            self._shelf.save(whose, self._calibrator, self._flight, self._wall_clock())
+        except StateError as error:
+            self._tell("save_failed", str(error), warning=True)
 
     def _begin(self, calibrator: Calibrator, parameters: Mapping[str, float]) -> None:
         """Go on with another calibrator, which is told what the messages mean."""
@@ -206,7 +198,9 @@ class Learner:
                 self._flown = self._flown if flown is None else flown
         if not judging:
             self._proof.drop()
-        self._of_these_sensors()
+        if self._flight is not None and not self._flight.current:
+            # Of before the restart: forgotten where other sensors say who they are.
+            self._flight = self._flight.of_these_sensors(self._calibrator.parameters)
         learned = self._learned()
         if in_flight and self._in_air:
             ready = (c.status is Status.CALIBRATED for c in self._answers.values())
@@ -229,8 +223,7 @@ class Learner:
         self._windows = 0
         self._flight = None
         if self._identity is not None:
-            place = self._store.path(self._identity.system_id, self._identity.board)
-            place.unlink(missing_ok=True)
+            self._shelf.clear(self._identity)
         return self._learned()
 
     def save(self, saved_at: float) -> None:
@@ -240,36 +233,13 @@ class Learner:
             StateError: the disk does not take them.
         """
         if self._identity is not None:
-            self._save(self._identity, saved_at)
+            self._shelf.save(self._identity, self._calibrator, self._flight, saved_at)
             trim()
-
-    def _save(self, whose: Identity, saved_at: float) -> None:
-        self._store.save(
-            whose.system_id,
-            self._calibrator.to_bytes(),
-            version=__version__,
-            saved_at=saved_at,
-            board=whose.board,
-            flight=b"" if self._flight is None else encode(self._flight),
-        )
-        self._counters["saves"] += 1
-
-    def _save_quietly(self, whose: Identity) -> None:
-        """Before another board takes over; a disk that does not take it costs that board's sums."""
-        try:
-            self._save(whose, self._wall_clock())
-        except StateError as error:
-            self._tell("save_failed", str(error), warning=True)
 
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what the diagnosis said; a flight that says nothing takes nothing away."""
         self._unjudged = False
-        silent = all(
-            d.verdict == Verdict.INSUFFICIENT.value
-            and d.calibration.status is not Status.CALIBRATED
-            for d in flight.diagnosed.values()
-        )
-        if silent and self._flight is not None:
+        if flight.says_nothing and self._flight is not None:
             self._tell(
                 "flight_too_short", "the flight says too little: what was known before stays"
             )
@@ -282,12 +252,6 @@ class Learner:
                 self._stale = self._urgent = True
                 self._tell("begun_anew", f"IMU {imu}: learning anew, physics was missing")
 
-    def _of_these_sensors(self) -> None:
-        """A flight of before the restart is forgotten where other sensors say who they are."""
-        flight = self._flight
-        if flight is not None and not flight.current:
-            self._flight = flight.of_these_sensors(self._calibrator.parameters)
-
     # What goes out
 
     def _learned(self) -> Learned:
@@ -296,24 +260,16 @@ class Learner:
         flown, self._flown = self._flown, {}
         trust = trust_view(self._calibrator.trust, windows=self._windows)
         return Learned(
-            calibrations=self._calibrations(),
+            calibrations=known_now(
+                self._flight, self._answers, self._calibrator.parameters, unjudged=self._unjudged
+            ),
             trust=msgspec.structs.replace(trust, trusted_s=self._calibrator.flown_s),
-            counters={**self._counters, **self._examiner.counters},
+            counters={**self._counters, **self._shelf.counters, **self._examiner.counters},
             news=news,
             flown=flown,
             flight=None if self._unjudged else self._flight,
             diagnosing=self._examiner.waiting,
         )
-
-    def _calibrations(self) -> dict[int, Calibration]:
-        """Of the flight as it was judged, or the estimator's own answers since then."""
-        judged = {}
-        for imu, found in (self._flight.diagnosed if self._flight else {}).items():
-            now = in_force(self._calibrator.parameters.values, imu)
-            if now is not None:
-                judged[imu] = compared_now(found.calibration, self._answers.get(imu), now)
-        both = judged | self._answers if self._unjudged else self._answers | judged
-        return dict(sorted(both.items()))
 
     def _solve(self) -> None:
         """Solve anew if something has come to it, and not too often unless it is urgent."""
@@ -366,10 +322,3 @@ class Learner:
 
     def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:
         self._news.append(News(kind, text, warning))
-
-
-def _surely_another(before: Identity, there: Identity) -> bool:
-    """Whether it is not the one of before by its own word."""
-    if before.system_id != there.system_id:
-        return True
-    return bool(before.board and there.board) and before.board != there.board

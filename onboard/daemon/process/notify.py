@@ -31,14 +31,3 @@ class Notifier:
                 manager.sendto(message, self._address)
         except OSError:
             return
-
-
-def watchdog_interval() -> float | None:
-    """Seconds within which the manager wants to hear from us; None without a watchdog."""
-    if os.environ.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
-        return None
-    try:
-        interval = int(os.environ["WATCHDOG_USEC"]) / 1e6
-    except (KeyError, ValueError):
-        return None
-    return interval if interval > 0 else None

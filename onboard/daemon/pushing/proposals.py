@@ -18,14 +18,14 @@ are written, or none.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from onboard.core.estimate.result import Status
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
-from onboard.daemon.view.snapshot import ChangeView, ProposalView
 from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.diagnosed import Diagnosed
@@ -70,11 +70,33 @@ class Proposal:
     held_back: Mapping[str, str] = field(default_factory=dict)
 
 
+class Refusals(Protocol):
+    """Where refusals outlive the service."""
+
+    def refusals(self) -> Mapping[int, str]:
+        """What is refused, by accelerometer, and why."""
+
+    def refused(self, imu: int, why: str) -> None:
+        """A refusal begins, or ends (then with nothing to say)."""
+
+
 class Proposals:
-    """The current proposals and what people said about them."""
+    """The current proposals and what people said about them.
+
+    Args:
+        settings: of the policy.
+        approval: whether a person has to approve each push.
+        imus: the accelerometers that may be written; empty for all.
+        refusals: where refusals are remembered; None: nowhere.
+    """
 
     def __init__(
-        self, settings: PolicySettings, *, approval: bool, imus: tuple[int, ...] = ()
+        self,
+        settings: PolicySettings,
+        *,
+        approval: bool,
+        imus: tuple[int, ...] = (),
+        refusals: Refusals | None = None,
     ) -> None:
         self.settings = settings
         self.approval = approval
@@ -85,8 +107,9 @@ class Proposals:
         """Accelerometer of the transaction under way: its values change by our own doing."""
         self._imus = imus
         self._standing: dict[int, Standing] = {}
-        self.on_refusal: Callable[[int, str], object] = lambda _imu, _why: None
-        """Called when a refusal begins, or ends (then with nothing to say)."""
+        self._refusals = refusals
+        for imu, why in (refusals.refusals() if refusals is not None else {}).items():
+            self.standing(imu).refused = why
         self._flight: JudgedFlight | None = None
 
     def update(
@@ -204,12 +227,8 @@ class Proposals:
         standing.approved = None
         if standing.refused != why:
             standing.refused = why
-            self.on_refusal(imu, why)
-
-    def restore(self, refusals: Mapping[int, str]) -> None:
-        """What was refused before the service started."""
-        for imu, why in refusals.items():
-            self.standing(imu).refused = why
+            if self._refusals is not None:
+                self._refusals.refused(imu, why)
 
     def succeeded(self, imu: int, values: Sequence[float]) -> None:
         """A transaction completed: its approval is used up; ``values`` are the six now."""
@@ -245,26 +264,8 @@ class Proposals:
         """It is refused no longer."""
         if self.standing(imu).refused:
             self.standing(imu).refused = ""
-            self.on_refusal(imu, "")
-
-    def view(self) -> tuple[ProposalView, ...]:
-        """For the snapshot."""
-        return tuple(
-            ProposalView(
-                imu=imu,
-                changes=tuple(
-                    ChangeView(
-                        name=c.name, before=c.before, after=c.wanted, sigma=c.sigma, kept=c.kept
-                    )
-                    for c in proposal.plan.changes
-                ),
-                held_back=dict(proposal.held_back),
-                approved=self.standing(imu).approved is not None,
-                rejected=bool(self.standing(imu).refused),
-                approvable=approvable(proposal.held_back),
-            )
-            for imu, proposal in self.current.items()
-        )
+            if self._refusals is not None:
+                self._refusals.refused(imu, "")
 
     def _physics(self, imu: int, *, diagnosing: bool) -> dict[str, str]:
         """What the diagnosis says against it, unless a person has approved in spite of it."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from onboard.core.estimate.result import Calibration
+from onboard.daemon.view.numbers import finite
 from onboard.daemon.view.snapshot import JudgedView
-from onboard.daemon.view.view import finite
 from onboard.push.entries import Planned, Watched
 from onboard.push.policy import VehicleCondition
 from onboard.push.signals import VehicleReport

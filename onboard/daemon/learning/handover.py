@@ -6,10 +6,11 @@ import asyncio
 import logging
 from collections import Counter
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 from onboard.core.inputs.samples import ParameterValue, Sample
-from onboard.daemon.learning.learner import Identity, Learned, Learner
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.learner import Learned, Learner
 from onboard.daemon.learning.worker import Worker
 from onboard.daemon.view.notices import Notices
 from onboard.errors import StateError
@@ -32,17 +33,33 @@ STEP_LIMIT_S = 120.0
 """A refinement or a diagnosis takes seconds, on a slow companion a minute; longer is a hang."""
 
 
+class There(Protocol):
+    """Who is there, and what is to be done with what it teaches."""
+
+    @property
+    def identity(self) -> Identity | None:
+        """As far as it is known; None while nobody is heard."""
+
+    @property
+    def introduced(self) -> bool:
+        """Whether it has said who it is, and the parameters that say what its messages mean."""
+
+    @property
+    def judging(self) -> bool:
+        """Whether a push waits for the flight that judges it."""
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether values may be written in flight."""
+
+
 class Learning:
     """Decodes, batches, saves.
 
     Args:
         learner: whom to hand the batches.
         notices: where its news go.
-        judging: whether a push waits for the flight that judges it.
-        in_flight: whether values may be written in flight.
-        identity: who is there, as far as it is known; None while nobody is heard.
-        ready: whether it has said who it is, and the parameters are known that say what its
-            messages mean.
+        there: who is there, and what is to be done with what it teaches.
         clock: monotonic time, s.
         wall_clock: Unix time, s.
         save_every_s: how often sums go to disk.
@@ -53,10 +70,7 @@ class Learning:
         learner: Learner,
         notices: Notices,
         *,
-        judging: Callable[[], bool],
-        identity: Callable[[], Identity | None],
-        in_flight: Callable[[], bool] = lambda: False,
-        ready: Callable[[], bool] = lambda: True,
+        there: There,
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
         save_every_s: float,
@@ -66,10 +80,7 @@ class Learning:
         self.counters: Counter[str] = Counter()
         self._learner = learner
         self._notices = notices
-        self._judging = judging
-        self._in_flight = in_flight
-        self._identity = identity
-        self._ready = ready
+        self._there = there
         self._begun = False
         self._clock = clock
         self._wall_clock = wall_clock
@@ -153,8 +164,8 @@ class Learning:
     async def _begin(self, now: float) -> bool:
         """Whether it is known who is there and what the messages mean, or is waited for in vain."""
         waited = 0.0 if self._arrived is None else now - self._arrived
-        identity = self._identity()
-        ready = self._ready() or waited > PARAMETERS_S or self._closing
+        identity = self._there.identity
+        ready = self._there.introduced or waited > PARAMETERS_S or self._closing
         if identity is None or not ready:
             return False
         # The parameters before all else; a stable order: the latest report still comes last.
@@ -168,7 +179,10 @@ class Learning:
     async def _learn(self, samples: list[Sample]) -> None:
         self._accept(
             await self._call(
-                self._learner.learn, samples, judging=self._judging(), in_flight=self._in_flight()
+                self._learner.learn,
+                samples,
+                judging=self._there.judging,
+                in_flight=self._there.in_flight,
             )
         )
 

@@ -1,0 +1,63 @@
+"""The shelf: what was learned of each board and the flight that was judged last, on the disk."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from onboard import __version__
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.daemon.learning.flight import JudgedFlight, decode, encode
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.learning.store import Store
+from onboard.errors import StateError
+
+
+class Shelf:
+    """A store whose places belong to boards.
+
+    Args:
+        store: the disk.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self.counters: Counter[str] = Counter()
+        self._store = store
+
+    def load(self, whose: Identity, calibrator: Calibrator) -> JudgedFlight | None:
+        """Lay a board's sums beside this calibrator; the last flight of it that was judged.
+
+        Raises:
+            StateError: what is there is damaged, or of another version.
+        """
+        try:
+            saved = self._store.load(whose.system_id, whose.board)
+            if saved is None:
+                return None
+            calibrator.lay_aside(saved.sums)
+        except StateError:
+            self.counters["state_refused"] += 1
+            raise
+        self.counters["state_resumed"] += 1
+        return decode(saved.flight) if saved.flight else None
+
+    def save(
+        self, whose: Identity, calibrator: Calibrator, flight: JudgedFlight | None, saved_at: float
+    ) -> None:
+        """Write a board's sums and its last flight.
+
+        Raises:
+            StateError: the disk does not take them.
+        """
+        self._store.save(
+            whose.system_id,
+            calibrator.to_bytes(),
+            version=__version__,
+            saved_at=saved_at,
+            board=whose.board,
+            flight=b"" if flight is None else encode(flight),
+        )
+        self.counters["saves"] += 1
+
+    def clear(self, whose: Identity) -> None:
+        """Forget what was learned of this board."""
+        self._store.path(whose.system_id, whose.board).unlink(missing_ok=True)

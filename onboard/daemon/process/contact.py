@@ -1,0 +1,113 @@
+"""Contact with the autopilot: who it is, when it is silent or reboots, and what follows."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from dataclasses import dataclass, field
+
+from onboard.daemon.process.parts import Parts
+from onboard.mavlink.autopilot import (
+    Autopilot,
+    AutopilotFound,
+    AutopilotRebooted,
+    AutopilotReturned,
+    AutopilotSilent,
+    ConnectionChanged,
+    ConnectionRestored,
+    ConnectionTrouble,
+    LinkEvent,
+)
+from onboard.mavlink.decode import Decoder
+from onboard.outage import Outage
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class Life:
+    """How far the service is in its life, and what it may do, for the snapshot.
+
+    ``phase`` is starting, searching, running, stopping or stopped; ``mode`` active or advise_only.
+    """
+
+    phase: str = "starting"
+    mode: str = "active"
+    mode_reason: str = ""
+    counters: Counter[str] = field(default_factory=Counter)
+
+
+class Contact:
+    """Tells parts and people what happens to the autopilot and the connections; ``now`` in s."""
+
+    def __init__(self, parts: Parts, life: Life) -> None:
+        self._parts = parts
+        self._life = life
+        self._silence, self._reboots = Outage(), Outage()
+
+    def on_link_event(self, now: float, event: LinkEvent) -> None:
+        """Take note of what happened to the autopilot or a connection."""
+        post, counters = self._parts.notices.post, self._life.counters
+        match event:
+            case AutopilotFound(autopilot):
+                self._found(autopilot)
+            case AutopilotSilent(silence):
+                counters["autopilot_silent"] += 1
+                self._nothing_is_known()
+                if self._silence.lost("no heartbeat", now):
+                    post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
+            case AutopilotReturned():
+                self._parts.learning.gap()
+                self._silence.works(now)
+            case AutopilotRebooted():
+                counters["autopilot_rebooted"] += 1
+                self._nothing_is_known()
+                if self._reboots.lost("rebooted", now):
+                    post("autopilot_rebooted", "the autopilot rebooted", warning=True)
+                self._reboots.works(now)
+            case ConnectionTrouble(endpoint, reason):
+                text = f"{endpoint}: {reason}; tried again until it answers"
+                post("connection_lost", text, warning=True)
+            case ConnectionRestored(endpoint, over):
+                post("connection_back", f"{endpoint}: back after {over}")
+            case ConnectionChanged(endpoint, state, reason):
+                logger.debug("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
+        self._parts.pusher.on_event(now, event)
+
+    def tell_of_recovery(self, now: float) -> None:
+        """Say that heartbeats are back, and how often it rebooted, once it has settled."""
+        post = self._parts.notices.post
+        over = self._silence.over(now)
+        if over is not None:
+            post("autopilot_returned", f"heartbeats are back after {over}")
+        times = self._reboots.times
+        if self._reboots.over(now) is not None and times > 1:
+            post(
+                "autopilot_runs",
+                f"the autopilot rebooted {times} times in a row; now it keeps running",
+            )
+
+    def _found(self, autopilot: Autopilot) -> None:
+        parts = self._parts
+        who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
+        parts.notices.post("autopilot_found", who)
+        parts.learning.decoder = Decoder(
+            autopilot.system, autopilot.component, clock=parts.link.boot_clock
+        )
+        self._life.phase = "running"
+        if not autopilot.is_ardupilot:
+            self._advise_only(
+                f"the autopilot is {autopilot.firmware_name}, not ArduPilot: "
+                "nothing is written to it"
+            )
+
+    def _advise_only(self, reason: str) -> None:
+        self._parts.notices.post("advise_only", f"advise-only: {reason}", warning=True)
+        self._life.mode, self._life.mode_reason = "advise_only", reason
+        self._parts.proposals.forbidden = reason
+        self._parts.parameters.enabled = False
+
+    def _nothing_is_known(self) -> None:
+        """Another autopilot, or another state of it, may be there when it is heard again."""
+        self._parts.observed.forget()
+        self._parts.learning.gap()

@@ -1,0 +1,143 @@
+"""The parts of one service, made from its configuration, each before those that need it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from onboard.daemon.learning.diagnoses import Diagnoses
+from onboard.daemon.learning.handover import Learning
+from onboard.daemon.learning.learner import Learner
+from onboard.daemon.learning.store import Store
+from onboard.daemon.process.condition import Observed
+from onboard.daemon.process.situation import Situation
+from onboard.daemon.pushing.ledger import Ledger
+from onboard.daemon.pushing.parameters import ParameterWatch
+from onboard.daemon.pushing.proposals import Proposals
+from onboard.daemon.pushing.pusher import Pusher
+from onboard.daemon.pushing.witness import Witness
+from onboard.daemon.setup import settings
+from onboard.daemon.setup.configuration import Configuration
+from onboard.daemon.view.notices import Notices
+from onboard.daemon.view.traffic import Traffic
+from onboard.mavlink.autopilot import Participant
+from onboard.mavlink.board import Board
+from onboard.mavlink.link import Link
+from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.streams import Streams
+from onboard.push.journal import Journal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """Everything that a service is made of but its outlets, which look at the whole of it."""
+
+    notices: Notices
+    recorder: Recorder | None
+    signed: bool
+    link: Link
+    board: Board
+    streams: Streams
+    parameters: ParameterWatch
+    observed: Observed
+    traffic: Traffic
+    journal: Journal
+    witness: Witness
+    proposals: Proposals
+    pusher: Pusher
+    diagnoses: Diagnoses
+    learning: Learning
+
+    @classmethod
+    def of(
+        cls,
+        configuration: Configuration,
+        *,
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+    ) -> Self:
+        """Make them.
+
+        Args:
+            configuration: what.
+            clock: monotonic time, s.
+            wall_clock: Unix time, s.
+
+        Raises:
+            ConfigurationError: an endpoint, key or directory that cannot be used.
+            StateError: the journal is locked or damaged.
+        """
+        directory = configuration.state.path()
+        notices, witness, board, parameters = (
+            Notices(wall_clock),
+            Witness(),
+            Board(),
+            ParameterWatch(),
+        )
+        signing = settings.signing(configuration.link, wall_clock)
+        endpoints = settings.endpoints(configuration.link)
+        recorder = settings.recorder(configuration.recording, directory, wall_clock)
+        journal = Journal(directory / "journal.jsonl")
+        ledger = Ledger(journal, wall_clock)
+        proposals = _proposals(configuration, ledger)
+        link = Link(
+            endpoints,
+            system=configuration.link.system_id or None,
+            signing=signing,
+            recorder=recorder,
+            clock=clock,
+            wall_clock=wall_clock,
+        )
+        situation = Situation(link, board, parameters, witness, proposals)
+        return cls(
+            notices=notices,
+            recorder=recorder,
+            signed=signing is not None,
+            link=link,
+            board=board,
+            streams=Streams(settings.stream_requests(configuration.link.rates)),
+            parameters=parameters,
+            observed=Observed(),
+            traffic=Traffic(),
+            journal=journal,
+            witness=witness,
+            proposals=proposals,
+            pusher=Pusher(ledger, proposals, witness, notices),
+            diagnoses=Diagnoses(ledger.append, notices),
+            learning=Learning(
+                _learner(configuration, directory, clock, wall_clock),
+                notices,
+                there=situation,
+                clock=clock,
+                wall_clock=wall_clock,
+                save_every_s=configuration.estimator.save_every_s,
+            ),
+        )
+
+    @property
+    def participants(self) -> tuple[Participant, ...]:
+        """Those that speak with the autopilot."""
+        return self.streams, self.board, self.parameters, self.pusher
+
+
+def _proposals(configuration: Configuration, ledger: Ledger) -> Proposals:
+    push = configuration.push
+    return Proposals(
+        settings.policy_settings(push), approval=push.approval, imus=push.imus, refusals=ledger
+    )
+
+
+def _learner(
+    configuration: Configuration,
+    directory: Path,
+    clock: Callable[[], float],
+    wall_clock: Callable[[], float],
+) -> Learner:
+    return Learner(
+        Store(directory),
+        settings.estimator_settings(configuration.estimator),
+        clock=clock,
+        wall_clock=wall_clock,
+    )

@@ -1,0 +1,49 @@
+"""What the learner has to know of the rest of the service before it takes the next batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from onboard.daemon.learning.identity import Identity
+from onboard.daemon.pushing.parameters import ParameterWatch
+from onboard.daemon.pushing.proposals import Proposals
+from onboard.daemon.pushing.witness import Witness
+from onboard.mavlink.autopilot import AutopilotState
+from onboard.mavlink.board import Board
+from onboard.mavlink.link import Link
+from onboard.push.policy import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """Looks at the parts that know; what :class:`onboard.daemon.learning.handover.There` asks."""
+
+    link: Link
+    board: Board
+    parameters: ParameterWatch
+    witness: Witness
+    proposals: Proposals
+
+    @property
+    def identity(self) -> Identity | None:
+        """Who is there now, None while nobody is heard."""
+        autopilot = self.link.autopilot
+        if autopilot is None or self.link.state is not AutopilotState.PRESENT:
+            return None
+        return Identity(autopilot.system, autopilot.firmware_name, self.board.uid)
+
+    @property
+    def introduced(self) -> bool:
+        """Whether it has said which board it is and what its messages mean."""
+        told = self.parameters.complete or not self.parameters.enabled
+        return told and self.board.answered
+
+    @property
+    def judging(self) -> bool:
+        """Whether a push waits for the flight that judges it."""
+        return self.witness.waiting
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether values may be written in flight."""
+        return self.proposals.settings.mode is Mode.IN_FLIGHT

@@ -1,0 +1,70 @@
+"""Proposals, the transaction under way and those before it, for people."""
+
+from __future__ import annotations
+
+from onboard.daemon.pushing.ledger import Ledger
+from onboard.daemon.pushing.proposals import Proposals, approvable
+from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
+from onboard.daemon.view.state import WAITING
+from onboard.daemon.view.written import written_view
+from onboard.push.entries import Purpose
+from onboard.push.signals import Outcome
+from onboard.push.transaction import PushTransaction
+
+
+def push_view(
+    proposals: Proposals,
+    ledger: Ledger,
+    *,
+    transaction: PushTransaction | None,
+    last: Outcome | None,
+    judged: tuple[JudgedView, ...],
+) -> PushView:
+    """What the snapshot says of pushes.
+
+    Args:
+        proposals: what would be written.
+        ledger: what was written.
+        transaction: under way, None if none is.
+        last: how the last one of this run of the service ended.
+        judged: what flights said of pushes.
+    """
+    waiting = (p.held_back.keys() for p in proposals.current.values() if p.held_back)
+    state = "interrupted" if ledger.open else "idle"
+    return PushView(
+        policy=proposals.settings.mode.value,
+        approval_required=proposals.approval,
+        approval_needed=any(names <= WAITING for names in waiting),
+        state=state if transaction is None else transaction.state.value,
+        active_imu=None if transaction is None else transaction.plan.imu,
+        proposals=proposal_views(proposals),
+        last_outcome=None if last is None else told(last),
+        can_roll_back=tuple(ledger.all_in_force()),
+        judged=judged,
+        written=written_view(ledger.entries, ledger.system_id, ledger.board),
+    )
+
+
+def told(outcome: Outcome) -> str:
+    """One sentence about how a transaction ended."""
+    what = "push" if outcome.purpose is Purpose.PUSH else "roll-back"
+    how = outcome.result.value.replace("_", " ")
+    return f"IMU {outcome.plan.imu}: {what} {how}: {outcome.sentence}"
+
+
+def proposal_views(proposals: Proposals) -> tuple[ProposalView, ...]:
+    """The proposals that there are, by accelerometer."""
+    return tuple(
+        ProposalView(
+            imu=imu,
+            changes=tuple(
+                ChangeView(name=c.name, before=c.before, after=c.wanted, sigma=c.sigma, kept=c.kept)
+                for c in proposal.plan.changes
+            ),
+            held_back=dict(proposal.held_back),
+            approved=proposals.standing(imu).approved is not None,
+            rejected=bool(proposals.standing(imu).refused),
+            approvable=approvable(proposal.held_back),
+        )
+        for imu, proposal in proposals.current.items()
+    )

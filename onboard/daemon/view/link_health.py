@@ -1,0 +1,53 @@
+"""The link's state and counters as the snapshot shows them."""
+
+from __future__ import annotations
+
+from onboard.daemon.view.snapshot import (
+    EndpointView,
+    LinkView,
+    MessageRate,
+)
+from onboard.mavlink.link import Link
+from onboard.push.policy import VehicleCondition
+
+
+def link_view(
+    link: Link, *, condition: VehicleCondition, messages: dict[str, MessageRate], signed: bool
+) -> LinkView:
+    """Health of the link, and who is behind it."""
+    autopilot = link.autopilot
+    counters: dict[str, int] = {
+        "standby": link.standby,
+        "echoed": link.echoed,
+        "reboots": link.boot_clock.reboots,
+    }
+    for connection in link.connections:
+        statistics = connection.codec.statistics
+        for name in ("frames", "bad_bytes", "bad_frames", "bad_signatures", "unknown", "sent"):
+            counters[name] = counters.get(name, 0) + getattr(statistics, name)
+        for source in statistics.sources.values():
+            for name in ("lost", "late", "duplicated"):
+                counters[name] = counters.get(name, 0) + getattr(source, name)
+        for name in ("dropped", "connects", "failures"):
+            counters[name] = counters.get(name, 0) + getattr(connection, name)
+    return LinkView(
+        state=link.state.value,
+        endpoints=tuple(
+            EndpointView(
+                endpoint=str(connection.endpoint),
+                state=connection.state.value,
+                reason=connection.last_error,
+                tries=connection.outage.tries,
+            )
+            for connection in link.connections
+        ),
+        signed=signed,
+        system_id=autopilot.system if autopilot else None,
+        component_id=autopilot.component if autopilot else None,
+        autopilot=autopilot.firmware_name if autopilot else None,
+        vehicle=autopilot.vehicle if autopilot else None,
+        armed=condition.armed,
+        landed=condition.landed,
+        messages=messages,
+        counters=counters,
+    )

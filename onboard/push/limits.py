@@ -1,0 +1,60 @@
+"""Every number that decides something about a push: its unit, and where it comes from."""
+
+from __future__ import annotations
+
+from typing import Final
+
+# What may be written at all
+
+SCALE_BOUNDS: Final = (0.8, 1.2)
+"""ArduPilot's documented range of INS_ACCSCAL_*, no unit."""
+OFFSET_BOUND: Final = 3.5
+"""ArduPilot's documented range of INS_ACCOFFS_* to both sides, m/s^2."""
+ARMING_THRESHOLD: Final = 0.75
+"""ArduPilot's default of ARMING_ACCTHRESH, m/s^2, where it has not told its own."""
+
+# What a flight has to show; costs: a wrong value flies, a right one waits for another flight
+
+SCALE_SIGMA_MAX: Final = 0.005
+"""No unit.  0.05 m/s^2 at 1 g: as much as the offset may be unknown."""
+OFFSET_SIGMA_MAX: Final = 0.05
+"""m/s^2: tilts the horizon by 0.3 degrees."""
+IMPROVEMENT: Final = 0.97
+"""Held-out residual, share of before, that a push must reach.  Tuned, not derived: an RMS of n
+independent samples is itself known to one part in sqrt(2 n) only, 3 % at n = 500."""
+SIGNIFICANCE: Final = 2.0
+"""Standard deviations that a value must differ by: 95 % of those that changed nothing stay out."""
+
+# In flight, where the EKF has to follow each step
+
+IN_FLIGHT_SCALE_STEP: Final = 0.005
+"""No unit.  0.05 m/s^2 at 1 g, as the offset's."""
+IN_FLIGHT_OFFSET_STEP: Final = 0.05
+"""m/s^2.  Tuned: small beside the accelerations of flight; larger steps wait for the landing."""
+EKF_WATCHED_S: Final = 30.0
+"""So long after a push in flight an EKF that became unhealthy is put down to it, s.  Tuned."""
+
+# When
+
+DISARMED_S: Final = 5.0
+"""s: five HEARTBEATs that say so."""
+SETTLE_S: Final = 2.0
+"""s.  Must exceed the longest delay of a link that repeats packets, so that none of our writes is
+still on its way when all six are read and believed."""
+TRANSACTION_S: Final = 60.0
+"""s for the way to new values: two or three on a good link; a poor one gets its time."""
+UNDO_ROUNDS: Final = 3
+"""Values that were undone and came back so often are somebody's doing: it is left open."""
+
+# What the next flight says of a push
+
+JUDGED_AFTER_S: Final = 60.0
+"""s of flight with trusted GPS before anything is said.  Tuned: errors show in tens of seconds."""
+RESIDUAL_MARGIN: Final = 0.1
+"""Share by which a residual may grow from one flight to the next.  Tuned."""
+CLEAR_EVIDENCE: Final = 9.0
+"""Twice a difference of log-likelihoods: three standard deviations for one number."""
+SAME: Final = 1e-6
+"""No unit and m/s^2: parameters are float32, which has seven digits."""
+UNCHANGED: Final = 1.2e-7
+"""Below FLT_EPSILON ArduPilot takes two floats for equal and may not store the difference."""
