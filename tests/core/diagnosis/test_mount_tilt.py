@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.estimate.calibrator import Calibrator
@@ -12,8 +13,9 @@ from onboard.core.physics.effects.mount_tilt import TRIM_RAD, MountTilt, attitud
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as fx
 from sitl.builtin import rotation
+from sitl.builtin.messages import packed
 from sitl.builtin.truth import GpsTruth, ImuTruth
-from sitl.recording import FlightSpec, fly_messages, run
+from sitl.recording import FlightSpec, run
 
 TURNED = fx.AccelerometerTilt(roll=-0.03, pitch=0.025)
 ASKEW = fx.BoardTilt(roll=0.03, pitch=-0.025)
@@ -34,18 +36,30 @@ def spec(*effects, **parameters):
 
 
 def diagnosed(flown):
-    decoder = Decoder(system=1, component=1)
+    decoder, packer = Decoder(system=1, component=1), mavlink.MAVLink(None, 1, 1)
     made = Calibrator(EstimatorSettings(buffer_s=3600.0, refine=False))
-    for _, message in fly_messages(flown):
+    for _, message in flight_of(flown).messages:
+        packed(message, packer)  # which gives it its header
         for sample in decoder.decode(message):
             made.feed(sample)
     made.finish()
     return diagnose(made, 1)
 
 
+LATEST = {}
+
+
+def flight_of(flown):
+    """The flight, flown once for its diagnosis and its attitude, which follow on each other."""
+    if repr(flown) not in LATEST:
+        LATEST.clear()
+        LATEST[repr(flown)] = run(flown)
+    return LATEST[repr(flown)]
+
+
 def attitude_error(flown):
     """Mean of roll and pitch as reported, less the airframe's own, rad; late in the flight."""
-    flight = run(flown)
+    flight = flight_of(flown)
     flying = flight.pieces[-1]
     off = []
     for _, message in flight.messages:
