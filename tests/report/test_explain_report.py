@@ -51,6 +51,7 @@ def diagnosis():
     return diagnose(calibrator, 1)
 
 
+@pytest.mark.slow
 def test_the_concealed_effect_is_found_with_its_size(diagnosis):
     effects = {e.name: e for e in diagnosis.effects}
     assert "gps_lever_arm" in effects

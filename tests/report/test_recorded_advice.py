@@ -20,6 +20,7 @@ def file_of(result: Explanation) -> str:
     return parameter_text(result.diagnosis, result.advice, result.files)
 
 
+@pytest.mark.slow
 def test_a_jump_gives_both_offsets_and_when(recordings):
     """i03: 0.05 before the jump at 188 s, 0.40 after it."""
     text = file_of(explained(recordings / "sitl" / "i03.tlog"))
@@ -32,6 +33,7 @@ def test_a_jump_gives_both_offsets_and_when(recordings):
     assert abs(t - 188.0) < 2.0
 
 
+@pytest.mark.slow
 def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
     text = file_of(explained(recordings / "sitl" / "b04.tlog"))
     assert loaded(text) == {}
@@ -41,12 +43,14 @@ def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
     )
 
 
+@pytest.mark.slow
 def test_a_trim_for_three_percent_of_an_insufficient_flight_is_not_set(recordings):
     result = explained(recordings / "real" / "real-fixedwing-03.BIN")
     assert loaded(file_of(result)) == {}
     assert "calibration: insufficient" in file_of(result)
 
 
+@pytest.mark.slow
 def test_what_improves_nothing_is_not_recommended(recordings):
     """real-fixedwing-02: held-out residual 0.90 -> 0.89, and no parameters in the log."""
     result = explained(recordings / "real" / "real-fixedwing-02.BIN")

@@ -74,6 +74,7 @@ def tilts(diagnosis):
     return [e for e in diagnosis.effects if e.name == "mount_tilt"]
 
 
+@pytest.mark.slow
 def test_an_accelerometer_turned_against_its_gyroscope_is_no_reason_for_a_trim():
     flown = spec(TURNED)
     (tilt,) = tilts(diagnosed(flown))
@@ -87,10 +88,12 @@ def test_an_accelerometer_turned_against_its_gyroscope_is_no_reason_for_a_trim()
     assert np.abs(attitude_error(spec(TURNED, **MISTAKEN))).max() > 0.02
 
 
+@pytest.mark.slow
 def test_after_the_sensor_is_replaced_the_next_flight_is_clean():
     assert diagnosed(spec()).effects == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "trim",
     [MISTAKEN, {"AHRS_TRIM_X": 0.03, "AHRS_TRIM_Y": -0.025}],
@@ -105,6 +108,7 @@ def test_a_trim_that_was_set_for_the_accelerometers_tilt_is_taken_back(trim):
     assert np.abs(attitude_error(spec(TURNED, **tilt.parameters))).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "trim"),
     [((ASKEW,), OF_BOARD), ((), MISTAKEN)],
@@ -119,6 +123,7 @@ def test_a_trim_says_nothing_of_what_is_missing(effects, trim):
         assert np.abs(attitude_error(spec(*effects, **trim))).max() < 0.01
 
 
+@pytest.mark.slow
 def test_an_attitude_off_against_both_sensors_is_trimmed_and_then_clean():
     flown = spec(fx.MountTilt(roll=0.03, pitch=-0.025))
     (tilt,) = tilts(diagnosed(flown))

@@ -49,6 +49,7 @@ def flagged(seed, gps, complaint, *effects, duration=200.0):
     return diagnose(made, 1), made.first_sample
 
 
+@pytest.mark.slow
 def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
     fault = concealed.GpsFault(start=90.0, end=123.0, north=1.2, east=-0.9)
     said, first = flagged(70, NOISY, (91.0, 128.0), fault)
@@ -65,6 +66,7 @@ def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
     assert (unused.reason, unused.contradicted) == ("ekf_gps_glitch", True)
 
 
+@pytest.mark.slow
 def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_clean():
     said, first = flagged(41, PROMPT, (70.0, 90.0), duration=150.0)
     assert said.verdict is Verdict.CLEAN
@@ -142,6 +144,7 @@ def test_a_proof_on_less_than_half_of_the_fixes_supports_nothing():
     assert replace(made, fixes=371).supported
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_a_flight_of_which_hardly_a_fix_fits_is_not_explained(recordings):
     from onboard.answers.explain import explain  # noqa: PLC0415 - not needed without the recordings
