@@ -9,13 +9,13 @@ from onboard.answers.verdict import headline, unused_in_words
 from onboard.core.diagnosis.coasting import _between_steps
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Mismatch, Verdict
-from onboard.core.diagnosis.timing_effects import _of_latency
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.settings import EstimatorSettings
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, Reason, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
+from onboard.core.physics.effects.gps_latency import GpsLatency
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import GpsTruth, random_imus
@@ -155,19 +155,24 @@ def test_a_flight_of_which_hardly_a_fix_fits_is_not_explained(recordings):
     assert f"only {said.mismatch.fixes} of {said.mismatch.believed} GPS fixes" in said.note
 
 
+def advised(delay, clock):
+    cure = GpsLatency._cured_by(delay, clock)
+    return cure.words, cure.parameters
+
+
 def test_the_advice_counts_from_the_ekfs_own_stamp():
     clock = FixClock(late=0.032, assumed=(0.12, 0.22))
-    cure, parameters = _of_latency(0.214, clock)
+    cure, parameters = advised(0.214, clock)
     assert parameters == {"GPS1_DELAY_MS": 182.0}
     assert "32 ms later" in cure
     assert "120 or 220 ms" in cure
 
 
 def test_what_the_driver_assumes_by_itself_is_not_advised():
-    cure, parameters = _of_latency(0.19, FixClock(assumed=(0.2,)))
+    cure, parameters = advised(0.19, FixClock(assumed=(0.2,)))
     assert parameters == {}
     assert cure.startswith("none")
-    _, parameters = _of_latency(0.19, FixClock(told=0.1, assumed=(0.1,)))
+    _, parameters = advised(0.19, FixClock(told=0.1, assumed=(0.1,)))
     assert parameters == {"GPS1_DELAY_MS": 190.0}
 
 
