@@ -39,6 +39,9 @@ class Balanced(HTMLParser):
             assert self.open.pop() == tag
 
 
+pytestmark = pytest.mark.slow  # all ask for one diagnosis
+
+
 @pytest.fixture(scope="module")
 def diagnosis():
     arm = GpsLeverArm(x=0.8, y=-0.5, z=-0.4)
@@ -51,7 +54,6 @@ def diagnosis():
     return diagnose(calibrator, 1)
 
 
-@pytest.mark.slow
 def test_the_concealed_effect_is_found_with_its_size(diagnosis):
     effects = {e.name: e for e in diagnosis.effects}
     assert "gps_lever_arm" in effects
