@@ -16,8 +16,10 @@ $(STAMP): pyproject.toml requirements.lock
 demo: $(STAMP)
 	$(BIN)/onboard demo $(ARGS)
 
+# A process for each core, a file of tests in one of them; ARGS="-n 0" runs all in one.  The matrices
+# are small: threads of the linear algebra would only be in each other's way.
 test: $(STAMP)
-	$(BIN)/python -m pytest $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 simulate: $(STAMP)
 	$(BIN)/python -m benchmarks.landings $(ARGS)

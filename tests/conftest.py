@@ -33,3 +33,19 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip("no shared recordings beside the project, and ONBOARD_RECORDINGS is not set")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with slow tests come first: two processes then end at about the same time."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """With ``--dist loadfile``: files that share what takes long are run by one process."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from tests.scheduling import SharedWork  # noqa: PLC0415 - only where there is xdist
+
+    return SharedWork(config, log)

@@ -120,6 +120,7 @@ def c01(recordings, tmp_path_factory):
     return told, answers["recordings"]["c01"]
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_a_recorded_flight_gives_the_truth_of_its_simulator(c01):
     (telemetry_imus, _), truth = c01
@@ -132,6 +133,7 @@ def test_a_recorded_flight_gives_the_truth_of_its_simulator(c01):
     assert delay == pytest.approx(truth["net_gps_delay_s"], abs=0.015)
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_two_recordings_of_one_flight_agree(c01):
     numbers = [[i["calibration"]["scale"] + i["calibration"]["offset"] for i in x] for x in c01[0]]

@@ -22,6 +22,7 @@ def held_back(service):
     return proposals[0].held_back if proposals else {}
 
 
+@pytest.mark.slow
 async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemon, port, tmp_path):
     async with daemon(in_a_hurry) as service, flying(port) as (autopilot, _, station_port):
         # A list of parameters is read in real time, however fast the rest is.

@@ -56,6 +56,7 @@ def seen(monkeypatch):
     return given
 
 
+@pytest.mark.slow
 def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, tmp_path, seen):
     one = learner(tmp_path)
     one.learn(flight, judging=False)
@@ -68,6 +69,7 @@ def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, t
     assert seen[0][1:] == seen[1][1:]
 
 
+@pytest.mark.slow
 def test_being_armed_on_the_ground_is_no_flight_to_be_judged(flight, tmp_path, seen):
     one = learner(tmp_path)
     one.learn(flight, judging=False)
@@ -115,6 +117,7 @@ def judge(one):
     return learned
 
 
+@pytest.mark.slow
 def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path, believed):
     one = learner(tmp_path)
     one.learn(flight, judging=False)
@@ -134,6 +137,7 @@ def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path
     }
 
 
+@pytest.mark.slow
 def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_path, believed):
     one = learner(tmp_path)
     one.learn(flight, judging=False)
@@ -150,6 +154,7 @@ def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_
     assert learned.trust.trusted_s == 0.0
 
 
+@pytest.mark.slow
 def test_another_board_begins_with_what_was_learned_of_it(flight, tmp_path, believed):
     other = Identity(1, board="0d0e0f")
     one = learner(tmp_path)
@@ -165,6 +170,7 @@ def test_another_board_begins_with_what_was_learned_of_it(flight, tmp_path, beli
     assert not back.current
 
 
+@pytest.mark.slow
 def test_the_stand_is_not_in_the_frozen_flight(flight, tmp_path, seen):
     one = learner(tmp_path)
     one.learn(flight, judging=False)

@@ -6,6 +6,7 @@ import pytest
 
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.daemon.learning import handover
+from onboard.daemon.learning.handover import Learning
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
@@ -65,6 +66,7 @@ async def learned(flight, directory, *, told_at):
     return learning.learned.calibrations[1]
 
 
+@pytest.mark.slow
 async def test_what_came_before_the_parameters_is_learned_as_they_say(flight, tmp_path):
     at_once = await learned(flight, tmp_path / "1", told_at=6.0)
     later = await learned(flight, tmp_path / "2", told_at=25.0)

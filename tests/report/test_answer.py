@@ -36,6 +36,7 @@ def plain_off(given):
     return np.abs(np.array(plain.value) - (*TRUE.scale, *TRUE.offset)) / np.array(plain.sigma)
 
 
+@pytest.mark.slow
 def test_a_complete_model_is_calibrated(tmp_path):
     given, _ = replayed(tmp_path)
     assert given.calibration.status is Status.CALIBRATED
@@ -43,12 +44,14 @@ def test_a_complete_model_is_calibrated(tmp_path):
     assert off(given.calibration).max() < 4.0
 
 
+@pytest.mark.slow
 def test_an_untold_antenna_spoils_nothing(tmp_path):
     given, _ = replayed(tmp_path, effects.GpsLeverArm(x=0.9, y=-0.5, z=-0.4))
     assert given.calibration.status is Status.CALIBRATED
     assert off(given.calibration).max() < 4.0
 
 
+@pytest.mark.slow
 def test_axes_that_are_not_square_are_taken_into_account(tmp_path):
     given, _ = replayed(tmp_path, effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05))
     assert given.calibration.status is Status.CALIBRATED
@@ -57,6 +60,7 @@ def test_axes_that_are_not_square_are_taken_into_account(tmp_path):
     assert given.modelled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden",
     [effects.BiasStep(time=110.0, x=0.4, y=-0.3, z=0.3), effects.BiasRamp(x=3e-3, y=-2e-3, z=2e-3)],

@@ -39,6 +39,9 @@ class Balanced(HTMLParser):
             assert self.open.pop() == tag
 
 
+pytestmark = pytest.mark.slow  # all ask for one diagnosis
+
+
 @pytest.fixture(scope="module")
 def diagnosis():
     arm = GpsLeverArm(x=0.8, y=-0.5, z=-0.4)

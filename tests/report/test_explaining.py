@@ -41,6 +41,7 @@ def write(tmp_path, frames):
     return written
 
 
+@pytest.mark.slow
 def test_the_second_is_diagnosed_as_if_all_had_been_read(write):
     path = write()
     everything = Recorded()
@@ -60,6 +61,7 @@ def test_without_the_first_the_second_is_diagnosed(write):
     assert result.document().recording.samples["imu"] > 0
 
 
+@pytest.mark.slow
 def test_a_second_recording_follows_on_the_first(tmp_path):
     """Both clocks begin at the same time: a fault of the second must not spoil the first."""
     quiet = FlightSpec(vehicle="plane", duration=100.0, imus=random_imus(4)[:1], seed=4)

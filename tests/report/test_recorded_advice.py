@@ -6,9 +6,10 @@ import re
 
 import pytest
 
-from onboard.answers.explain import Explanation, explain
+from onboard.answers.explain import Explanation
 from onboard.answers.verdict import about_six
 from onboard.report.parameters import parameter_text
+from tests.explained import explained
 from tests.report.test_advice import comment
 from tests.report.test_report_parameters import loaded
 
@@ -19,9 +20,10 @@ def file_of(result: Explanation) -> str:
     return parameter_text(result.diagnosis, result.advice, result.files)
 
 
+@pytest.mark.slow
 def test_a_jump_gives_both_offsets_and_when(recordings):
     """i03: 0.05 before the jump at 188 s, 0.40 after it."""
-    text = file_of(explain([recordings / "sitl" / "i03.tlog"]))
+    text = file_of(explained(recordings / "sitl" / "i03.tlog"))
     assert loaded(text) == {}
     said = comment(text, "INS_ACCOFFS_X")
     before, t, after = map(
@@ -31,8 +33,9 @@ def test_a_jump_gives_both_offsets_and_when(recordings):
     assert abs(t - 188.0) < 2.0
 
 
+@pytest.mark.slow
 def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
-    text = file_of(explain([recordings / "sitl" / "b04.tlog"]))
+    text = file_of(explained(recordings / "sitl" / "b04.tlog"))
     assert loaded(text) == {}
     assert re.search(
         r"at 35 degC, [+-][\d.]+ per degree, flown from \d+ to \d+ degC",
@@ -40,15 +43,17 @@ def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
     )
 
 
+@pytest.mark.slow
 def test_a_trim_for_three_percent_of_an_insufficient_flight_is_not_set(recordings):
-    result = explain([recordings / "real" / "real-fixedwing-03.BIN"])
+    result = explained(recordings / "real" / "real-fixedwing-03.BIN")
     assert loaded(file_of(result)) == {}
     assert "calibration: insufficient" in file_of(result)
 
 
+@pytest.mark.slow
 def test_what_improves_nothing_is_not_recommended(recordings):
     """real-fixedwing-02: held-out residual 0.90 -> 0.89, and no parameters in the log."""
-    result = explain([recordings / "real" / "real-fixedwing-02.BIN"])
+    result = explained(recordings / "real" / "real-fixedwing-02.BIN")
     assert loaded(file_of(result)) == {}
     assert about_six(result.advice).startswith("Leave the calibration parameters as they are")
     assert "in force" in about_six(result.advice)

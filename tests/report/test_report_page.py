@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.answers.explain import explain
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.physics.finding import Imprint, Quantity, ResponseCurve
 from onboard.report.explain import explain_html
+from tests.explained import explained
 from tests.report.diagnoses_by_hand import advice_on, diagnosis, effect, told_apart_not, unknown
 from tests.report.html_page import Page
 
@@ -165,7 +165,7 @@ def test_text_is_readable_in_light_and_dark(scheme):
 @pytest.mark.recordings
 @pytest.mark.slow
 def test_a_real_diagnosis(recordings: Path):
-    result = explain([recordings / "sitl" / "i03.tlog"])
+    result = explained(recordings / "sitl" / "i03.tlog")
     html = explain_html(
         result.diagnosis,
         files=result.files,

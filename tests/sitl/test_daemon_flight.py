@@ -55,6 +55,7 @@ async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, mo
             await sitl.fly(FLIGHT_S)
             assert [await sitl.parameter(name) for name in SIX] == before, "not in flight"
             await sitl.land()
+            await sitl.set_parameter("SIM_SPEEDUP", 1.0)  # nothing to see any more, much to compute
             await until(lambda: 1 in service.snapshot().push.can_roll_back)
 
             planned = service.parts.journal.last_completed(1).plan

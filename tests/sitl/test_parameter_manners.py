@@ -234,6 +234,7 @@ def test_no_reboot_and_no_second_flight_while_armed(peer):
     assert peer.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0) == mav.MAV_RESULT_FAILED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["plane", "copter"])
 def test_flies_lands_and_flies_again(vehicle):
     peer = Peer(vehicle)

@@ -28,6 +28,7 @@ async def served(vehicle, speedup=20.0):
             await task
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["copter", "plane"])
 async def test_mavsdk_reads_writes_and_flies(vehicle):
     async with served(vehicle) as (server, url), Pilot.at(url, vehicle) as pilot:

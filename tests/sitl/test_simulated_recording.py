@@ -123,6 +123,7 @@ def attitude_error(flight):
     return np.stack([error[:, 2, 1], error[:, 0, 2], error[:, 1, 0]], axis=1), np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["plane", "copter"])
 def test_attitude_errs_as_a_filter_does(vehicle):
     error, _ = attitude_error(recording.run(FlightSpec(vehicle=vehicle, duration=200.0, seed=5)))

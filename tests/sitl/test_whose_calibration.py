@@ -52,6 +52,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
             await daemons.until(lambda: service.snapshot().parameters.keys() >= set(SIX))
             await sitl.fly(FLIGHT_S)
             await sitl.land()
+            await sitl.set_parameter("SIM_SPEEDUP", 1.0)  # nothing to see any more, much to compute
             await daemons.until(
                 lambda: held_back(service).get(1, {}).keys() == {"disarmed_too_short"}, limit=600.0
             )
@@ -88,6 +89,7 @@ async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, tmp_path)
             await daemons.until(lambda: service.snapshot().parameters.keys() >= set(SIX))
             await sitl.fly(FLIGHT_S)
             await sitl.land()
+            await sitl.set_parameter("SIM_SPEEDUP", 1.0)
             states = {"writing", "settling", "verifying"}
             await daemons.until(
                 lambda: (

@@ -4,13 +4,12 @@ import json
 
 import pytest
 
-from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.samples import ImuSample
 from onboard.recordings.opening import open_recording
+from tests.explained import explained
 
-pytestmark = pytest.mark.recordings
+pytestmark = [pytest.mark.recordings, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
@@ -19,11 +18,10 @@ def answers(recordings):
 
 
 def diagnosed(recordings, name):
-    made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
-    for sample in open_recording(recordings / "sitl" / f"{name}.tlog").samples():
-        made.feed(sample)
-    made.finish()
-    return diagnose(made, 1), made.first_sample
+    """What is said of a recording, and its first inertial sample, from which times count."""
+    path = recordings / "sitl" / f"{name}.tlog"
+    begun = next(s.t for s in open_recording(path).samples() if isinstance(s, ImuSample))
+    return explained(path).diagnosis, begun
 
 
 def truth_of(record, first_sample):

@@ -37,6 +37,7 @@ def gains(full, times):
     return np.array([g for g, _ in scored])
 
 
+@pytest.mark.slow
 def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeypatch):
     times = full.point.skew_from + AT + np.arange(-8.0, 9.0, 4.0)
     near = gains(full, times)
@@ -46,6 +47,7 @@ def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeyp
     assert near == pytest.approx(whole, rel=0.15)
 
 
+@pytest.mark.slow
 def test_it_is_found_to_the_second(full):
     begun = full.point.skew_from  # the first sample, on the ground
     found = jumps.jump_near(full, (), begun + AT + 30.0)

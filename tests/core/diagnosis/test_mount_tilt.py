@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.estimate.calibrator import Calibrator
@@ -12,8 +13,9 @@ from onboard.core.physics.effects.mount_tilt import TRIM_RAD, MountTilt, attitud
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as fx
 from sitl.builtin import rotation
+from sitl.builtin.messages import packed
 from sitl.builtin.truth import GpsTruth, ImuTruth
-from sitl.recording import FlightSpec, fly_messages, run
+from sitl.recording import FlightSpec, run
 
 TURNED = fx.AccelerometerTilt(roll=-0.03, pitch=0.025)
 ASKEW = fx.BoardTilt(roll=0.03, pitch=-0.025)
@@ -34,18 +36,30 @@ def spec(*effects, **parameters):
 
 
 def diagnosed(flown):
-    decoder = Decoder(system=1, component=1)
+    decoder, packer = Decoder(system=1, component=1), mavlink.MAVLink(None, 1, 1)
     made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
-    for _, message in fly_messages(flown):
+    for _, message in flight_of(flown).messages:
+        packed(message, packer)  # which gives it its header
         for sample in decoder.decode(message):
             made.feed(sample)
     made.finish()
     return diagnose(made, 1)
 
 
+LATEST = {}
+
+
+def flight_of(flown):
+    """The flight, flown once for its diagnosis and its attitude, which follow on each other."""
+    if repr(flown) not in LATEST:
+        LATEST.clear()
+        LATEST[repr(flown)] = run(flown)
+    return LATEST[repr(flown)]
+
+
 def attitude_error(flown):
     """Mean of roll and pitch as reported, less the airframe's own, rad; late in the flight."""
-    flight = run(flown)
+    flight = flight_of(flown)
     flying = flight.pieces[-1]
     off = []
     for _, message in flight.messages:
@@ -60,6 +74,7 @@ def tilts(diagnosis):
     return [e for e in diagnosis.effects if e.name == "mount_tilt"]
 
 
+@pytest.mark.slow
 def test_an_accelerometer_turned_against_its_gyroscope_is_no_reason_for_a_trim():
     flown = spec(TURNED)
     (tilt,) = tilts(diagnosed(flown))
@@ -73,10 +88,12 @@ def test_an_accelerometer_turned_against_its_gyroscope_is_no_reason_for_a_trim()
     assert np.abs(attitude_error(spec(TURNED, **MISTAKEN))).max() > 0.02
 
 
+@pytest.mark.slow
 def test_after_the_sensor_is_replaced_the_next_flight_is_clean():
     assert diagnosed(spec()).effects == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "trim",
     [MISTAKEN, {"AHRS_TRIM_X": 0.03, "AHRS_TRIM_Y": -0.025}],
@@ -91,6 +108,7 @@ def test_a_trim_that_was_set_for_the_accelerometers_tilt_is_taken_back(trim):
     assert np.abs(attitude_error(spec(TURNED, **tilt.parameters))).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "trim"),
     [((ASKEW,), OF_BOARD), ((), MISTAKEN)],
@@ -105,6 +123,7 @@ def test_a_trim_says_nothing_of_what_is_missing(effects, trim):
         assert np.abs(attitude_error(spec(*effects, **trim))).max() < 0.01
 
 
+@pytest.mark.slow
 def test_an_attitude_off_against_both_sensors_is_trimmed_and_then_clean():
     flown = spec(fx.MountTilt(roll=0.03, pitch=-0.025))
     (tilt,) = tilts(diagnosed(flown))

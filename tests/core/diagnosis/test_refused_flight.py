@@ -9,7 +9,6 @@ from onboard.answers.verdict import headline, unused_in_words
 from onboard.core.diagnosis.coasting import _between_steps
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Mismatch, Verdict
-from onboard.core.diagnosis.timing_effects import _of_latency
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.settings import CalibratorSettings
@@ -17,6 +16,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.gps.distrust import Distrust
 from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
+from onboard.core.physics.effects.gps_latency import GpsLatency
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import GpsTruth, random_imus
@@ -50,6 +50,7 @@ def flagged(seed, gps, complaint, *effects, duration=200.0):
     return diagnose(made, 1), made.first_sample
 
 
+@pytest.mark.slow
 def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
     fault = concealed.GpsFault(start=90.0, end=123.0, north=1.2, east=-0.9)
     said, first = flagged(70, NOISY, (91.0, 128.0), fault)
@@ -66,6 +67,7 @@ def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
     assert (unused.reason, unused.contradicted) == ("ekf_gps_glitch", True)
 
 
+@pytest.mark.slow
 def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_clean():
     said, first = flagged(41, PROMPT, (70.0, 90.0), duration=150.0)
     assert said.verdict is Verdict.CLEAN
@@ -143,6 +145,7 @@ def test_a_proof_on_less_than_half_of_the_fixes_supports_nothing():
     assert replace(made, fixes=371).supported
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_a_flight_of_which_hardly_a_fix_fits_is_not_explained(recordings):
     from onboard.answers.explain import explain  # noqa: PLC0415 - not needed without the recordings
@@ -153,19 +156,24 @@ def test_a_flight_of_which_hardly_a_fix_fits_is_not_explained(recordings):
     assert f"only {said.mismatch.fixes} of {said.mismatch.believed} GPS fixes" in said.note
 
 
+def advised(delay, clock):
+    cure = GpsLatency._cured_by(delay, clock)
+    return cure.words, cure.parameters
+
+
 def test_the_advice_counts_from_the_ekfs_own_stamp():
     clock = FixClock(late=0.032, assumed=(0.12, 0.22))
-    cure, parameters = _of_latency(0.214, clock)
+    cure, parameters = advised(0.214, clock)
     assert parameters == {"GPS1_DELAY_MS": 182.0}
     assert "32 ms later" in cure
     assert "120 or 220 ms" in cure
 
 
 def test_what_the_driver_assumes_by_itself_is_not_advised():
-    cure, parameters = _of_latency(0.19, FixClock(assumed=(0.2,)))
+    cure, parameters = advised(0.19, FixClock(assumed=(0.2,)))
     assert parameters == {}
     assert cure.startswith("none")
-    _, parameters = _of_latency(0.19, FixClock(configured=0.1, assumed=(0.1,)))
+    _, parameters = advised(0.19, FixClock(configured=0.1, assumed=(0.1,)))
     assert parameters == {"GPS1_DELAY_MS": 190.0}
 
 

@@ -43,6 +43,7 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert said.effects == ()
 
 
+@pytest.mark.slow
 def test_a_false_velocity_is_found_from_beginning_to_end():
     fault = concealed.GpsFault(start=70.0, end=84.0, north=0.0, east=2.5)
     said, first = diagnosed("plane", 42, fault)
@@ -55,6 +56,7 @@ def test_a_false_velocity_is_found_from_beginning_to_end():
     assert effect.where[0].axis == "earth_east"
 
 
+@pytest.mark.slow
 def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jumps_back():
     fault = concealed.GpsFault(start=60.0, end=85.0, north=0.0, east=3.3)
     said, first = diagnosed("copter", 46, fault)
@@ -63,6 +65,7 @@ def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jump
     assert abs(effect.intervals[-1][1] + first - fault.end) < 2.0
 
 
+@pytest.mark.slow
 def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
     # The EKF levels with the accelerometer: 1.4 m/s^2 in the first minute tilt it by degrees.
     warm = {"temperature_start": 15.0, "temperature_end": 50.0, "temperature_time": 25.0}
@@ -76,6 +79,7 @@ def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
         assert abs(found.value - truth) < max(0.1 * abs(truth), 3.0 * found.sigma)
 
 
+@pytest.mark.slow
 def test_a_very_late_attitude_leaves_nothing_over_for_other_effects():
     said, _ = diagnosed("copter", 48, concealed.ImuDelay(delay=0.09))
     (effect,) = said.effects
@@ -83,6 +87,7 @@ def test_a_very_late_attitude_leaves_nothing_over_for_other_effects():
     assert effect.unknowns["delay"].value == pytest.approx(0.09, rel=0.04)
 
 
+@pytest.mark.slow
 def test_a_jump_of_one_axis_is_said_to_be_on_that_axis():
     step = concealed.BiasStep(time=80.0, x=0.5)
     said, first = diagnosed("copter", 43, step)
@@ -92,6 +97,7 @@ def test_a_jump_of_one_axis_is_said_to_be_on_that_axis():
     assert {e.name for e in said.effects} == {"bias_step"}
 
 
+@pytest.mark.slow
 def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
     said, _ = diagnosed("copter", 44, concealed.Saturation(limit=11.4))
     effect = next(e for e in said.effects if e.name == "saturation")
@@ -100,6 +106,7 @@ def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
     assert np.all(np.diff(np.array(effect.intervals)) >= 0.0)
 
 
+@pytest.mark.slow
 def test_what_has_no_name_gets_none_but_its_formula():
     hidden = concealed.Nameless(term="dynamic_pressure", x=-0.2, y=-0.2, z=-0.2)
     said, _ = diagnosed("copter", 45, hidden, duration=200.0)
@@ -109,6 +116,7 @@ def test_what_has_no_name_gets_none_but_its_formula():
     assert "speed" in effect.formula
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "axis", "size"), [(50, "x", -0.33), (51, "y", 0.37)])
 def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
     # Sideways it looks like a tilt that wanders: noise found without it would be made of it.
@@ -121,6 +129,7 @@ def test_a_copters_jump_does_not_pass_for_noise(seed, axis, size):
     assert effect.unknowns[axis].value == pytest.approx(size, rel=0.1)
 
 
+@pytest.mark.slow
 def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_confounder():
     # In a hover's force, 24 r / g of a squared window is an antenna r higher.
     averaging = replace(PROMPT, smoothing=0.3)

@@ -42,6 +42,7 @@ def assert_true(got, truth, vehicle):
     assert error @ np.linalg.solve(np.array(got.covariance), error) < 33.1  # 6 dof: p of 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a02", "a07", "b01", "b06"])
 def test_stream_gives_the_truth(recordings, answers, name):
     truth = answers[name]
@@ -50,6 +51,7 @@ def test_stream_gives_the_truth(recordings, answers, name):
     assert abs(got.timing["gps_delay_s"].value - truth["net_gps_delay_s"]) < DELAY_LIMIT_S
 
 
+@pytest.mark.slow
 def test_log_gives_the_truth_of_both_accelerometers(recordings, answers):
     truth = answers["c01"]
     made = calibrated(recordings / "sitl" / "c01.BIN")
@@ -57,6 +59,7 @@ def test_log_gives_the_truth_of_both_accelerometers(recordings, answers):
     assert_true(made.calibration(2), truth["imu2"], truth["vehicle"])
 
 
+@pytest.mark.slow
 def test_what_does_not_move_is_not_calibrated(recordings):
     made = calibrated(recordings / "real" / "real-quad-10-hover.BIN")
     assert made.imus

@@ -43,6 +43,7 @@ def saved():
     return flown(samples(OURS)).to_bytes()
 
 
+@pytest.mark.slow
 def test_another_board_of_the_same_model_does_not_get_the_sums_of_this_one(saved):
     flight = samples(ANOTHER, seed=2)
     got = flown(flight, saved)
@@ -53,6 +54,7 @@ def test_another_board_of_the_same_model_does_not_get_the_sums_of_this_one(saved
     assert got.calibration(1).offset == alone.calibration(1).offset
 
 
+@pytest.mark.slow
 def test_a_second_flight_of_the_same_board_adds_up(saved):
     flight = samples(OURS, seed=3)
     both, alone = flown(flight, saved), flown(flight)

@@ -39,6 +39,7 @@ def flight(request):
     return simulated(FlightSpec(vehicle=request.param, seed=12, duration=300.0, imus=imus))
 
 
+@pytest.mark.slow
 def test_each_fault_changes_the_receiver_alone(flight):
     span = moving_span(flight.samples)
     others = [s for s in flight.samples if not isinstance(s, GpsFix)]
@@ -48,6 +49,7 @@ def test_each_fault_changes_the_receiver_alone(flight):
         assert [s for s in faulted if not isinstance(s, GpsFix)] == others
 
 
+@pytest.mark.slow
 def test_step_glitch_and_gaps_in_one_flight(flight):
     span = moving_span(flight.samples)
     every = (STEP, GLITCH, GAPS)
@@ -63,6 +65,7 @@ def test_step_glitch_and_gaps_in_one_flight(flight):
     assert np.sum(small & np.array(o.observed)) >= 5, told(o)
 
 
+@pytest.mark.slow
 def test_a_noisy_receiver_is_not_believed_when_it_is_right_by_chance(flight):
     """After seconds of coasting the gate is as wide as the noise."""
     (o,) = outcomes(flight, NOISE)
@@ -71,6 +74,7 @@ def test_a_noisy_receiver_is_not_believed_when_it_is_right_by_chance(flight):
     assert o.good, told(o)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [NO_FIX, SILENT], ids=["no fix", "silent"])
 def test_the_last_answer_outlives_gps(flight, fault):
     span = moving_span(flight.samples)
@@ -93,6 +97,7 @@ def test_the_last_answer_outlives_gps(flight, fault):
     assert np.all(np.abs(error) < 4.0 * np.array(got.scale_sigma + got.offset_sigma))
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 @pytest.mark.parametrize(
     ("name", "fault"),

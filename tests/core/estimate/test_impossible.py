@@ -68,6 +68,7 @@ def test_accelerometers_that_autopilots_do_not_have(imu):
     assert impossible(replace(IMU, imu=imu)) == "imu_impossible"
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(
     st.lists(

@@ -12,6 +12,7 @@ import pytest
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Restarted
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.assembly import AssemblySettings
 from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
 from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
@@ -350,7 +351,7 @@ def test_a_slow_track_refuses_what_is_late_and_keeps_two():
 
 
 def test_flight_that_left_the_buffer_stays_in_the_sums(flight):
-    every = replace(ONCE, batch_s=2.0, memory_s=1e12)
+    every = replace(ONCE, assembly=AssemblySettings(batch_s=2.0), memory_s=1e12)
     short = fed(flight, replace(every, buffer_s=10.0))[0].engine(1)
     long = fed(flight, every)[0].engine(1)
     assert len(short.aged) > 12

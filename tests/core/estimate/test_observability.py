@@ -74,6 +74,7 @@ def test_axes_that_were_not_excited_are_named_one_by_one():
     assert "to both sides" in result.weak[1].advice
 
 
+@pytest.mark.slow
 def test_each_kind_of_vehicle_is_told_what_it_can_do():
     def advised(kind):
         return assess(information(flight(1_000_000, 3, 0.01, 3)), kind=kind).coverage.advice

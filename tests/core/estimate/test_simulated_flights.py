@@ -127,6 +127,7 @@ def long_armed():
     return [s for s in samples if not (isinstance(s, ParameterValue) and "_POS" in s.name)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", PLACES)
 def test_an_antenna_whose_place_is_told_does_no_harm(long_armed, told):
     """The receiver reports its antenna's velocity; nobody but the estimator moves it."""
@@ -154,6 +155,7 @@ def test_an_antenna_told_a_little_wrong_does_no_harm(long_armed, wrong):
     assert_true(got)
 
 
+@pytest.mark.slow
 def test_a_sparse_attitude_is_not_interpolated():
     """At 4 Hz a copter tips over and back between two samples."""
     samples, delay = flown("copter", 150.0, rates=RATES | {"ATTITUDE": 4.0}, seed=7)
@@ -163,6 +165,7 @@ def test_a_sparse_attitude_is_not_interpolated():
     assert abs(told.value - delay) < 3.0 * told.sigma
 
 
+@pytest.mark.slow
 def test_repeated_and_late_samples_change_nothing(short, of_short):
     noisy, recent = [], []
     for sample in short:
@@ -186,6 +189,7 @@ def exact(sample):
     return dataclasses.replace(sample, f_b=f, f_step=0.0)
 
 
+@pytest.mark.slow
 def test_a_change_of_parameters_in_flight_leaves_the_estimate(short):
     before, after = split([exact(s) for s in short], 35.0)
     in_force = {p.name: p.value for p in parameters_of(short)}
@@ -209,6 +213,7 @@ def test_a_change_of_parameters_in_flight_leaves_the_estimate(short):
     assert changed.in_force_offset == pytest.approx(MOVED["offset"])
 
 
+@pytest.mark.slow
 def test_the_finer_stream_is_preferred(short):
     def fine(sample):
         return dataclasses.replace(exact(sample), source=ImuSource.HIGHRES_IMU)
@@ -229,6 +234,7 @@ def test_the_finer_stream_is_preferred(short):
     assert_same(calibrated(both), calibrated(alone))
 
 
+@pytest.mark.slow
 def test_a_reboot_in_flight_keeps_what_was_learnt(copter):
     before, after = split(copter, 75.0)
     start = next(s.t for s in after if isinstance(s, ImuSample)) - 4.0
@@ -247,6 +253,7 @@ def test_a_reboot_in_flight_keeps_what_was_learnt(copter):
     assert got.rejected["reboots"] == 1
 
 
+@pytest.mark.slow
 def test_twenty_seconds_without_gps(copter):
     got = calibrated([s for s in copter if not (isinstance(s, GpsFix) and 50.0 < s.t < 70.0)])
     assert got.status is Status.CALIBRATED
@@ -259,6 +266,7 @@ def halves(copter):
     return fed(before), [*parameters_of(before), *after]
 
 
+@pytest.mark.slow
 def test_saved_sums_go_on_where_they_stopped(halves):
     first, rest = halves
     assert first.parameters.device_id(1)
@@ -288,6 +296,7 @@ def test_damaged_state_is_refused(halves, damage):
         Calibrator.from_bytes(damage(halves[0].to_bytes()))
 
 
+@pytest.mark.slow
 def test_a_hover_is_never_called_calibrated():
     samples, _ = flown("copter", 90.0, dull=True)
     made = Calibrator()

@@ -1,0 +1,25 @@
+"""Which process runs which tests: a file in one of them, and files that share work in the same."""
+
+from __future__ import annotations
+
+from xdist.scheduler import LoadFileScheduling
+
+SHARED = {
+    "tests/core/diagnosis/test_diagnosis.py": "explained recordings",
+    "tests/report/test_one_answer.py": "explained recordings",
+    "tests/report/test_recorded_advice.py": "explained recordings",
+    "tests/report/test_report_page.py": "explained recordings",
+}
+"""Files that ask :func:`tests.explained.explained` for the same recordings."""
+
+
+class SharedWork(LoadFileScheduling):
+    """Files in the order of collection, which has the long ones first: the end is even."""
+
+    def __init__(self, config, log=None):
+        config.option.loadscopereorder = False
+        super().__init__(config, log)
+
+    def _split_scope(self, nodeid):
+        file = super()._split_scope(nodeid)
+        return SHARED.get(file, file)
