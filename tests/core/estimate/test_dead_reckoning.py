@@ -13,7 +13,7 @@ from onboard.core.maths.frames import rotation_from_vector
 LATITUDE, STEP = 0.8, 0.2
 
 
-def steady(v_n, horizon):
+def steady(v_n, horizon, step=STEP):
     """Level flight at a constant velocity over the turning earth, axes kept along NED.
 
     Raw force is zero and the whole force is in beta, so that two calibrations are two forces.
@@ -21,15 +21,15 @@ def steady(v_n, horizon):
     turn = earth_rate_n(LATITUDE) + transport_rate_n(LATITUDE, 0.0, v_n)
     chain = [
         Interval(
-            start=k * STEP,
-            end=(k + 1) * STEP,
-            turn=rotation_from_vector(turn * STEP),
+            start=k * step,
+            end=(k + 1) * step,
+            turn=rotation_from_vector(turn * step),
             by_scale=np.zeros((3, 3)),
-            by_offset=STEP * np.eye(3),
+            by_offset=step * np.eye(3),
             velocity=v_n,
             latitude=LATITUDE,
         )
-        for k in range(round(horizon / STEP))
+        for k in range(round(horizon / step))
     ]
     state = EpochState(0.0, np.zeros(3), np.eye(3), v_n, np.zeros(3))
     force = -np.array([0.0, 0.0, STANDARD_GRAVITY]) - coriolis_n(LATITUDE, 0.0, v_n)
@@ -54,12 +54,12 @@ def test_an_offset_drifts_with_time():
     assert drift.rms[0] == pytest.approx(0.6 / np.sqrt(3.0), rel=0.02)
 
 
-@pytest.mark.parametrize("since", [0.0, 0.137, 1234.5678, 98765.4321])
+@pytest.mark.parametrize("since", [0.0, 2.739, 16.528, 1234.5678])
 def test_which_windows_are_looked_at_does_not_depend_on_when_the_clock_began(since):
     """Windows that follow on a grid of epochs: sums of times must not decide by rounding."""
-    chain, states, force = steady(np.array([20.0, 0.0, 0.0]), 240.0)
+    chain, states, force = steady(np.array([20.0, 0.0, 0.0]), 240.0, step=0.4)
     chain = [replace(x, start=since + x.start, end=since + x.end) for x in chain]
     states = [replace(states[0], t=since)] + [replace(states[0], t=x.end) for x in chain]
     six = np.concatenate([np.ones(3), force])
-    drift = free_drift(chain, states, [six], horizon_s=60.0, most=4)
-    assert drift.windows == 4
+    drift = free_drift(chain, states, [six], horizon_s=10.0, most=24)
+    assert drift.windows == 24
