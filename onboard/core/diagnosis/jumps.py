@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.hypotheses import Candidate
 from onboard.core.diagnosis.selection import OFFSETS, SETTLED_S, Fitter
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block

@@ -13,28 +13,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.candidates import (
+    CONTRADICTING,
+    LEAST_BLOCKS,
+    RECONCILED,
+    Candidate,
+)
+from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import (
-    CONTRADICTING,
-    FAIR,
-    LEAST_BLOCKS,
-    MARGIN,
-    RECONCILED,
-    Candidate,
     Choice,
     choose,
     doubtful,
-    reconciles,
     reconsider_standing,
 )
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
-from onboard.core.diagnosis.records import Diagnosis, NotTestable
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
-from onboard.core.diagnosis.screening import false_fixes, unclipped
-from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
+from onboard.core.diagnosis.settling import families_of, settled
 from onboard.core.diagnosis.standing import (
     Measured,
     attitude_unknowns,
@@ -43,20 +41,14 @@ from onboard.core.diagnosis.standing import (
     standing_kinds,
     without,
 )
-from onboard.core.diagnosis.testability import testable_of, unseen_share
-from onboard.core.estimate.calibration_model import moved
+from onboard.core.diagnosis.testability import unseen_share
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
-from onboard.core.maths.arrays import Array
-from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin, Standing
-from onboard.core.physics.finding import Finding
 
-ENOUGH = 0.3
-"""Share of a flight that has to be left without what is clipped."""
 SUSPECT = 18.0
 """Fall of chi-square by a jump at any block's start that one flight of thirty shows by chance."""
 
@@ -80,33 +72,9 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     """
     engine = calibrator.engine(imu)
     flight = since_reboot(engine.batches) if latest else list(engine.batches)
-    first = float(flight[0].segment.t[0]) if latest and flight else calibrator.first_sample
-    antenna = calibrator.parameters.antenna
-    origin = Origin(
-        t0=first,
-        antenna=(float(antenna[0]), float(antenna[1]), float(antenna[2])),
-        trim=calibrator.parameters.trim,
-        imu=imu,
-    )
-    rail = saturation_effect(flight, origin.t0, imu)
-    batches = flight
-    if rail is not None:
-        batches = unclipped(batches, rail.intervals, origin.t0)
-        if sum(c.trusted_s for c in batches) < ENOUGH * sum(c.trusted_s for c in flight):
-            # Clipped all the time: what is left would say less than what is spoiled.
-            batches = flight
-    testable, absent = testable_of(catalogue(origin), batches)
-    if rail is not None:
-        absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
-        testable = [f for f in testable if not f.bent_by_clipping]
-    full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
-    clipped = rail is not None and batches is flight
-    fault: Finding | None = None
-    if not clipped:
-        # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault, batches = false_fixes(calibrator, engine, full, origin.t0)
-    if fault is not None:
-        full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+    origin = _origin(calibrator, imu, flight if latest else ())
+    clear = cleared(calibrator, engine, flight, origin)
+    full, testable = clear.full, clear.testable
     full.doubting_attitude()
     choice = _chosen(full, testable)
     jumped = _with_jump(full, testable, choice)
@@ -117,45 +85,31 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         if _wanders(choice) or _wanders(other):
             full, testable, choice = *jumped, other
     standing, doubts = _second_thoughts(choice, full, calibrator, imu)
-    families = _families(choice)
+    families = families_of(choice)
     if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
         families = [f.averaged() for f in families]
-    final = _final(full, choice, families).doubting_attitude()
-    if any(f.onset is not None for f in families) and any(f.in_proportion for f in families):
-        found = final.found().theta
-        families = _about_sizes([(f, found[final.indices(f)]) for f in families])
-        final = _again(full, families, final).with_rows().doubting_attitude()
-    kept = _needed(final, families)
-    if len(kept) < len(families):
-        # A jump may have passed for something slower, or the other way round.
-        families = kept
-        final = _again(full, families, final).with_rows().doubting_attitude()
-    wider = families if clipped else searched(final, families, choice.fitter.variance_inflation)
-    if wider != families:
-        families = wider
-        final = _again(full, families, final).with_noise().doubting_attitude()
-        kept = _needed(final, families)
-        if len(kept) < len(families):
-            families = kept
-            final = _again(full, families, final).with_rows().doubting_attitude()
-    unused = unused_flight(flight, calibrator.trust.refusals, fault, origin.t0, asked=not clipped)
+    final, families = settled(full, choice, families, named_only=clear.clipped)
+    asked = not clear.clipped
+    unused = unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked)
     return Judge(
         calibrator,
         imu,
         Evidence(full, choice, final, tuple(families), doubts, believed(flight), unused),
         origin,
-        absent,
-        tuple(e for e in (rail, fault) if e is not None),
+        clear.absent,
+        tuple(e for e in (clear.rail, clear.fault) if e is not None),
     )
 
 
-def since_reboot(batches: Sequence[Batch]) -> list[Batch]:
-    """The batches at the end whose clock is one and the same."""
-    first = 0
-    for i in range(1, len(batches)):
-        if batches[i].fixes.t[0] < batches[i - 1].fixes.t[0]:
-            first = i
-    return list(batches[first:])
+def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin:
+    """What effects count from: the first sample of all, or of ``latest`` if there is any."""
+    x, y, z = (float(a) for a in calibrator.parameters.antenna)
+    return Origin(
+        t0=float(latest[0].segment.t[0]) if latest else calibrator.first_sample,
+        antenna=(x, y, z),
+        trim=calibrator.parameters.trim,
+        imu=imu,
+    )
 
 
 def _with_jump(
@@ -272,66 +226,3 @@ def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[s
     column = choice.fitter.model.index[standing_kinds()[name].in_every_model[0]]
     start, least = reduced(name, full.point, told)
     return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
-
-
-def _families(choice: Choice) -> list[Effect]:
-    """Columns of what was chosen; those of a gain about its size."""
-    theta = choice.fitter.fit(choice.free, held_out=False).theta
-    sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
-    return _about_sizes(sized)
-
-
-def _about_sizes(sized: Sequence[tuple[Effect, Array]]) -> list[Effect]:
-    """Effects of which those in proportion to the force act on the force without the others."""
-    alone = [(f.about(size, ()), size) for f, size in sized]
-    return [
-        f.about(size, [a for j, a in enumerate(alone) if j != i and a[0].changes_force])
-        for i, (f, size) in enumerate(alone)
-    ]
-
-
-def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Examination:
-    """The model that was chosen, about what the sums of everything say of it."""
-    model = choice.fitter.model
-    fit = choice.fitter.fit(choice.free, held_out=False)
-    final = Examination(
-        full,
-        families,
-        t0=full.point.skew_from,
-        start=full,
-        point=moved(full.point, model, fit.theta),
-    )
-    theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
-    mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
-    theirs = [model.index[final.model.unknowns[i].name] for i in mine]
-    theta[mine] = fit.theta[theirs]
-    covariance[np.ix_(mine, mine)] = fit.covariance[np.ix_(theirs, theirs)]
-    return final.with_rows(theta, covariance)
-
-
-def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:
-    """Another model than the final one, from where that one has come to."""
-    return Examination(full, families, t0=full.point.skew_from, start=final)
-
-
-def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
-    """Families that stay significant when all of them are in one model."""
-    fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
-    kept = list(families)
-    base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
-    while kept:
-        free = base + made.indices_of(kept)
-        # What a needless jump makes of the offsets must not weaken what is said for the others.
-        fitter.variance_inflation = fitter.variance_inflation_of(free)
-        with_all = fitter.fit(free, held_out=False)
-        worst, least = None, np.inf
-        for family in kept:
-            c = candidate_of(made, family)
-            rest = [i for i in free if i not in c.index]
-            bic = c.bic(fitter, fitter.fit(rest, held_out=False), with_all)
-            if bic < least and not (bic > FAIR and reconciles(fitter, rest, c.index)):
-                worst, least = family, bic
-        if least >= MARGIN:
-            break
-        kept = [f for f in kept if f is not worst]
-    return kept

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from onboard.core.diagnosis.candidates import MARGIN, Candidate, accepted
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.hypotheses import MARGIN, Candidate, accepted
 from onboard.core.diagnosis.jumps import candidate_of
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.physics.effect import Effect, Origin

@@ -21,7 +21,7 @@ import numpy as np
 
 from onboard.answers.answer import answer, diagnosed
 from onboard.answers.explain_document import explain_document
-from onboard.core.diagnosis.procedure import since_reboot
+from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Six, Status

@@ -1,0 +1,69 @@
+"""A flight without what must not be fitted: clipped samples, false fixes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.records import NotTestable
+from onboard.core.diagnosis.screening import false_fixes, unclipped
+from onboard.core.diagnosis.testability import testable_of
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.engine import Engine
+from onboard.core.inputs.segments import Batch
+from onboard.core.physics.catalogue import catalogue
+from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.finding import Finding
+
+ENOUGH = 0.3
+"""Share of a flight that has to be left without what is clipped."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cleared:
+    """A flight without what must not be fitted, with every effect that it can be asked for.
+
+    ``clipped`` if the accelerometer was at its rail all the time, and nothing was left out.
+    """
+
+    full: Examination
+    testable: list[Effect]
+    absent: list[NotTestable]
+    rail: Finding | None
+    fault: Finding | None
+    clipped: bool
+
+
+def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin: Origin) -> Cleared:
+    """Leave out what was clipped and which fixes are false, for no sums may hold them."""
+    rail = saturation_effect(flight, origin.t0, origin.imu)
+    batches = flight
+    if rail is not None:
+        batches = unclipped(batches, rail.intervals, origin.t0)
+        if sum(c.trusted_s for c in batches) < ENOUGH * sum(c.trusted_s for c in flight):
+            # Clipped all the time: what is left would say less than what is spoiled.
+            batches = flight
+    testable, absent = testable_of(catalogue(origin), batches)
+    if rail is not None:
+        absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
+        testable = [f for f in testable if not f.bent_by_clipping]
+    full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+    clipped = rail is not None and batches is flight
+    fault: Finding | None = None
+    if not clipped:
+        # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
+        fault, batches = false_fixes(calibrator, engine, full, origin.t0)
+    if fault is not None:
+        full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+    return Cleared(full, testable, absent, rail, fault, clipped)
+
+
+def since_reboot(batches: Sequence[Batch]) -> list[Batch]:
+    """The batches at the end whose clock is one and the same."""
+    first = 0
+    for i in range(1, len(batches)):
+        if batches[i].fixes.t[0] < batches[i - 1].fixes.t[0]:
+            first = i
+    return list(batches[first:])

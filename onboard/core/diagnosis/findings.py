@@ -1,0 +1,143 @@
+"""Findings: every effect that was found, with its size, its evidence and its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.diagnosis.candidates import HELD_OUT_GAIN, MARGIN, Candidate
+from onboard.core.diagnosis.final_model import FinalModel
+from onboard.core.diagnosis.hypotheses import Choice, confounders_of
+from onboard.core.diagnosis.regimes import main_axis, spans
+from onboard.core.diagnosis.standing import standing_effects, standing_kinds, without
+from onboard.core.maths.arrays import Array
+from onboard.core.model.linearisation import Linearisation
+from onboard.core.physics.catalogue import response_of
+from onboard.core.physics.effect import Cure, Effect, Standing
+from onboard.core.physics.finding import Confounder, Finding, Quantity
+
+ONSET_S = 0.5
+"""Sigma of a moment that is searched at half seconds, s."""
+
+
+class Findings:
+    """Makes the findings of a final model."""
+
+    def __init__(self, final: FinalModel, choice: Choice, full_point: Linearisation) -> None:
+        """Take the final model, the choice that led to it, and what the choice is counted from."""
+        self._final, self._choice, self._full_point = final, choice, full_point
+
+    def made(self, standing: Standing, doubts: Mapping[str, Sequence[str]]) -> list[Finding]:
+        """Everything that was found in the sums.
+
+        Args:
+            standing: the unknowns of every model.
+            doubts: effects of them that something else could stand for.
+        """
+        # A name has one effect: what stands beside regressors of its own is their consequence.
+        named = {f.effect for f in self._final.families}
+        out = [
+            self._standing(name, quantities, cure)
+            for name, (quantities, cure) in standing_effects(standing).items()
+            if name not in doubts and name not in named and self._holds(name)
+        ]
+        return out + [self._effect(f) for f in self._final.families]
+
+    def _standing(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
+        final = self._final
+        columns = standing_kinds()[name].in_every_model
+        index = [final.index[c] for c in columns]
+        held = final.held(columns)
+        made = self._record(name, quantities, index, held, cure)
+        return replace(made, confounders=self._standing_confounders(name, columns))
+
+    def _holds(self, name: str) -> bool:
+        """Whether timing or a constant attitude error is needed, also on data not fitted.
+
+        With the antenna's place free, or with the antenna where it was told to be: a few
+        centimetres of it could do instead on some flights, which is said besides.
+        """
+        final = self._final
+        every = (
+            final.evidence(name, among) for among in (final.all, final.with_configured_antenna())
+        )
+        return any(bic >= MARGIN and held >= HELD_OUT_GAIN for bic, held in every)
+
+    def _standing_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
+        """What else could stand for timing or a constant attitude error, by the full sums."""
+        final = self._final
+        choice, full = self._choice, self._choice.fitter.model.index
+        target = Candidate(name, tuple(full[c] for c in columns), ())
+        rest = [i for i in choice.free if i not in target.index]
+        told = final.clock.configured_on_stamp
+        held = without(columns, full, self._full_point, choice.fitter.absent, told)
+        others = [c for c in choice.candidates if c not in choice.chosen and c.effect != name]
+        return tuple(confounders_of(choice.fitter, rest, target, others, held))
+
+    def _effect(self, f: Effect) -> Finding:
+        final = self._final
+        index = [i for i in final.all if i in final.engine.indices(f)]
+        sigma = np.sqrt(np.diag(final.solution.covariance))
+        taken = {"clock_rate": final.engine.point.skew}
+        quantities = {
+            key: Quantity(
+                float(final.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
+            )
+            for key, i, u in zip(f.keys, index, f.unknowns, strict=True)
+        }
+        if f.onset is not None:
+            quantities = {"time": Quantity(f.onset - final.origin.t0, ONSET_S, "s"), **quantities}
+        values = {k: q.value for k, q in quantities.items()}
+        held = final.engine.absent
+        made = self._record(f.effect, quantities, index, held, f.cured(values))
+        made = replace(
+            made,
+            confounders=self._confounders(f),
+            formula=f.formula([quantities[k].value for k in f.keys]),
+        )
+        if f.onset is None:
+            return made
+        span = ((f.onset - final.origin.t0, final.engine.blocks[-1].end - final.origin.t0),)
+        axis = main_axis(final.solution.theta[index])
+        return replace(made, where=spans(final.engine.batches, final.origin.t0, span, axis))
+
+    def _confounders(self, f: Effect) -> tuple[Confounder, ...]:
+        for c in self._choice.chosen:
+            if c.effect == f.effect:
+                return tuple(self._choice.confounders(c))
+        return ()
+
+    def _record(
+        self,
+        name: str,
+        quantities: dict[str, Quantity],
+        index: Sequence[int],
+        held: Array,
+        cure: Cure,
+    ) -> Finding:
+        final = self._final
+        without, with_it = final.without(index, held)
+        rest = [i for i in final.all if i not in index]
+        theta = final.solution.theta
+        bic = final.fitter.gain(without, with_it) - len(index) * np.log(max(final.fitter.rows, 2.0))
+        return Finding(
+            name=name,
+            unknowns=quantities,
+            share_of_mismatch=final.share(without, with_it),
+            delta_bic=-float(bic),
+            held_out_before=final.fitter.held_rms(without),
+            held_out_after=final.fitter.held_rms(with_it),
+            parameters=dict(cure.parameters),
+            cure=cure.words,
+            where=final.where(index, without.theta, with_it.theta),
+            held_out_velocity_before=final.held_velocity(rest, held),
+            held_out_velocity_after=final.held_velocity(final.all),
+            imprint=final.epochs.imprint(
+                index, theta[list(index)] - held[list(index)], theta, final.origin.t0
+            ),
+            response_curve=response_of(
+                name, quantities, final.engine.batches, final.origin.t0, final.origin.temperature
+            ),
+        )

@@ -1,0 +1,115 @@
+"""From the effects that were chosen to the model that stands: about its sizes, nothing needless."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.diagnosis.candidates import (
+    FAIR,
+    MARGIN,
+)
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.hypotheses import (
+    Choice,
+    reconciles,
+)
+from onboard.core.diagnosis.jumps import candidate_of
+from onboard.core.diagnosis.search import searched
+from onboard.core.diagnosis.selection import Fitter
+from onboard.core.estimate.calibration_model import moved
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.effect import Effect
+
+
+def settled(
+    full: Examination, choice: Choice, families: list[Effect], *, named_only: bool
+) -> tuple[Examination, list[Effect]]:
+    """The model that was chosen, until nothing in it is needless and nothing is left to find."""
+    final = _final(full, choice, families).doubting_attitude()
+    if any(f.onset is not None for f in families) and any(f.in_proportion for f in families):
+        found = final.found().theta
+        families = _about_sizes([(f, found[final.indices(f)]) for f in families])
+        final = _again(full, families, final).with_rows().doubting_attitude()
+    # A jump may have passed for something slower, or the other way round.
+    final, families = _pruned(full, families, final)
+    inflation = choice.fitter.variance_inflation
+    wider = families if named_only else searched(final, families, inflation)
+    if wider != families:
+        final = _again(full, wider, final).with_noise().doubting_attitude()
+        final, families = _pruned(full, wider, final)
+    return final, families
+
+
+def _pruned(
+    full: Examination, families: list[Effect], final: Examination
+) -> tuple[Examination, list[Effect]]:
+    """The model without families that are not needed beside the others."""
+    kept = _needed(final, families)
+    if len(kept) == len(families):
+        return final, families
+    return _again(full, kept, final).with_rows().doubting_attitude(), kept
+
+
+def families_of(choice: Choice) -> list[Effect]:
+    """Columns of what was chosen; those of a gain about its size."""
+    theta = choice.fitter.fit(choice.free, held_out=False).theta
+    sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
+    return _about_sizes(sized)
+
+
+def _about_sizes(sized: Sequence[tuple[Effect, Array]]) -> list[Effect]:
+    """Effects of which those in proportion to the force act on the force without the others."""
+    alone = [(f.about(size, ()), size) for f, size in sized]
+    return [
+        f.about(size, [a for j, a in enumerate(alone) if j != i and a[0].changes_force])
+        for i, (f, size) in enumerate(alone)
+    ]
+
+
+def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Examination:
+    """The model that was chosen, about what the sums of everything say of it."""
+    model = choice.fitter.model
+    fit = choice.fitter.fit(choice.free, held_out=False)
+    final = Examination(
+        full,
+        families,
+        t0=full.point.skew_from,
+        start=full,
+        point=moved(full.point, model, fit.theta),
+    )
+    theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
+    mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
+    theirs = [model.index[final.model.unknowns[i].name] for i in mine]
+    theta[mine] = fit.theta[theirs]
+    covariance[np.ix_(mine, mine)] = fit.covariance[np.ix_(theirs, theirs)]
+    return final.with_rows(theta, covariance)
+
+
+def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:
+    """Another model than the final one, from where that one has come to."""
+    return Examination(full, families, t0=full.point.skew_from, start=final)
+
+
+def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
+    """Families that stay significant when all of them are in one model."""
+    fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
+    kept = list(families)
+    base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
+    while kept:
+        free = base + made.indices_of(kept)
+        # What a needless jump makes of the offsets must not weaken what is said for the others.
+        fitter.variance_inflation = fitter.variance_inflation_of(free)
+        with_all = fitter.fit(free, held_out=False)
+        worst, least = None, np.inf
+        for family in kept:
+            c = candidate_of(made, family)
+            rest = [i for i in free if i not in c.index]
+            bic = c.bic(fitter, fitter.fit(rest, held_out=False), with_all)
+            if bic < least and not (bic > FAIR and reconciles(fitter, rest, c.index)):
+                worst, least = family, bic
+        if least >= MARGIN:
+            break
+        kept = [f for f in kept if f is not worst]
+    return kept
