@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from onboard.answers.answer import Answer
 from onboard.answers.conditions import conditions
-from onboard.core.diagnosis.evidence import AMBIGUOUS
+from onboard.core.diagnosis.limits import AMBIGUOUS
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameter_names

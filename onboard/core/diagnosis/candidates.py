@@ -6,33 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.diagnosis.limits import (
+    CHANCE,
+    HELD_OUT_GAIN,
+    MARGIN,
+    MATTERS_HELD_OUT,
+    MATTERS_OFFSET,
+    MATTERS_SCALE,
+    SIGNIFICANT,
+    USED,
+)
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.physics.effect import Effect
-
-MARGIN = 25.0
-"""Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss."""
-HELD_OUT_GAIN = 12.0
-SECOND_ORDER = 5e-3
-"""Share of the evidence of what was found that columns linear in it may have left over."""
-SIGNIFICANT = 5.0
-CONTRADICTING, RECONCILED = 3.0, 0.35
-"""Inflation of the variance from which blocks contradict each other; what share is agreement."""
-FAIR = 10.0
-"""Fall of BIC that is enough for an effect which makes blocks agree."""
-MATTERS_SCALE, MATTERS_OFFSET, MATTERS_HELD_OUT = 0.005, 0.02, 0.03
-MOST_EFFECTS = 5
-LEAST_BLOCKS = 4
-"""Blocks of a flight among which a jump can be looked for."""
-RIVAL_SHARE = 0.15
-"""Least share of an effect's evidence that makes another one its confounder."""
-LEFT_BESIDE = 0.5
-"""A confounder explains the same: beside the effect less than this share of its gain is left."""
-USED = 4.0
-"""Sigmas from which an unknown of several counts as used."""
-CHANCE = 4.0
-"""What an unknown that is not used gains by chance, 19 times of 20."""
-STILL = 0.8
-"""Share of its least size that a timing error must keep whatever else is in the model."""
 
 
 @dataclass(frozen=True, slots=True)

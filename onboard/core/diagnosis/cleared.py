@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.limits import ENOUGH
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
@@ -16,9 +17,6 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.finding import Finding
-
-ENOUGH = 0.3
-"""Share of a flight that has to be left without what is clipped."""
 
 
 @dataclass(frozen=True, slots=True)

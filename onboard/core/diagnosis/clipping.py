@@ -7,16 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL, RAIL_RUN, RAIL_SAMPLES
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
-
-RAIL_SAMPLES, RAIL_RUN = 12, 4
-FEWEST_CLIPPED = 5
-"""Clipped samples between two reports that are more than a knock."""
-LEAST_RAIL = 10.3
-"""More than any accelerometer that is at rest reads, m/s^2."""
 
 
 def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:

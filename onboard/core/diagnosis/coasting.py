@@ -15,6 +15,14 @@ from itertools import pairwise
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.limits import (
+    APART_S,
+    BEFORE_S,
+    FAULT_M_S,
+    FEWEST_FIXES,
+    MEAN_S,
+    MOST_SCATTER,
+)
 from onboard.core.diagnosis.refusals import Refused
 from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import COLOUR_TIME_S, GATE_VELOCITY
@@ -24,18 +32,6 @@ from onboard.core.filter.traces import EpochTrace
 from onboard.core.filter.whitening import WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-
-MEAN_S = 1.0
-"""Fixes are compared in means over as long: white noise averages out, a fault of seconds stays."""
-FEWEST_FIXES = 5
-FAULT_M_S = 0.7
-"""No receiver's ordinary error lasts at so much; what is smaller passes for noise."""
-MOST_SCATTER = 0.5
-"""Of the size of a fault: more is a noisy receiver, or an inertia that turns with the vehicle."""
-BEFORE_S = 5.0
-"""The EKF complains some seconds after the receiver has begun to fail."""
-APART_S = 2.0
-"""Refused fixes that are closer to each other than this are one span."""
 
 
 @dataclass(frozen=True, slots=True)

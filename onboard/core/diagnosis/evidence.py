@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import MARGIN, SIGNIFICANT
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.hypotheses import Choice
+from onboard.core.diagnosis.limits import AMBIGUOUS, MARGIN, SIGNIFICANT
 from onboard.core.diagnosis.plain import plain_six
 from onboard.core.diagnosis.records import (
     Ambiguity,
@@ -41,9 +41,6 @@ from onboard.core.physics.catalogue import kind_of, kinds
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.mount_tilt import trim_in_words
 from onboard.core.physics.finding import Finding
-
-AMBIGUOUS = 10.0
-"""Confounders within this difference of BIC cannot be told apart."""
 
 
 @dataclass(frozen=True, slots=True)

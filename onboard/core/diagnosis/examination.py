@@ -12,6 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from onboard.core.diagnosis.limits import (
+    AGREE,
+    CONSISTENT,
+    HARDLY_BELIEVED,
+    LESS_BELIEVED,
+    NEIGHBOURS,
+    NOISE_ROUNDS,
+    SAMPLE_S,
+    STILL_INCONSISTENT,
+    WORTH_A_PASS,
+)
 from onboard.core.diagnosis.standing import attitude_unknowns
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine
@@ -22,23 +33,6 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import Effect
-
-SAMPLE_S = 200.0
-"""Flight on which noise levels are tried; more does not make them better known."""
-NEIGHBOURS = 4
-"""Neighbouring batches of the sample: the filter needs ten seconds to settle in each."""
-NOISE_ROUNDS = 4
-WORTH_A_PASS = (2e-3, 4e-3, 0.01, 0.05)
-"""Moves of delay, squared window, attitude delay and heading that are worth another pass."""
-
-
-CONSISTENT = 1.25
-"""Inflation of the variance up to which blocks of a flight agree."""
-LESS_BELIEVED = 3.0
-STILL_INCONSISTENT = 0.7
-HARDLY_BELIEVED = 0.1
-AGREE = 1.5
-"""Sigmas within which two answers are the same."""
 
 
 class Examination(Engine):

@@ -8,21 +8,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from onboard.core.diagnosis.coasting import FEWEST_FIXES, MOST_SCATTER, Contradiction
+from onboard.core.diagnosis.coasting import Contradiction
+from onboard.core.diagnosis.limits import (
+    BESIDE_S,
+    FAULT_S,
+    FEWEST_FIXES,
+    LONGEST_FAULT_S,
+    MOST_SCATTER,
+    NEIGHBOURS_S,
+    ONSET_FIXES,
+)
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.physics.finding import Finding, Quantity
-
-FAULT_S = 1.0
-ONSET_FIXES = 3
-LONGEST_FAULT_S = 120.0
-BESIDE_S = 2.0
-"""Spells of one fault are parted by fewer good fixes: those before the EKF complained."""
-NEIGHBOURS_S = 1.1
-"""Fixes that follow on each other: between them inertia changes by next to nothing."""
 
 
 def fault_effect(

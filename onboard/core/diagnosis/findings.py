@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import HELD_OUT_GAIN, MARGIN, Candidate
+from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
+from onboard.core.diagnosis.limits import HELD_OUT_GAIN, MARGIN, ONSET_S
 from onboard.core.diagnosis.regimes import main_axis, spans
 from onboard.core.diagnosis.standing import standing_effects, standing_kinds, without
 from onboard.core.maths.arrays import Array
@@ -17,9 +18,6 @@ from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
 from onboard.core.physics.effect import Cure, Effect, Standing
 from onboard.core.physics.finding import Confounder, Finding, Quantity
-
-ONSET_S = 0.5
-"""Sigma of a moment that is searched at half seconds, s."""
 
 
 class Findings:

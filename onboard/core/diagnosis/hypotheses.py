@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import (
+from onboard.core.diagnosis.candidates import Candidate, accepted, convincing
+from onboard.core.diagnosis.limits import (
     CONTRADICTING,
     FAIR,
     LEAST_BLOCKS,
@@ -24,9 +25,6 @@ from onboard.core.diagnosis.candidates import (
     RIVAL_SHARE,
     SECOND_ORDER,
     STILL,
-    Candidate,
-    accepted,
-    convincing,
 )
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.maths.arrays import Array

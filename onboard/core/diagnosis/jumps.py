@@ -9,20 +9,14 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.selection import OFFSETS, SETTLED_S, Fitter
+from onboard.core.diagnosis.limits import FURTHEST, REACH_S, SETTLED_S, SETTLING_S, SPACINGS
+from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
-
-REACH_S = 16.0
-"""How far from the boundary of a block a jump may have been that shows there."""
-SETTLING_S = 40.0
-"""What a jump does to the filter's state is forgotten after that long."""
-FURTHEST = 3
-SPACINGS = ((2.0, REACH_S), (0.5, 3.0))
 
 
 def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:

@@ -13,12 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import (
-    CONTRADICTING,
-    LEAST_BLOCKS,
-    RECONCILED,
-    Candidate,
-)
+from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
@@ -29,6 +24,7 @@ from onboard.core.diagnosis.hypotheses import (
     reconsider_standing,
 )
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
+from onboard.core.diagnosis.limits import CONTRADICTING, LEAST_BLOCKS, RECONCILED, SUSPECT
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
 from onboard.core.diagnosis.selection import Fitter
@@ -48,9 +44,6 @@ from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, Origin, Standing
-
-SUSPECT = 18.0
-"""Fall of chi-square by a jump at any block's start that one flight of thirty shows by chance."""
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:

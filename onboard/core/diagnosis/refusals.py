@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from onboard.core.diagnosis.limits import SAME_FIX_S
 from onboard.core.diagnosis.records import Unused
 from onboard.core.gps.distrust import Distrust, RefusedFixes
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
@@ -25,8 +26,6 @@ OPINIONS: Final = frozenset(
     }
 )
 """Reasons to refuse a receiver that has a fix and goes on reporting: the inertia can be asked."""
-SAME_FIX_S = 0.1
-"""Times in a batch are even, those of the trust window are as stamped: jitter is between them."""
 
 
 @dataclass(frozen=True, slots=True)

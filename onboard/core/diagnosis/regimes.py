@@ -16,7 +16,6 @@ from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.physics.finding import Where
 
 MOST_PLACES = 5
-REGIMES = ("turning", "accelerating", "high load factor", "climbing", "high throttle", "steady")
 
 
 def regime_of(batch: Batch) -> str:

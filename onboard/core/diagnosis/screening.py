@@ -13,9 +13,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.diagnosis.coasting import FAULT_M_S, Contradiction, contradictions
+from onboard.core.diagnosis.coasting import Contradiction, contradictions
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.faults import fault_effect
+from onboard.core.diagnosis.limits import (
+    FAR_OFF,
+    FAULT_M_S,
+    FEWEST_REFUSED,
+    MARGIN_S,
+    OFF,
+    SHORTEST_S,
+)
 from onboard.core.diagnosis.refusals import OPINIONS, refused
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine, through
@@ -26,16 +34,6 @@ from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Finding
-
-MARGIN_S = 0.4
-"""Around clipped samples: the accelerometer's low-pass and the receiver's delay."""
-SHORTEST_S = 4.0
-"""Pieces of flight between two clipped ones that are worth an alignment."""
-FEWEST_REFUSED = 3
-OFF = 8.0
-"""Times the receiver's noise, or the usual innovation: no fix of a receiver that is well."""
-FAR_OFF = 12.0
-"""Times the usual innovation: worth a closer look, even if no gate has refused it."""
 
 
 def unclipped(

@@ -11,17 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import MARGIN, Candidate, accepted
+from onboard.core.diagnosis.candidates import Candidate, accepted
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.jumps import candidate_of
+from onboard.core.diagnosis.limits import FAR_BETTER, MARGIN, SUSPICIOUS
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.empirical import products
-
-SUSPICIOUS = 3.0
-"""Inflation of the variance from which a residual is searched."""
-FAR_BETTER = 1.3
-"""Share of an effect's own evidence that a product needs to take its place."""
 
 
 def searched(

@@ -14,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.diagnosis.limits import SETTLED_S
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.solution import solve, total
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model, Unknown
+from onboard.core.physics.effects.bias_step import LARGEST
 
 OFFSETS = (3, 4, 5)
 """Columns of the offsets among the six."""
-JUMP_SIGMA = 3.0
-SETTLED_S = 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +147,7 @@ class Fitter:
         memory blurs that by some seconds, which is enough to know where to look closer.
         """
         m = self.model.size
-        unknowns = tuple(Unknown(f"jump_{a}", "m/s^2", 0.0, JUMP_SIGMA) for a in "xyz")
+        unknowns = tuple(Unknown(f"jump_{a}", "m/s^2", 0.0, LARGEST) for a in "xyz")
         model = Model([*self.model.families, _Jump(unknowns)])
         after = [*range(m), *OFFSETS]
         blocks = []
@@ -171,7 +171,7 @@ class Fitter:
         Not while an EKF that has just begun converges: its attitude jumps then.
         """
         index, offsets = list(free), list(OFFSETS)
-        information = np.concatenate([self._prior[index], np.full(3, JUMP_SIGMA**-2)])
+        information = np.concatenate([self._prior[index], np.full(3, LARGEST**-2)])
         prior = np.diag(information)
         mean = np.concatenate([self.model.prior[index], np.zeros(3)])
         at = self.absent.copy()

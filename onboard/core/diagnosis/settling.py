@@ -6,16 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.diagnosis.candidates import (
-    FAIR,
-    MARGIN,
-)
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import (
     Choice,
     reconciles,
 )
 from onboard.core.diagnosis.jumps import candidate_of
+from onboard.core.diagnosis.limits import FAIR, MARGIN
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import moved

@@ -6,14 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from onboard.core.diagnosis.limits import LEAST_SPREAD, MOST_UNSEEN
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect
-
-LEAST_SPREAD = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
-"""Changes of slow signals below which what follows them is not to be seen."""
-MOST_UNSEEN = 0.02
-"""What changes faster than its samples come averages out in an integral, but for so much."""
 
 
 def testable_of(

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.testability import MOST_UNSEEN, unseen_share
+from onboard.core.diagnosis.limits import MOST_UNSEEN
+from onboard.core.diagnosis.testability import unseen_share
 
 
 def batches(values, size=40):
