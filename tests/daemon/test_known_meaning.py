@@ -6,7 +6,7 @@ import pytest
 
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.daemon.learning import handover
-from onboard.daemon.learning.handover import Learning
+from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
@@ -41,7 +41,7 @@ async def learned(flight, directory, *, told_at):
         0.0,
         SimpleNamespace(identity=Identity(1), introduced=False, judging=False, in_flight=False),
     )
-    learning = Learning(
+    learning = Handover(
         Learner(Store(directory), CalibratorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
         there=there,

@@ -61,7 +61,7 @@ async def connecting(endpoint, air, directory, monkeypatch):
     finally:
         service.link.close()
         await task
-        service.learning.let_go()
+        service.handover.let_go()
 
 
 def lines(caplog, endpoint):

@@ -53,7 +53,7 @@ class There(Protocol):
         """Whether values may be written in flight."""
 
 
-class Learning:
+class Handover:
     """Decodes, batches, saves.
 
     Args:

@@ -64,7 +64,7 @@ class Service:
     ) -> None:
         self.configuration = configuration
         self.parts = Parts.of(configuration, clock=clock, wall_clock=wall_clock)
-        self.link, self.learning = self.parts.link, self.parts.learning
+        self.link, self.handover = self.parts.link, self.parts.handover
         self.notices = self.parts.notices
         self.server: Door | None = None
         self.stopped_by: signal.Signals | None = None
@@ -79,7 +79,7 @@ class Service:
         self._started = clock()
         self._stopping = asyncio.Event()
         self._learner_task: asyncio.Task[None] | None = None
-        self.learning.listen(self._on_learned)
+        self.handover.listen(self._on_learned)
 
     @property
     def phase(self) -> str:
@@ -157,11 +157,11 @@ class Service:
         parts.traffic.tick(now)
         self.contact.tell_of_recovery(now)
         parts.pusher.judge(parts.witness.report(condition, now))
-        self.learning.tell_of_lag(now)
-        learned = self.learning.learned
+        self.handover.tell_of_lag(now)
+        learned = self.handover.learned
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
-        known = parts.parameters.complete and self.learning.identified
+        known = parts.parameters.complete and self.handover.identified
         if learned is not None and (known or parts.pusher.busy):
             parts.pusher.consider(
                 now,
@@ -174,7 +174,7 @@ class Service:
         if self.server is not None:
             self.server.publish()
         self._outlets.publish()
-        if self.learning.keeps_up(now):
+        if self.handover.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._portrait.sentence(self._clock()))
 
     def _on_learned(self, learned: Learned) -> None:
@@ -195,7 +195,7 @@ class Service:
         self.link.close()
         if self._learner_task is not None:
             self._learner_task.cancel()
-        await self.learning.close(SAVE_S)
+        await self.handover.close(SAVE_S)
 
     async def _finish_push(self) -> None:
         try:
@@ -211,20 +211,20 @@ class Service:
         if self.server is not None:
             await self.server.close()
         self.parts.journal.close()
-        self.learning.let_go()
+        self.handover.let_go()
 
     async def _learn(self) -> None:
         await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
-        await self.learning.run()
+        await self.handover.run()
 
     # What comes in
 
     def on_message(self, now: float, message: Message) -> None:
         """Take one message of the link."""
-        if self.learning.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
+        if self.handover.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
             return
         self.parts.traffic.count(message.get_type())
-        for sample in self.learning.take(message):
+        for sample in self.handover.take(message):
             self.parts.observed.feed(sample, now)
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
@@ -244,7 +244,7 @@ class Service:
     async def reset(self, imus: tuple[int, ...]) -> str:
         """Forget what was learned, of all accelerometers: they share the window."""
         del imus
-        await self.learning.reset()
+        await self.handover.reset()
         self.parts.proposals.forget()
         self.parts.diagnoses.forget()
         self._life.counters["resets"] += 1
