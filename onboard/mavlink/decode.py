@@ -25,6 +25,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.mavlink import limits
 from onboard.mavlink.bootclock import BootClock
 from onboard.mavlink.dialect import MESSAGE_IDS, Message, mavlink
 from onboard.mavlink.vehicle import kind_of_vehicle
@@ -44,8 +45,6 @@ DETECTED = 3
 """GPS_JAMMING_STATE and GPS_SPOOFING_STATE: detected and not mitigated."""
 ON_GROUND, LANDED_UNKNOWN = 1, 0
 PARAM_VALUE = MESSAGE_IDS["PARAM_VALUE"]
-EARLY_SOURCES, EARLY_PARAMETERS = 8, 3000
-"""How much is kept for a sender whose HEARTBEAT is still to come."""
 NOTHING: Samples = ()
 
 
@@ -134,9 +133,9 @@ class Decoder:
     def _keep(self, message: Message) -> None:
         """A parameter of somebody who may turn out to be the autopilot."""
         source = message.get_srcSystem(), message.get_srcComponent()
-        if len(self._early) < EARLY_SOURCES or source in self._early:
+        if len(self._early) < limits.EARLY_SOURCES or source in self._early:
             kept = self._early.setdefault(source, {})
-            if len(kept) < EARLY_PARAMETERS or message.param_id in kept:
+            if len(kept) < limits.EARLY_PARAMETERS or message.param_id in kept:
                 kept[message.param_id] = message
 
     def _adopts(self, message: Message) -> bool:

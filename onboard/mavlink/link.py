@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
 from onboard.errors import LinkError
+from onboard.mavlink import limits
 from onboard.mavlink.autopilot import (
     Autopilot,
     AutopilotFound,
@@ -30,18 +31,11 @@ from onboard.mavlink.dialect import COMPONENT, Message, mavlink, message_ids
 from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.signing import Signing
-from onboard.mavlink.transport import DEFAULT_LINGER_S
 from onboard.outage import Over
 
 Handler: TypeAlias = Callable[[float, Message], None]
 EventHandler: TypeAlias = Callable[[float, LinkEvent], None]
 
-TICK_S = 0.1
-HEARTBEAT_INTERVAL_S = 1.0
-HEARTBEAT_TIMEOUT_S = 5.0
-"""Five heartbeats missed; ArduPilot's own measure for losing a ground station."""
-FAILOVER_S = 1.5
-"""Silence on the endpoint in use after which another one that hears the autopilot takes over."""
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 
 
@@ -74,7 +68,7 @@ class Link:
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
         rng: random.Random | None = None,
-        linger: float = DEFAULT_LINGER_S,
+        linger: float = limits.LINGER_S,
     ) -> None:
         self.autopilot: Autopilot | None = None
         self.state = AutopilotState.SEARCHING
@@ -234,7 +228,7 @@ class Link:
             source = (frame.system, frame.component)
             if source == self._source:
                 if connection is not self._active:
-                    if now - self._heard <= FAILOVER_S:
+                    if now - self._heard <= limits.FAILOVER_S:
                         self.standby += 1
                         continue
                     self._active = connection
@@ -288,18 +282,18 @@ class Link:
     async def _tick_forever(self) -> None:
         while True:
             self._tick(self._clock())
-            await asyncio.sleep(TICK_S)
+            await asyncio.sleep(limits.TICK_S)
 
     def _tick(self, now: float) -> None:
         if now >= self._next_beat:
-            self._next_beat = now + HEARTBEAT_INTERVAL_S
+            self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
             self._beat()
         for connection in self.connections:
             connection.check(now)
         if self.autopilot is None:
             return
         silence = now - self._heartbeat_at
-        if self.state is AutopilotState.PRESENT and silence > HEARTBEAT_TIMEOUT_S:
+        if self.state is AutopilotState.PRESENT and silence > limits.HEARTBEAT_TIMEOUT_S:
             self.state = AutopilotState.SILENT
             self._emit(now, AutopilotSilent(silence))
         if self.state is AutopilotState.PRESENT:

@@ -21,15 +21,14 @@ from onboard.mavlink.autopilot import (
 )
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.connection import (
-    BACKOFF_CAP_S,
-    SILENCE_S,
     TRANSITIONS,
     Backoff,
     ConnectionState,
 )
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.endpoint import Endpoint, EndpointError
-from onboard.mavlink.link import HEARTBEAT_TIMEOUT_S, Link
+from onboard.mavlink.limits import BACKOFF_CAP_S, HEARTBEAT_TIMEOUT_S, SILENCE_S
+from onboard.mavlink.link import Link
 from onboard.mavlink.streams import StreamRequest, Streams
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 from tests.mavlink.virtual_time import virtual_time
