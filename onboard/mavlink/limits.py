@@ -78,7 +78,7 @@ longer waits are for a boot that is still busy and for parameters fetched at the
 # The boot clock
 
 NEAR_WRAP_S: Final = 600.0
-"""s; a jump back by one wrap counts as a wrap only this close to it, else it is a reboot [tuned]."""
+"""s; a jump back by one wrap is a wrap only this close to it, else a reboot [tuned]."""
 UNIX_FROM_US: Final = 10**15
 """us; a ``time_usec`` above this, 31 years of uptime, is Unix time: some autopilots send that
 [data]."""
@@ -137,6 +137,6 @@ BURST_S: Final = 0.2
 FLUSH_INTERVAL_S: Final = 1.0
 """s; so much of a recording a power cut costs [tuned]."""
 PENDING_LIMIT: Final = 8 << 20
-"""bytes held for a disk that does not keep up, about ten minutes; then frames are dropped [data]."""
+"""bytes held for a disk that does not keep up, about ten minutes; more is dropped [data]."""
 CLOSE_TIMEOUT_S: Final = 3.0
 """s that the disk gets for the last bytes, inside what the service manager gives us [tuned]."""
