@@ -1,4 +1,4 @@
-"""Whether the autopilot is there: found by a first HEARTBEAT, silent without, back with the next."""
+"""Whether the autopilot is there: found by its first HEARTBEAT, silent, and back again."""
 
 from __future__ import annotations
 
