@@ -11,26 +11,19 @@ import contextlib
 import logging
 import random
 import re
-import ssl
 from collections import Counter
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import aiomqtt
 
+from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.outbox import Outbox, newer
-from onboard.daemon.mqtt.payloads import (
-    ReplyMessage,
-    calibration_message,
-    document,
-    event_message,
-    read_command,
-)
+from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
+from onboard.daemon.mqtt.tls import tls_context
 from onboard.daemon.setup.configuration import MqttSettings, read_secret
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import JournalLine, Snapshot
-from onboard.errors import ConfigurationError, OnboardError, UsageError
 from onboard.mavlink.connection import Backoff
 from onboard.outage import Outage
 
@@ -80,9 +73,9 @@ class Publisher:
         rng: random.Random | None = None,
     ) -> None:
         self.counters: Counter[str] = Counter()
+        self._commands = Commands(actions, notices, self.counters)
         self.connected = False
         self._settings = settings
-        self._actions = actions
         self._notices = notices
         self._clock = clock
         self._password = (
@@ -102,7 +95,7 @@ class Publisher:
         self._journal: tuple[JournalLine, ...] | None = None
         self._next_state = 0.0
         self._outage = Outage(STABLE_S)
-        self._refused = self._retained = False
+        self._refused = False
         self._closing = asyncio.Event()
         self._diagnosed = False
         self._task: asyncio.Task[None] | None = None
@@ -264,32 +257,10 @@ class Publisher:
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
             payload = message.payload if isinstance(message.payload, bytes) else b""
-            if message.retain:
-                # Somebody's mistake: it would be carried out anew at every connection.
-                self.counters["mqtt_commands_ignored"] += 1
-                if not self._retained:
-                    logger.warning("a retained command is ignored, and all further ones")
-                self._retained = True
-                continue
-            reply = await self._carry_out(payload)
-            self._outbox.event("command/reply", document(reply))
-            self._news.set()
-
-    async def _carry_out(self, payload: bytes) -> ReplyMessage:
-        try:
-            wanted = read_command(payload)
-        except UsageError as error:
-            self.counters["mqtt_commands_refused"] += 1
-            return ReplyMessage(command=None, error=str(error))
-        action = getattr(self._actions, wanted.command)
-        try:
-            done = await action(wanted.imus)
-        except OnboardError as error:
-            self.counters["mqtt_commands_refused"] += 1
-            return ReplyMessage(command=wanted.command, id=wanted.id, error=str(error))
-        self.counters["mqtt_commands"] += 1
-        self._notices.post("mqtt_command", f"over MQTT: {wanted.command}: {done}")
-        return ReplyMessage(command=wanted.command, id=wanted.id, done=done)
+            reply = await self._commands.take(payload, retained=message.retain)
+            if reply is not None:
+                self._outbox.event("command/reply", document(reply))
+                self._news.set()
 
     # How
 
@@ -318,45 +289,6 @@ class Publisher:
             self._notices.post(
                 "mqtt_connected", f"broker {self._where}: publishing again after {over}"
             )
-
-
-def tls_context(settings: MqttSettings) -> ssl.SSLContext | None:
-    """What [mqtt] says of TLS; None for plain text.
-
-    Raises:
-        ConfigurationError: a file that cannot be read or holds no certificate or key.
-    """
-    if not settings.tls:
-        return None
-    context = ssl.create_default_context()
-    if settings.ca_file is not None:
-        with _explained(settings.ca_file, "ca_file"):
-            # Only this authority: a broker of one's own is not vouched for by the web's.
-            context = ssl.create_default_context(cafile=str(Path(settings.ca_file).expanduser()))
-    if settings.certificate_file is not None and settings.key_file is not None:
-        with _explained(f"{settings.certificate_file}, {settings.key_file}", "certificate_file"):
-            context.load_cert_chain(
-                Path(settings.certificate_file).expanduser(),
-                Path(settings.key_file).expanduser(),
-                password=_no_passphrase,
-            )
-    return context
-
-
-def _no_passphrase() -> str:
-    """Instead of OpenSSL's question at a terminal that a service does not have."""
-    return ""
-
-
-@contextlib.contextmanager
-def _explained(files: str, key: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:  # ssl.SSLError is one
-        reason = error.strerror or str(error)
-        if isinstance(error, ssl.SSLError):
-            reason = f"no usable certificate or key ({error.reason or reason})"
-        raise ConfigurationError(f"{files} ([mqtt] {key}): {reason}") from None
 
 
 def _reason(error: Exception) -> str:
