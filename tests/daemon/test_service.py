@@ -14,9 +14,6 @@ import pytest
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import ImuSample
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.learning import handover
-from onboard.daemon.process import portrait
-from onboard.daemon.process import service as service_module
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.daemon.view.snapshot import Snapshot
@@ -436,7 +433,7 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
     document, daemon, port, monkeypatch
 ):
     release = threading.Event()
-    monkeypatch.setattr(handover, "STEP_LIMIT_S", 0.1)
+    monkeypatch.setattr("onboard.daemon.learning.limits.STEP_LIMIT_S", 0.1)
     async with daemon(document) as service, Vehicle(port):
         await until(lambda: service.handover.learned is not None)
         service.handover._learner.learn = lambda *_, **__: release.wait(30.0)
@@ -447,15 +444,15 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
         service._notifier.send = lambda **fields: sent.append(fields)
         await service.on_tick(service._clock())
         assert sent == []
-        monkeypatch.setattr(service_module, "SAVE_S", 0.1)
+        monkeypatch.setattr("onboard.daemon.process.limits.SAVE_S", 0.1)
     release.set()
 
 
 async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port, monkeypatch):
     release = threading.Event()
-    monkeypatch.setattr(handover, "BEHIND_S", 0.3)
-    monkeypatch.setattr(handover, "CAUGHT_UP_S", 0.29)
-    monkeypatch.setattr(portrait, "BEHIND_WORTH_SAYING_S", 0.29)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BEHIND_S", 0.3)
+    monkeypatch.setattr("onboard.daemon.learning.limits.CAUGHT_UP_S", 0.29)
+    monkeypatch.setattr("onboard.daemon.process.limits.BEHIND_WORTH_SAYING_S", 0.29)
 
     def said(service, kind):
         return [notice.text for notice in service.snapshot().notices if notice.kind == kind]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import aiomqtt
 
+from onboard.daemon.mqtt import limits
 from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.outbox import Outbox, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
@@ -36,15 +37,6 @@ library.setLevel(logging.CRITICAL)
 """The library's own log has a line for every attempt; what matters is told as a notice."""
 
 ONLINE, OFFLINE = b"online", b"offline"
-KEEPALIVE_S = 30
-ANSWER_S = 10.0
-"""A broker that confirms nothing for so long has hung."""
-BACKOFF_BASE_S = 1.0
-BACKOFF_CAP_S = 60.0
-STABLE_S = 10.0
-"""A connection that held this long starts the back-off from the beginning."""
-COMMANDS_WAITING = 16
-FAREWELL_S = 2.0
 _CODES = re.compile(r"^\[[^]]*\] | \(_ssl\.c:\d+\)$")
 """What is around the words of a system's or a broker's error: [Errno 111], [code:135]."""
 
@@ -85,7 +77,7 @@ class Publisher:
         )
         self._tls = tls_context(settings)
         jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
-        self._backoff = Backoff(jitter, BACKOFF_BASE_S, BACKOFF_CAP_S)
+        self._backoff = Backoff(jitter, limits.BACKOFF_BASE_S, limits.BACKOFF_CAP_S)
         self._outbox = Outbox()
         self._news = asyncio.Event()
         self._named = asyncio.Event()
@@ -94,7 +86,7 @@ class Publisher:
             self._named.set()
         self._journal: tuple[JournalLine, ...] | None = None
         self._next_state = 0.0
-        self._outage = Outage(STABLE_S)
+        self._outage = Outage(limits.STABLE_S)
         self._refused = False
         self._closing = asyncio.Event()
         self._diagnosed = False
@@ -149,7 +141,7 @@ class Publisher:
                 self.connected = False
             if self._closing.is_set():
                 return
-            if self._clock() - began >= STABLE_S:
+            if self._clock() - began >= limits.STABLE_S:
                 self._backoff.reset()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(self._backoff.next()):
@@ -169,7 +161,7 @@ class Publisher:
         task = self._task
         if task is None or task.done():
             return
-        await asyncio.wait((task,), timeout=FAREWELL_S)
+        await asyncio.wait((task,), timeout=limits.FAREWELL_S)
         if not task.done():
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -187,12 +179,12 @@ class Publisher:
             password=self._password,
             will=aiomqtt.Will(self._topic("availability"), OFFLINE, qos=1, retain=True),
             tls_context=self._tls,
-            keepalive=KEEPALIVE_S,
+            keepalive=limits.KEEPALIVE_S,
             logger=library,
-            timeout=ANSWER_S,
+            timeout=limits.ANSWER_S,
             # Commands of an hour ago are not to be carried out when the line is back.
             clean_session=True,
-            max_queued_incoming_messages=COMMANDS_WAITING,
+            max_queued_incoming_messages=limits.COMMANDS_WAITING,
         )
         async with client:
             if settings.commands:
@@ -210,7 +202,11 @@ class Publisher:
                 # Leaving in good order keeps the broker from publishing the last will.
                 with contextlib.suppress(aiomqtt.MqttError):
                     await client.publish(
-                        self._topic("availability"), OFFLINE, qos=1, retain=True, timeout=FAREWELL_S
+                        self._topic("availability"),
+                        OFFLINE,
+                        qos=1,
+                        retain=True,
+                        timeout=limits.FAREWELL_S,
                     )
 
     async def _speak(self, client: aiomqtt.Client) -> None:

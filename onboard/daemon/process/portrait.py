@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from onboard import __version__
 from onboard.daemon.outlets.outlets import Outlets
+from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Life
 from onboard.daemon.process.parts import Parts
 from onboard.daemon.view.accelerometers import imu_view
@@ -18,9 +19,6 @@ from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
 from onboard.daemon.view.state import INFO, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
 from onboard.push.policy import VehicleCondition
-
-JOURNAL_SHOWN = 50
-BEHIND_WORTH_SAYING_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class Portrait:
             imus=imus,
             push=push,
             parameters=finite_values(self.parts.parameters.values),
-            journal=journal_view(self.parts.journal.entries[-JOURNAL_SHOWN:]),
+            journal=journal_view(self.parts.journal.entries[-limits.JOURNAL_SHOWN :]),
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,
@@ -98,7 +96,7 @@ class Portrait:
         imus = ", ".join(f"IMU {view.imu} {view.state.title}" for view in views)
         trust = "trusted" if learned.trust.open else "not trusted"
         lag = self.parts.handover.behind(now)
-        late = f", {lag:.0f} s behind" if lag > BEHIND_WORTH_SAYING_S else ""
+        late = f", {lag:.0f} s behind" if lag > limits.BEHIND_WORTH_SAYING_S else ""
         return f"{self.parts.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}{late}"
 
     def _counters(self) -> dict[str, int]:

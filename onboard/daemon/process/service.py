@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from onboard.daemon.learning.learner import Learned
 from onboard.daemon.outlets.door import Door
 from onboard.daemon.outlets.outlets import Outlets
+from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Contact, Life
 from onboard.daemon.process.interrupts import stop_signals
 from onboard.daemon.process.notify import Notifier
@@ -37,11 +38,6 @@ if TYPE_CHECKING:
     from onboard.daemon.outlets.control import Page
 
 logger = logging.getLogger(__name__)
-
-TICK_S = 1.0
-SAVE_S = 5.0
-FINISH_PUSH_S = 8.0
-"""A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
 
 
 class Service:
@@ -141,14 +137,14 @@ class Service:
         self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
 
     async def _main_loop(self) -> None:
-        due = self._clock() + TICK_S
+        due = self._clock() + limits.TICK_S
         while not self._stopping.is_set():
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(max(0.0, due - self._clock())):
                     await self._stopping.wait()
             await self.on_tick(self._clock())
             # A tick that came late is not made up for: the watchdog would be told lies.
-            due = max(due + TICK_S, self._clock())
+            due = max(due + limits.TICK_S, self._clock())
 
     async def on_tick(self, now: float) -> None:
         """Judge, save, tell; the watchdog is fed last, when all that worked."""
@@ -195,11 +191,11 @@ class Service:
         self.link.close()
         if self._learner_task is not None:
             self._learner_task.cancel()
-        await self.handover.close(SAVE_S)
+        await self.handover.close(limits.SAVE_S)
 
     async def _finish_push(self) -> None:
         try:
-            async with asyncio.timeout(FINISH_PUSH_S):
+            async with asyncio.timeout(limits.FINISH_PUSH_S):
                 await self.parts.pusher.idle.wait()
         except TimeoutError:
             logger.warning("a push is left open; it is finished or undone after the next start")
