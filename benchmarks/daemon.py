@@ -207,7 +207,7 @@ async def day(hours: float) -> Day:
                 if now >= next_tick:
                     next_tick += 1.0
                     before = time.process_time()
-                    await service.learning.step()
+                    await service.handover.step()
                     if service.snapshot().counters.get("diagnoses", 0) > diagnoses:
                         diagnoses += 1
                         diagnosing += time.process_time() - before

@@ -17,9 +17,9 @@ from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message, mavlink, message_ids
 from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.limits import LINGER_S
 from onboard.mavlink.link import Link
 from onboard.mavlink.recorder import Recorder
-from onboard.mavlink.transport import DEFAULT_LINGER_S
 
 RATES = {"RAW_IMU": 200, "ATTITUDE": 50, "GPS_RAW_INT": 10, "HEARTBEAT": 1}
 LIVE_S = 10.0
@@ -109,7 +109,7 @@ def run() -> list[tuple[str, float, str]]:
         ("link: message skipped", 1e6 * min(per_message(wanted=False) for _ in range(3)), "us"),
     ]
     with tempfile.TemporaryDirectory() as folder:
-        share, _ = asyncio.run(live(LIVE_S, DEFAULT_LINGER_S, Path(folder) / "x.tlog"))
+        share, _ = asyncio.run(live(LIVE_S, LINGER_S, Path(folder) / "x.tlog"))
     out.append(("link: live at 261 messages/s, recording", 100.0 * share, "% of a core"))
     share, _ = asyncio.run(live(LIVE_S, 0.0, None))
     out.append(("link: the same, waking up for each datagram", 100.0 * share, "% of a core"))

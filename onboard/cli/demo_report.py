@@ -41,7 +41,7 @@ class Outcome:
             number: SixParameters(scale=imu.scale, offset=imu.offset)
             for number, imu in enumerate(imus, start=1)
         }
-        learned = service.learning.learned
+        learned = service.handover.learned
         return cls(
             truth=truth,
             calibrations={} if learned is None else learned.calibrations,

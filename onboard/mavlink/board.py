@@ -11,16 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
 
-ANSWER_TIMEOUT_S = (1.0, 1.0, 2.0, 4.0, 1.0, 1.0, 2.0, 4.0)
-"""How long each try waits before the next one.
-
-Half of them ask with the command of today, half with that of old firmware.  Where a link loses
-a third of all frames, question and answer both get through in 0.44 of the tries, so that all
-eight fail in one start out of a hundred; where it loses nothing the first is answered.  The
-longer waits are for a boot that is still busy and for parameters fetched at the same time.
-"""
 COMMANDS = (
     (int(mavlink.MAV_CMD_REQUEST_MESSAGE), float(MESSAGE_IDS["AUTOPILOT_VERSION"])),
     (int(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES), 1.0),
@@ -32,7 +25,7 @@ REFUSALS = (
     int(mavlink.MAV_RESULT_FAILED),
 )
 """What ArduPilot says to a command, or a message, that it does not have."""
-_TRIES_EACH = len(ANSWER_TIMEOUT_S) // len(COMMANDS)
+_TRIES_EACH = len(limits.ANSWER_TIMEOUT_S) // len(COMMANDS)
 _STAGES = {0: "dev", 64: "alpha", 128: "beta", 192: "rc"}
 """FIRMWARE_VERSION_TYPE; 255, an official release, has no name."""
 
@@ -93,12 +86,12 @@ class Board:
         """The question that is due, if one is."""
         if self._target is None or self.answered or now < self._next:
             return ()
-        if self._tries == len(ANSWER_TIMEOUT_S):
+        if self._tries == len(limits.ANSWER_TIMEOUT_S):
             self._given_up = True
             return ()
         number, parameter = COMMANDS[self._tries // _TRIES_EACH]
         confirmation = self._tries % _TRIES_EACH
-        self._next = now + ANSWER_TIMEOUT_S[self._tries]
+        self._next = now + limits.ANSWER_TIMEOUT_S[self._tries]
         self._tries += 1
         return (
             mavlink.MAVLink_command_long_message(

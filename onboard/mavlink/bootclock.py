@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
+from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
 
 STAMPED_MS: Final = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE")
@@ -24,12 +25,6 @@ _SYSTEM_TIME = MESSAGE_IDS["SYSTEM_TIME"]
 
 WRAP_S = 4294967.296
 """``time_boot_ms`` is a 32-bit count of milliseconds: it starts again after 49.7 days."""
-NEAR_WRAP_S = 600.0
-"""A jump back by one wrap counts as a wrap only this close to it; else it is a reboot."""
-UNIX_FROM_US = 10**15
-"""A ``time_usec`` above this (31 years of uptime) is unix time: some autopilots send that."""
-UNIX_STEP_S = 10.0
-"""Unix time that departs this far from boot time has been set (by GPS, say)."""
 
 
 class BootClock:
@@ -65,10 +60,10 @@ class BootClock:
     def seconds_ms(self, time_boot_ms: int) -> float:
         """Seconds since boot from a 32-bit ``time_boot_ms``; continues across the wrap."""
         t, latest = time_boot_ms * 1e-3, self.latest
-        if latest is None or latest < WRAP_S - NEAR_WRAP_S:
+        if latest is None or latest < WRAP_S - limits.NEAR_WRAP_S:
             return t
         nearest = t + round((latest - t) / WRAP_S) * WRAP_S
-        if abs(nearest - latest) < NEAR_WRAP_S:
+        if abs(nearest - latest) < limits.NEAR_WRAP_S:
             return nearest
         same_turn = t + latest // WRAP_S * WRAP_S
         return same_turn if same_turn >= latest else t
@@ -76,11 +71,11 @@ class BootClock:
     def seconds_us(self, time_usec: int) -> float:
         """Seconds since boot from a 64-bit ``time_usec`` (boot or unix time), however old."""
         t = time_usec * 1e-6
-        if time_usec < UNIX_FROM_US:
+        if time_usec < limits.UNIX_FROM_US:
             return t
         reference = self.latest or 0.0
         if self._unix_offset is None or (
-            not self._paired and abs(t - self._unix_offset - reference) > UNIX_STEP_S
+            not self._paired and abs(t - self._unix_offset - reference) > limits.UNIX_STEP_S
         ):
             # Without SYSTEM_TIME the offset is that of the moment: good to the message delay.
             self._unix_offset = t - reference
@@ -88,7 +83,7 @@ class BootClock:
 
     def _tick_us(self, time_usec: int) -> None:
         t = self.seconds_us(time_usec)
-        if time_usec < UNIX_FROM_US:
+        if time_usec < limits.UNIX_FROM_US:
             self._tick(t)
         elif self.latest is None or t > self.latest:
             # Unix time runs on through a reboot: it tells how late it is, not of reboots.
@@ -98,7 +93,7 @@ class BootClock:
         """SYSTEM_TIME: both clocks at one instant."""
         t = self.seconds_ms(time_boot_ms)
         self._tick(t)
-        if time_unix_usec > UNIX_FROM_US:
+        if time_unix_usec > limits.UNIX_FROM_US:
             self._unix_offset = time_unix_usec * 1e-6 - t
             self._paired = True
 

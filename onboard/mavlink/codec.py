@@ -11,12 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.mavlink import framing
+from onboard.mavlink import framing, limits
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.signing import Signing
-
-REORDERING = 16
-"""A sequence number at most this far behind is a late packet; further back, packets were lost."""
 
 
 class Frame(NamedTuple):
@@ -49,7 +46,7 @@ class SourceStatistics:
         gap = (sequence - self.last - 1) & 0xFF
         if gap == 0xFF:
             self.duplicated += 1
-        elif gap >= 0x100 - REORDERING:
+        elif gap >= 0x100 - limits.REORDERING:
             self.late += 1
             self.lost = max(0, self.lost - 1)
         else:

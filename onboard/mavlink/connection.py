@@ -7,18 +7,11 @@ import random
 from collections.abc import Callable
 from enum import Enum
 
+from onboard.mavlink import limits
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
-from onboard.mavlink.transport import DEFAULT_LINGER_S, Transport, open_transport
+from onboard.mavlink.transport import Transport, open_transport
 from onboard.outage import Outage, Over
-
-BACKOFF_BASE_S = 0.5
-BACKOFF_CAP_S = 15.0
-"""A USB autopilot is back some seconds after a reboot; waiting longer than this loses flight."""
-STABLE_S = 10.0
-"""A connection that held this long starts the back-off from the beginning."""
-SILENCE_S = 15.0
-"""A TCP or serial line without one byte for so long is dead, whatever the system says."""
 
 
 class ConnectionState(Enum):
@@ -45,7 +38,10 @@ class Backoff:
     """Full jitter: the n-th wait is uniform between 0 and ``min(cap, base 2^n)``."""
 
     def __init__(
-        self, rng: random.Random, base: float = BACKOFF_BASE_S, cap: float = BACKOFF_CAP_S
+        self,
+        rng: random.Random,
+        base: float = limits.BACKOFF_BASE_S,
+        cap: float = limits.BACKOFF_CAP_S,
     ) -> None:
         self._rng = rng
         self._base = base
@@ -88,7 +84,7 @@ class Connection:
         tell: Callable[[Connection, str | Over], None],
         clock: Callable[[], float],
         rng: random.Random,
-        linger: float = DEFAULT_LINGER_S,
+        linger: float = limits.LINGER_S,
     ) -> None:
         self.endpoint = endpoint
         self.codec = codec
@@ -96,7 +92,7 @@ class Connection:
         self.last_error = ""
         self.connects = 0
         self.failures = 0
-        self.outage = Outage(STABLE_S)
+        self.outage = Outage(limits.STABLE_S)
         self._dropped = 0
         self.last_received: float | None = None
         self._receive = receive
@@ -134,9 +130,9 @@ class Connection:
             self._is_stream
             and self.last_received is not None
             and self.is_up
-            and now - self.last_received > SILENCE_S
+            and now - self.last_received > limits.SILENCE_S
         ):
-            self._lost(f"nothing received for {SILENCE_S:.0f} s")
+            self._lost(f"nothing received for {limits.SILENCE_S:.0f} s")
 
     async def run(self) -> None:
         """Connect, and connect again, until cancelled.
@@ -180,7 +176,7 @@ class Connection:
             reason: str = await broken
         finally:
             self._drop_transport()
-        if self._clock() - since >= STABLE_S:
+        if self._clock() - since >= limits.STABLE_S:
             self._backoff.reset()
         return reason
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.errors import ConfigurationError, UsageError
+from onboard.mavlink import limits
 
-DEFAULT_BAUD = 57600
-"""ArduPilot's default for telemetry ports (SERIAL1_BAUD 57)."""
 BAUD_RATES: dict[int, int] = {
     int(name[1:]): getattr(termios, name)
     for name in dir(termios)
@@ -87,7 +86,7 @@ class Endpoint:
 
     @classmethod
     def _parse_serial(cls, text: str, rest: str) -> Endpoint:
-        device, baud = rest, DEFAULT_BAUD
+        device, baud = rest, limits.DEFAULT_BAUD
         head, colon, tail = rest.rpartition(":")
         if colon:
             if not (tail.isascii() and tail.isdigit()):

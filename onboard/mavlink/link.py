@@ -6,42 +6,31 @@ import asyncio
 import random
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeAlias
 
 from onboard.errors import LinkError
+from onboard.mavlink import limits
+from onboard.mavlink.audience import Audience, EventHandler, Handler
 from onboard.mavlink.autopilot import (
     Autopilot,
     AutopilotFound,
     AutopilotRebooted,
-    AutopilotReturned,
-    AutopilotSilent,
     AutopilotState,
     ConnectionChanged,
     ConnectionRestored,
     ConnectionTrouble,
-    LinkEvent,
     Participant,
 )
 from onboard.mavlink.bootclock import STAMPED, BootClock
 from onboard.mavlink.codec import Codec, Frame
 from onboard.mavlink.connection import Connection
-from onboard.mavlink.decode import is_autopilot
-from onboard.mavlink.dialect import COMPONENT, Message, mavlink, message_ids
+from onboard.mavlink.dialect import Message, mavlink
 from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.presence import Presence
 from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.routes import Routes
 from onboard.mavlink.signing import Signing
-from onboard.mavlink.transport import DEFAULT_LINGER_S
 from onboard.outage import Over
 
-Handler: TypeAlias = Callable[[float, Message], None]
-EventHandler: TypeAlias = Callable[[float, LinkEvent], None]
-
-TICK_S = 0.1
-HEARTBEAT_INTERVAL_S = 1.0
-HEARTBEAT_TIMEOUT_S = 5.0
-"""Five heartbeats missed; ArduPilot's own measure for losing a ground station."""
-FAILOVER_S = 1.5
-"""Silence on the endpoint in use after which another one that hears the autopilot takes over."""
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 
 
@@ -74,23 +63,21 @@ class Link:
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
         rng: random.Random | None = None,
-        linger: float = DEFAULT_LINGER_S,
+        linger: float = limits.LINGER_S,
     ) -> None:
-        self.autopilot: Autopilot | None = None
-        self.state = AutopilotState.SEARCHING
         self.boot_clock = BootClock()
-        self.echoed = 0
-        self.standby = 0
-        self._expected_system = system
+        self.routes = Routes(system or 1)
+        self._presence = Presence(system)
         self._recorder = recorder
         self._clock = clock
         self._wall_clock = wall_clock
-        self._wanted = frozenset((_HEARTBEAT,))
+        self._audience = Audience((_HEARTBEAT,))
         jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
+        wanted = self._audience.wanted
         self.connections = tuple(
             Connection(
                 endpoint,
-                Codec(system=system or 1, wanted=self._wanted, signing=signing, link_id=number),
+                Codec(system=system or 1, wanted=wanted, signing=signing, link_id=number),
                 receive=self._received,
                 changed=self._connection_changed,
                 tell=self._connection_told,
@@ -100,20 +87,22 @@ class Link:
             )
             for number, endpoint in enumerate(endpoints)
         )
-        self._handlers: dict[int, tuple[Handler, ...]] = {}
-        self._event_handlers: list[EventHandler] = []
         self._participants: list[Participant] = []
-        self._routes: dict[tuple[int, int], Connection] = {}
-        self._source: tuple[int, int] | None = None
-        self._own = (system or 1, COMPONENT)
-        self._active: Connection | None = None
-        self._heard = 0.0
-        self._heartbeat_at = 0.0
         self._next_beat = 0.0
         self._found = asyncio.Event()
         self._stopped: asyncio.Future[None] | None = None
         self._closed = False
         self.subscribe(self._watch_boot_clock, STAMPED)
+
+    @property
+    def autopilot(self) -> Autopilot | None:
+        """Who was found; None before its first HEARTBEAT."""
+        return self._presence.autopilot
+
+    @property
+    def state(self) -> AutopilotState:
+        """Whether it is heard now."""
+        return self._presence.state
 
     # Who gets what
 
@@ -123,15 +112,13 @@ class Link:
         Raises:
             ValueError: the dialect has no such message.
         """
-        for number in message_ids(names):
-            self._handlers[number] = (*self._handlers.get(number, ()), handler)
-            self._wanted |= {number}
+        self._audience.add(handler, names)
         for connection in self.connections:
-            connection.codec.wanted = self._wanted
+            connection.codec.wanted = self._audience.wanted
 
     def subscribe_events(self, handler: EventHandler) -> None:
         """Have ``handler(now, event)`` called for what happens to autopilot and connections."""
-        self._event_handlers.append(handler)
+        self._audience.add_for_events(handler)
 
     def attach(self, participant: Participant) -> None:
         """Drive a sans-IO protocol: feed it, poll it, send what it returns."""
@@ -190,8 +177,7 @@ class Link:
                 await self._found.wait()
         except TimeoutError:
             where = "; ".join(
-                f"{connection.endpoint} ({connection.last_error or connection.state.value})"
-                for connection in self.connections
+                f"{c.endpoint} ({c.last_error or c.state.value})" for c in self.connections
             )
             raise LinkError(f"no heartbeat from an autopilot in {timeout:g} s: {where}") from None
         if self.autopilot is None:
@@ -202,12 +188,8 @@ class Link:
 
     def send(self, message: Message) -> None:
         """Send a message under our ids: to where its target was heard, else everywhere."""
-        target = (getattr(message, "target_system", 0), getattr(message, "target_component", 0))
-        if target == self._source and self._active is not None:
-            route: Connection | None = self._active
-        else:
-            route = self._routes.get(target)
-        chosen = (route,) if route is not None and route.is_up else self.connections
+        route = self.routes.to(message)
+        chosen = self.connections if route is None else (route,)
         recorder = self._recorder
         for connection in chosen:
             if connection.is_up:
@@ -232,55 +214,34 @@ class Link:
         recorder = self._recorder
         for frame in frames:
             source = (frame.system, frame.component)
-            if source == self._source:
-                if connection is not self._active:
-                    if now - self._heard <= FAILOVER_S:
-                        self.standby += 1
-                        continue
-                    self._active = connection
-                self._heard = now
-            elif source == self._own:
-                self.echoed += 1
+            if not self.routes.accepts(source, connection, now):
                 continue
-            self._routes[source] = connection
             if recorder is not None:
                 recorder.write(wall, frame.raw)
             if frame.message is None:
                 continue
             if frame.message_id == _HEARTBEAT:
                 self._heartbeat(connection, source, frame.message, now)
-            for handler in self._handlers.get(frame.message_id, ()):
-                handler(now, frame.message)
+            self._audience.hear(now, frame.message_id, frame.message)
 
     def _heartbeat(
         self, connection: Connection, source: tuple[int, int], message: Message, now: float
     ) -> None:
-        if self._source is None:
-            if not is_autopilot(message) or self._expected_system not in (None, source[0]):
-                return
-            self._source = source
-            self._active = connection
-            self._own = (source[0], COMPONENT)
+        event = self._presence.heartbeat(source, message, now)
+        if isinstance(event, AutopilotFound):
+            self.routes.settle(source, connection, now)
             for other in self.connections:
                 other.codec.system = source[0]
-            self.autopilot = Autopilot(*source, message.type, message.autopilot)
-            self.state = AutopilotState.PRESENT
-            self._heard = self._heartbeat_at = now
             self._found.set()
-            self._emit(now, AutopilotFound(self.autopilot))
+        if event is not None:
+            self._audience.hear_of(now, event)
             self._restart_participants(now)
-        elif source == self._source:
-            self._heartbeat_at = now
-            if self.state is AutopilotState.SILENT:
-                self.state = AutopilotState.PRESENT
-                self._emit(now, AutopilotReturned())
-                self._restart_participants(now)
 
     def _watch_boot_clock(self, now: float, message: Message) -> None:
-        if (message.get_srcSystem(), message.get_srcComponent()) != self._source:
+        if (message.get_srcSystem(), message.get_srcComponent()) != self.routes.autopilot:
             return
         if self.boot_clock.observe(message):
-            self._emit(now, AutopilotRebooted(self.boot_clock.reboots))
+            self._audience.hear_of(now, AutopilotRebooted(self.boot_clock.reboots))
             self._restart_participants(now)
 
     # Time
@@ -288,55 +249,48 @@ class Link:
     async def _tick_forever(self) -> None:
         while True:
             self._tick(self._clock())
-            await asyncio.sleep(TICK_S)
+            await asyncio.sleep(limits.TICK_S)
 
     def _tick(self, now: float) -> None:
         if now >= self._next_beat:
-            self._next_beat = now + HEARTBEAT_INTERVAL_S
-            self._beat()
+            self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
+            self.send(_our_heartbeat())  # over UDP it also tells the peer where we are
         for connection in self.connections:
             connection.check(now)
-        if self.autopilot is None:
-            return
-        silence = now - self._heartbeat_at
-        if self.state is AutopilotState.PRESENT and silence > HEARTBEAT_TIMEOUT_S:
-            self.state = AutopilotState.SILENT
-            self._emit(now, AutopilotSilent(silence))
+        silent = self._presence.check(now)
+        if silent is not None:
+            self._audience.hear_of(now, silent)
         if self.state is AutopilotState.PRESENT:
             for participant in self._participants:
                 for message in participant.poll(now):
                     self.send(message)
 
-    def _beat(self) -> None:
-        """Our HEARTBEAT, on every endpoint: over UDP it also tells the peer where we are."""
-        self.send(
-            mavlink.MAVLink_heartbeat_message(
-                mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-                mavlink.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                mavlink.MAV_STATE_ACTIVE,
-                3,
-            )
-        )
-
     def _restart_participants(self, now: float) -> None:
-        if self._source is not None:
+        if self.routes.autopilot is not None:
             for participant in self._participants:
-                participant.start(*self._source, now)
+                participant.start(*self.routes.autopilot, now)
 
     def _connection_changed(self, connection: Connection, reason: str) -> None:
         if connection.is_up:
             self._next_beat = self._clock()
-        self._emit(self._clock(), ConnectionChanged(connection.endpoint, connection.state, reason))
+        self._audience.hear_of(
+            self._clock(), ConnectionChanged(connection.endpoint, connection.state, reason)
+        )
 
     def _connection_told(self, connection: Connection, news: str | Over) -> None:
         now, endpoint = self._clock(), connection.endpoint
         if isinstance(news, Over):
-            self._emit(now, ConnectionRestored(endpoint, news))
+            self._audience.hear_of(now, ConnectionRestored(endpoint, news))
         else:
-            self._emit(now, ConnectionTrouble(endpoint, news))
+            self._audience.hear_of(now, ConnectionTrouble(endpoint, news))
 
-    def _emit(self, now: float, event: LinkEvent) -> None:
-        for handler in self._event_handlers:
-            handler(now, event)
+
+def _our_heartbeat() -> Message:
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        0,
+        0,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
+    )

@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from onboard.errors import RefusedError
+from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import (
     MAV_PARAM_TYPE_REAL32,
@@ -31,11 +32,6 @@ from onboard.mavlink.parameter_messages import (
 )
 
 NAME_LENGTH = 16
-LIST_HZ = 50.0
-ANNOUNCE_HZ = 5.0
-"""PARAM_VALUE is 37 bytes on the wire: a list takes 1.9 kB/s for its second, changes 0.2."""
-BURST_S = 0.2
-"""Sending that was not possible for longer than this is not made up for."""
 
 Set = Callable[[float], None]
 
@@ -89,8 +85,8 @@ class ParameterServer:
         *,
         writable: Mapping[str, Writable],
         component: int = COMPONENT,
-        list_hz: float = LIST_HZ,
-        announce_hz: float = ANNOUNCE_HZ,
+        list_hz: float = limits.LIST_HZ,
+        announce_hz: float = limits.ANNOUNCE_HZ,
         denied: Callable[[str, str], None] | None = None,
     ) -> None:
         for name in values:
@@ -245,7 +241,7 @@ class _Pace:
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._burst = max(1.0, rate * BURST_S)
+        self._burst = max(1.0, rate * limits.BURST_S)
         self._credit = 0.0
         self._at: float | None = None
 

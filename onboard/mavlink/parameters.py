@@ -31,6 +31,7 @@ from enum import Enum, auto
 from types import MappingProxyType
 from typing import TypeAlias
 
+from onboard.mavlink import limits
 from onboard.mavlink.parameter_messages import (
     ErrorReceived,
     ParameterErrorCode,
@@ -105,17 +106,13 @@ ParameterOutput: TypeAlias = SendAction | ParameterResult
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClientSettings:
-    """Patience of the client.
+    """Patience of the client: reads at a time, tries of each, and how long each try waits (s)."""
 
-    ArduPilot queues 20 read requests and 5 replies for *all* links together: ``in_flight``
-    leaves room for a ground station that reads at the same time.
-    """
-
-    in_flight: int = 8
-    attempts: int = 5
-    first_timeout_s: float = 0.7
-    timeout_growth: float = 1.5
-    longest_timeout_s: float = 3.0
+    in_flight: int = limits.READS_IN_FLIGHT
+    attempts: int = limits.ATTEMPTS
+    first_timeout_s: float = limits.FIRST_TIMEOUT_S
+    timeout_growth: float = limits.TIMEOUT_GROWTH
+    longest_timeout_s: float = limits.LONGEST_TIMEOUT_S
 
     def timeout(self, attempt: int) -> float:
         """Seconds to wait after attempt 1, 2, ..."""

@@ -13,11 +13,8 @@ import struct
 from pathlib import Path
 
 from onboard.errors import ConfigurationError
+from onboard.mavlink import limits
 
-FLUSH_INTERVAL_S = 1.0
-PENDING_LIMIT = 8 << 20
-"""Bytes held for a disk that does not keep up (about ten minutes); then frames are dropped."""
-CLOSE_TIMEOUT_S = 3.0
 _STAMP = struct.Struct(">Q")
 _log = logging.getLogger(__name__)
 
@@ -46,7 +43,7 @@ class Recorder:
 
     def write(self, unix_time: float, frame: bytes) -> None:
         """Take one frame, received or sent at ``unix_time`` (s)."""
-        if self._failed or len(self._pending) > PENDING_LIMIT:
+        if self._failed or len(self._pending) > limits.PENDING_LIMIT:
             self.dropped += 1
             return
         self._pending += _STAMP.pack(int(unix_time * 1e6))
@@ -57,11 +54,11 @@ class Recorder:
         """Write to disk once a second until cancelled; then write the rest and close."""
         try:
             while True:
-                await asyncio.sleep(FLUSH_INTERVAL_S)
+                await asyncio.sleep(limits.FLUSH_INTERVAL_S)
                 await self._flush()
         finally:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(CLOSE_TIMEOUT_S):
+                async with asyncio.timeout(limits.CLOSE_TIMEOUT_S):
                     await self._flush()
                     self._file.close()
 

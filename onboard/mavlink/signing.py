@@ -12,10 +12,11 @@ import hashlib
 import hmac
 from collections.abc import Callable
 
+from onboard.mavlink import limits
+
 EPOCH_UNIX_S = 1420070400.0
 """1 January 2015, where signing time starts."""
 TICKS_PER_S = 100_000
-NEW_STREAM_LAG = 60 * TICKS_PER_S
 RADIO_STATUS = 109
 """Made by telemetry radios, which have no key: accepted unsigned, as the specification says."""
 
@@ -69,7 +70,7 @@ class Signing:
         last = self._streams.get(stream)
         if last is None:
             now = int((self._wall_clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-            if timestamp + NEW_STREAM_LAG < max(self._timestamp, now):
+            if timestamp + limits.NEW_STREAM_LAG_S * TICKS_PER_S < max(self._timestamp, now):
                 return False
         elif timestamp <= last:
             return False

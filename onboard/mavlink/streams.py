@@ -14,23 +14,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
 
-LADDER_MS = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000)
-"""Intervals tried, whole ms.  Few, for ArduPilot keeps ten buckets of equal interval."""
-ACK_TIMEOUT_S = 1.0
-ASKS = 4
-"""Tries of one question before the autopilot counts as mute on it."""
-RECHECK_S = 60.0
-"""When a message is found to be unsupported it is asked for once more: an acknowledgement that
-came late or twice can have been about another message."""
-MUTE_MESSAGES = 2
-"""So many mute questions, while nothing was ever answered, mean firmware without the command."""
-WINDOW_S = 4.0
-SHORTFALL = 0.5
-"""Measured below this share of what was granted: ask again."""
-AGAIN_S = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
-"""Waits before asking again; ArduPilot slows streams itself while parameters are fetched."""
 LEGACY_GROUPS: dict[str, int] = {
     "RAW_IMU": 1,
     "SCALED_IMU": 1,
@@ -116,7 +102,7 @@ class _Stream:
         self.request = request
         self.number = MESSAGE_IDS[request.name]
         wanted = request.interval_ms
-        self.ladder = (wanted, *(step for step in LADDER_MS if step > wanted))
+        self.ladder = (wanted, *(step for step in limits.LADDER_MS if step > wanted))
         self.restart(0.0)
 
     def restart(self, now: float) -> None:
@@ -160,13 +146,13 @@ class _Stream:
         """When the window of measurement is over: take the rate and judge it."""
         elapsed = now - self._since
         expected = 1e3 / (self.granted_ms or self.request.interval_ms)
-        if elapsed < max(WINDOW_S, 4.0 / expected):
+        if elapsed < max(limits.RATE_WINDOW_S, 4.0 / expected):
             return
         self.measured = self._count / elapsed
         self._begin_window(now)
         if self.granted is None or self.state is StreamState.ASKED:
             return
-        if self.measured >= SHORTFALL * expected:
+        if self.measured >= limits.RATE_SHORTFALL * expected:
             self.state, self.again, self.due = StreamState.FLOWING, 0, None
         elif self.due is None:
             self.ask_later(now, StreamState.SLOW if self.measured else StreamState.SILENT)
@@ -181,14 +167,14 @@ class _Stream:
     def give_up(self, now: float) -> None:
         """Even the slowest interval was denied: there is no such message, unless we misheard."""
         self.state = StreamState.UNSUPPORTED
-        self.due = None if self.rechecked else now + RECHECK_S
+        self.due = None if self.rechecked else now + limits.RECHECK_S
         self.rechecked = True
         self.denied = -1
 
     def ask_later(self, now: float, state: StreamState) -> None:
         """Ask again, the later the oftener it did not help."""
         self.state = state
-        self.due = now + AGAIN_S[min(self.again, len(AGAIN_S) - 1)]
+        self.due = now + limits.AGAIN_S[min(self.again, len(limits.AGAIN_S) - 1)]
         self.again += 1
 
     def _begin_window(self, now: float) -> None:
@@ -272,15 +258,15 @@ class Streams:
             return ()
         if self._current is None:
             return self._next(now) if now >= self._quiet_until else ()
-        if now - self._asked_at < ACK_TIMEOUT_S:
+        if now - self._asked_at < limits.ACK_TIMEOUT_S:
             return ()
-        if self._asks < ASKS:
+        if self._asks < limits.ASKS:
             return self._ask(self._current, now)
         self._current.ask_later(now, StreamState.WAITING)
         self._current = None
         if not self._answered:
             self._mute += 1
-            if self._mute >= MUTE_MESSAGES:
+            if self._mute >= limits.MUTE_MESSAGES:
                 self._go_legacy(now)
         return self._next(now)
 
@@ -304,7 +290,7 @@ class Streams:
         self._current = None
         if self._asks > 1:
             # The earlier tries may be answered yet: let that pass before the next question.
-            self._quiet_until = now + ACK_TIMEOUT_S
+            self._quiet_until = now + limits.ACK_TIMEOUT_S
         if result == mavlink.MAV_RESULT_UNSUPPORTED and not self._answered:
             self._go_legacy(now)
         elif result == mavlink.MAV_RESULT_ACCEPTED:
@@ -379,7 +365,7 @@ class Streams:
             return ()
         stream.settle(now, 0)
         asked = self._groups_asked.get(group)
-        if asked is not None and now - asked < ACK_TIMEOUT_S:
+        if asked is not None and now - asked < limits.ACK_TIMEOUT_S:
             return ()
         self._groups_asked[group] = now
         rate = max(

@@ -17,17 +17,10 @@ import socket
 from collections.abc import Callable
 from typing import Protocol
 
+from onboard.mavlink import limits
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
 from onboard.mavlink.serialport import open_serial
 
-DEFAULT_LINGER_S = 0.02
-CONNECT_TIMEOUT_S = 5.0
-DATAGRAMS_PER_WAKE = 128
-READ_SIZE = 65536
-WRITE_LIMIT = 65536
-"""Bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast."""
-PEER_LIMIT = 8
-PEER_SILENCE_S = 30.0
 UNUSABLE = (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES, errno.EPERM)
 
 Receive = Callable[[bytes], None]
@@ -47,7 +40,7 @@ class Transport(Protocol):
 
 
 async def open_transport(
-    endpoint: Endpoint, receive: Receive, lost: Lost, *, linger: float = DEFAULT_LINGER_S
+    endpoint: Endpoint, receive: Receive, lost: Lost, *, linger: float = limits.LINGER_S
 ) -> Transport:
     """Open an endpoint.
 
@@ -65,7 +58,7 @@ async def open_transport(
         return StreamTransport(open_serial(endpoint), receive, lost, linger)
     loop = asyncio.get_running_loop()
     kind = socket.SOCK_STREAM if endpoint.kind is EndpointKind.TCP else socket.SOCK_DGRAM
-    async with asyncio.timeout(CONNECT_TIMEOUT_S):
+    async with asyncio.timeout(limits.CONNECT_TIMEOUT_S):
         family, _, _, _, address = (
             await loop.getaddrinfo(endpoint.host or "0.0.0.0", endpoint.port, type=kind)  # noqa: S104 - the user asked for all interfaces
         )[0]
@@ -154,7 +147,7 @@ class DatagramTransport:
         self._receive = receive
         self._clock = clock
         self._peers: dict[tuple[object, ...], float] = {}
-        self._buffer = memoryview(bytearray(READ_SIZE))
+        self._buffer = memoryview(bytearray(limits.READ_SIZE))
         self._closed = False
         self._pace = Pace(sock.fileno(), self._drain, linger)
 
@@ -171,7 +164,9 @@ class DatagramTransport:
             self._send(data, None)
         else:
             now = self._clock()
-            silent = [peer for peer, heard in self._peers.items() if now - heard > PEER_SILENCE_S]
+            silent = [
+                peer for peer, heard in self._peers.items() if now - heard > limits.PEER_SILENCE_S
+            ]
             for peer in silent:
                 del self._peers[peer]
             for peer in self._peers:
@@ -197,7 +192,7 @@ class DatagramTransport:
 
     def _drain(self) -> bool:
         chunks: list[bytes] = []
-        for _ in range(DATAGRAMS_PER_WAKE):
+        for _ in range(limits.DATAGRAMS_PER_WAKE):
             try:
                 size, peer = self._socket.recvfrom_into(self._buffer)
             except BlockingIOError:
@@ -205,7 +200,9 @@ class DatagramTransport:
             except OSError:
                 continue  # an ICMP error about something we sent
             chunks.append(bytes(self._buffer[:size]))
-            if self._clock is not None and (peer in self._peers or len(self._peers) < PEER_LIMIT):
+            if self._clock is not None and (
+                peer in self._peers or len(self._peers) < limits.PEER_LIMIT
+            ):
                 self._peers[peer] = self._clock()
         if chunks:
             self._receive(b"".join(chunks))
@@ -230,7 +227,7 @@ class StreamTransport:
 
     def write(self, data: bytes) -> None:
         """Send; what the line does not take at once waits, up to a limit."""
-        if self._closed or len(self._waiting) + len(data) > WRITE_LIMIT:
+        if self._closed or len(self._waiting) + len(data) > limits.WRITE_LIMIT:
             self.dropped += 1
             return
         idle = not self._waiting
@@ -266,7 +263,7 @@ class StreamTransport:
 
     def _drain(self) -> bool:
         try:
-            data = os.read(self._descriptor, READ_SIZE)
+            data = os.read(self._descriptor, limits.READ_SIZE)
         except BlockingIOError:
             return False
         except OSError as error:

@@ -4,8 +4,6 @@ import socket
 
 import pytest
 
-from onboard.daemon.learning import handover
-from onboard.daemon.process import service as service_module
 from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
@@ -34,8 +32,8 @@ def document(tmp_path, port):
 def impatient(monkeypatch):
     """What real vehicles need seconds for takes none on loopback."""
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr(service_module, "TICK_S", 0.05)
-    monkeypatch.setattr(handover, "BATCH_S", 0.02)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 

@@ -68,7 +68,7 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
 
 def convinced(service, *calibrations, missing="", modelled=False, effects=()):
     """Have the daemon believe that it has learned these from the flight that has just ended."""
-    learner = service.learning._learner
+    learner = service.handover._learner
     learner._solve = lambda: None
     learner._answers = {c.imu: c for c in calibrations}
     verdict = "explained" if effects else "clean"

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import EkfHealth, VehicleState
-from onboard.daemon.process.condition import STALE_S, Observed
+from onboard.daemon.process.condition import Observed
+from onboard.daemon.process.limits import STALE_S
 
 
 def armed(observed, value, now):

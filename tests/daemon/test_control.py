@@ -6,8 +6,9 @@ from contextlib import asynccontextmanager
 import aiohttp
 import pytest
 
-from onboard.daemon.outlets.control import VIEWERS_MAX, ControlServer
+from onboard.daemon.outlets.control import ControlServer
 from onboard.daemon.outlets.door import Door, bound
+from onboard.daemon.outlets.limits import VIEWERS_MAX
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import ConfigurationError, RefusedError
 from tests.daemon.blank_snapshot import blank_snapshot

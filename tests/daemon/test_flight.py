@@ -48,9 +48,9 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         await service.approve((1,))
         await until(lambda: service.snapshot().push.can_roll_back == (1,), limit=400.0)
         assert service.snapshot().diagnosis["verdict"] in {"clean", "explained"}
-        await until(lambda: service.learning._busy_since is None, limit=400.0)
+        await until(lambda: service.handover._busy_since is None, limit=400.0)
 
-        imu = service.learning.learned.calibrations[1]
+        imu = service.handover.learned.calibrations[1]
         estimate = np.array(imu.scale + imu.offset)
         sigma = np.array(imu.scale_sigma + imu.offset_sigma)
         error = estimate - TRUE_SIX
@@ -67,7 +67,7 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         assert imu_view.timing["gps_delay_s"].value == pytest.approx(0.12, abs=0.03)
 
     # The same numbers come out of the recording of the very same stream.
-    live = service.learning._learner._calibrator
+    live = service.handover._learner._calibrator
     live.finish()
     (recording,) = (tmp_path / "recordings").glob("*.tlog")
     calibrator = Calibrator(live.settings)

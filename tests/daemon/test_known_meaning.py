@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.daemon.learning import handover
-from onboard.daemon.learning.handover import Learning
+from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
@@ -41,7 +40,7 @@ async def learned(flight, directory, *, told_at):
         0.0,
         SimpleNamespace(identity=Identity(1), introduced=False, judging=False, in_flight=False),
     )
-    learning = Learning(
+    learning = Handover(
         Learner(Store(directory), CalibratorSettings(), clock=lambda: now, wall_clock=lambda: now),
         Notices(lambda: now),
         there=there,
@@ -78,6 +77,6 @@ async def test_what_came_before_the_parameters_is_learned_as_they_say(flight, tm
 async def test_parameters_that_never_come_are_not_waited_for_for_ever(
     flight, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(handover, "PARAMETERS_S", 5.0)
+    monkeypatch.setattr("onboard.daemon.learning.limits.PARAMETERS_S", 5.0)
     without = await learned(flight, tmp_path, told_at=1e9)
     assert without.trusted_s > 30.0

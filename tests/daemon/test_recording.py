@@ -14,7 +14,7 @@ FRAME = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3).pack(mavlink.MAVLink
 
 
 async def record(directory, *, frames, file_bytes, keep, per_flush, monkeypatch):
-    monkeypatch.setattr("onboard.mavlink.recorder.FLUSH_INTERVAL_S", 0.001)
+    monkeypatch.setattr("onboard.mavlink.limits.FLUSH_INTERVAL_S", 0.001)
     seconds = iter(range(1, 1_000_000))
     recorder = RollingRecorder(
         directory, keep=keep, file_bytes=file_bytes, wall_clock=lambda: float(next(seconds))

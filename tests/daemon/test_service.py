@@ -14,9 +14,6 @@ import pytest
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import ImuSample
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.learning import handover
-from onboard.daemon.process import portrait
-from onboard.daemon.process import service as service_module
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.daemon.view.snapshot import Snapshot
@@ -164,9 +161,9 @@ async def test_an_approval_in_spite_of_one_diagnosis_is_none_in_spite_of_the_nex
 async def test_what_nobody_has_diagnosed_is_not_written(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         vehicle.armed = True
-        await until(lambda: service.learning.identified)
+        await until(lambda: service.handover.identified)
         convinced(service, WANTED)
-        service.learning._learner._flight = None
+        service.handover._learner._flight = None
         await until(lambda: "not_diagnosed" in held_back(service))
         vehicle.armed = False
         await until(lambda: held_back(service).keys() == {"not_diagnosed"})
@@ -359,7 +356,7 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
 async def test_a_restart_goes_on_from_the_saved_sums(document, daemon, port):
     async with Vehicle(port):
         async with daemon(document) as service:
-            await until(lambda: service.learning.learned is not None)
+            await until(lambda: service.handover.learned is not None)
         async with daemon(document) as again:
             await until(lambda: again.snapshot().counters.get("state_resumed") == 1)
 
@@ -436,33 +433,33 @@ async def test_a_learner_that_hangs_starves_the_watchdog_but_not_the_link(
     document, daemon, port, monkeypatch
 ):
     release = threading.Event()
-    monkeypatch.setattr(handover, "STEP_LIMIT_S", 0.1)
+    monkeypatch.setattr("onboard.daemon.learning.limits.STEP_LIMIT_S", 0.1)
     async with daemon(document) as service, Vehicle(port):
-        await until(lambda: service.learning.learned is not None)
-        service.learning._learner.learn = lambda *_, **__: release.wait(30.0)
-        await until(lambda: not service.learning.keeps_up(service._clock()))
+        await until(lambda: service.handover.learned is not None)
+        service.handover._learner.learn = lambda *_, **__: release.wait(30.0)
+        await until(lambda: not service.handover.keeps_up(service._clock()))
         count = service.snapshot().link.messages["RAW_IMU"].count
         await until(lambda: service.snapshot().link.messages["RAW_IMU"].count > count + 5)
         sent = []
         service._notifier.send = lambda **fields: sent.append(fields)
         await service.on_tick(service._clock())
         assert sent == []
-        monkeypatch.setattr(service_module, "SAVE_S", 0.1)
+        monkeypatch.setattr("onboard.daemon.process.limits.SAVE_S", 0.1)
     release.set()
 
 
 async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port, monkeypatch):
     release = threading.Event()
-    monkeypatch.setattr(handover, "BEHIND_S", 0.3)
-    monkeypatch.setattr(handover, "CAUGHT_UP_S", 0.29)
-    monkeypatch.setattr(portrait, "BEHIND_WORTH_SAYING_S", 0.29)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BEHIND_S", 0.3)
+    monkeypatch.setattr("onboard.daemon.learning.limits.CAUGHT_UP_S", 0.29)
+    monkeypatch.setattr("onboard.daemon.process.limits.BEHIND_WORTH_SAYING_S", 0.29)
 
     def said(service, kind):
         return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
 
     async with daemon(document) as service, Vehicle(port):
-        await until(lambda: service.learning._begun)
-        learner = service.learning._learner
+        await until(lambda: service.handover._begun)
+        learner = service.handover._learner
         learn, learned = learner.learn, []
 
         def slow(samples, **how):
@@ -486,9 +483,9 @@ async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
         await until(file.exists)
-        before = service.learning._learner._calibrator
+        before = service.handover._learner._calibrator
         await service.reset(())
-        assert service.learning._learner._calibrator is not before
+        assert service.handover._learner._calibrator is not before
         assert service.snapshot().counters["resets"] == 1
 
 
@@ -496,5 +493,5 @@ async def test_before_the_first_flight_it_says_what_to_do(document, daemon, port
     async with daemon(document) as service:
         assert service.snapshot().next_step is None, "nobody is there"
         async with Vehicle(port):
-            await until(lambda: service.learning.learned is not None)
+            await until(lambda: service.handover.learned is not None)
             assert service.snapshot().next_step.text.startswith("fly")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.daemon.process import service
+from onboard.daemon.process import limits
 
 UNIT = Path(__file__).parents[2] / "systemd" / "onboard.service"
 LIMIT = 2.0
@@ -50,5 +50,5 @@ def test_the_watchdog_and_the_timeouts_fit_the_service():
     assert settings["Type"] == "notify"
     assert settings["StateDirectory"] == "onboard"
     assert float(settings["WatchdogSec"]) > 10.0
-    assert float(settings["TimeoutStopSec"]) > service.FINISH_PUSH_S + 2.0
+    assert float(settings["TimeoutStopSec"]) > limits.FINISH_PUSH_S + 2.0
     assert settings["RestartPreventExitStatus"] == "2"

@@ -23,7 +23,7 @@ async def learned_but_not_written(service, vehicle):
 
 
 async def settled(service, number=20):
-    await until(lambda: service.learning.identified and service.parts.parameters.complete)
+    await until(lambda: service.handover.identified and service.parts.parameters.complete)
     await ticks(service, number)
 
 
@@ -182,7 +182,7 @@ async def test_what_is_written_is_what_was_approved(document, daemon, port):
         await service.approve((1,))
         moved = calibration(scale=(1.0205, 0.99, 1.01))  # half a sigma: the approval stands
         convinced(service, moved)
-        await until(lambda: service.learning.learned.calibrations[1].scale == moved.scale)
+        await until(lambda: service.handover.learned.calibrations[1].scale == moved.scale)
         vehicle.armed = False
         await until(lambda: service.snapshot().push.can_roll_back == (1,))
         assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
@@ -211,7 +211,7 @@ async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
     async with daemon(document) as service, Vehicle(port) as vehicle:
         await settled(service, 1)
         examined = []
-        learner = service.learning._learner
+        learner = service.handover._learner
         monkeypatch.setattr(type(learner._examiner), "waiting", (1,))
         monkeypatch.setattr(
             learner, "examine", lambda: examined.append(1) or learner.learn((), judging=False)
@@ -220,4 +220,4 @@ async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
         await until(lambda: service.snapshot().link.state == "silent")
         examined.clear()
         await until(lambda: examined)
-        assert not service.learning.identified
+        assert not service.handover.identified

@@ -10,8 +10,9 @@ import aiohttp
 import msgspec
 import pytest
 
-from onboard.daemon.outlets.control import BODY_MAX, VIEWERS_MAX, ControlServer
+from onboard.daemon.outlets.control import ControlServer
 from onboard.daemon.outlets.door import bound
+from onboard.daemon.outlets.limits import BODY_MAX, VIEWERS_MAX
 from onboard.daemon.view import snapshot
 from onboard.daemon.view.history import ROWS_MAX, SCHEMA, History
 from onboard.daemon.view.snapshot import Record, Snapshot

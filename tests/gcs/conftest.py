@@ -4,8 +4,6 @@ import contextlib
 
 import pytest
 
-from onboard.daemon.learning import handover
-from onboard.daemon.process import service as service_module
 from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
@@ -17,8 +15,8 @@ from tests.gcs.router import Router
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr(service_module, "TICK_S", 0.05)
-    monkeypatch.setattr(handover, "BATCH_S", 0.02)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.daemon.outlets import announcer
-from onboard.daemon.outlets.announcer import INTERVAL_S, LINES, TEXT_LENGTH, Announcer, statustext
+from onboard.daemon.outlets.announcer import LINES, TEXT_LENGTH, Announcer, statustext
+from onboard.daemon.outlets.limits import FLAPPING_S, INTERVAL_S, WAITING_MAX
 from onboard.daemon.view.snapshot import Notice
 from onboard.mavlink.codec import Codec
 
@@ -102,7 +102,7 @@ def test_a_window_that_flaps_is_not_a_stream_of_messages():
         cockpit.post("window_opened", "GPS is trusted: learning", after=0.5)
         cockpit.post("window_closed", "GPS is not trusted: hdop", after=0.5)
     cockpit.pass_time(60.0)
-    assert len(cockpit.heard) <= 1 + 360.0 / announcer.FLAPPING_S
+    assert len(cockpit.heard) <= 1 + 360.0 / FLAPPING_S
     assert cockpit.texts[-1] == "OBC: GPS is not trusted: hdop"
 
 
@@ -147,9 +147,9 @@ def test_of_too_much_the_least_severe_is_lost():
     for number in range(30):
         cockpit.post("parameter_done", f"done {number}")
     cockpit.pass_time(200.0)
-    assert len(cockpit.heard) == announcer.WAITING_MAX
+    assert len(cockpit.heard) == WAITING_MAX
     assert cockpit.heard[0][1] == ERROR
-    assert cockpit.announcer.counters["texts_dropped"] == 31 - announcer.WAITING_MAX
+    assert cockpit.announcer.counters["texts_dropped"] == 31 - WAITING_MAX
 
 
 @settings(deadline=None)

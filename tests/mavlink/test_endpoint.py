@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.errors import ConfigurationError, UsageError
-from onboard.mavlink.endpoint import DEFAULT_BAUD, Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.limits import DEFAULT_BAUD
 
 
 @pytest.mark.parametrize(

@@ -21,15 +21,14 @@ from onboard.mavlink.autopilot import (
 )
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.connection import (
-    BACKOFF_CAP_S,
-    SILENCE_S,
     TRANSITIONS,
     Backoff,
     ConnectionState,
 )
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.endpoint import Endpoint, EndpointError
-from onboard.mavlink.link import HEARTBEAT_TIMEOUT_S, Link
+from onboard.mavlink.limits import BACKOFF_CAP_S, HEARTBEAT_TIMEOUT_S, SILENCE_S
+from onboard.mavlink.link import Link
 from onboard.mavlink.streams import StreamRequest, Streams
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 from tests.mavlink.virtual_time import virtual_time
@@ -230,7 +229,7 @@ class TestTraffic:
                     transport.say(attitude(ms))
                 await asyncio.sleep(0.1)
             assert heard == list(range(10_000, 12_000, 100))
-            assert link.standby == 40
+            assert link.routes.standby == 40
             for ms in range(12_000, 16_000, 100):
                 tcp.say(attitude(ms))
                 await asyncio.sleep(0.1)
@@ -261,7 +260,7 @@ class TestTraffic:
             air.transports[0].say(heartbeat())
             air.transports[0].say(heartbeat(18, 8), Codec(system=1, component=191))
             assert len(heard) == 1
-            assert link.echoed == 1
+            assert link.routes.echoed == 1
 
     @virtual_time
     async def test_handlers_get_messages_in_order_with_their_receive_times(self, air):

@@ -11,7 +11,7 @@ import pytest
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection as connection_module
-from onboard.mavlink.connection import BACKOFF_CAP_S
+from onboard.mavlink.limits import BACKOFF_CAP_S
 from onboard.outage import SETTLE_S, Outage
 from tests.mavlink.mavlink_peer import FakeAir, heartbeat
 from tests.mavlink.virtual_time import virtual_time
@@ -61,7 +61,7 @@ async def connecting(endpoint, air, directory, monkeypatch):
     finally:
         service.link.close()
         await task
-        service.learning.let_go()
+        service.handover.let_go()
 
 
 def lines(caplog, endpoint):

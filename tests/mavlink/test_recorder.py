@@ -12,8 +12,9 @@ from onboard.mavlink import connection as connection_module
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.limits import PENDING_LIMIT
 from onboard.mavlink.link import Link
-from onboard.mavlink.recorder import PENDING_LIMIT, Recorder
+from onboard.mavlink.recorder import Recorder
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
 
 
@@ -90,7 +91,7 @@ async def test_nothing_is_written_on_the_loops_thread(tmp_path):
 
 
 async def test_cancelled_in_the_middle_of_a_write_keeps_the_order(tmp_path, monkeypatch):
-    monkeypatch.setattr("onboard.mavlink.recorder.FLUSH_INTERVAL_S", 0.001)
+    monkeypatch.setattr("onboard.mavlink.limits.FLUSH_INTERVAL_S", 0.001)
     gate = threading.Event()
     writing = threading.Event()
 

@@ -11,7 +11,8 @@ from typing import Self
 import pytest
 
 from onboard.mavlink.endpoint import Endpoint, EndpointError
-from onboard.mavlink.transport import WRITE_LIMIT, open_transport
+from onboard.mavlink.limits import WRITE_LIMIT
+from onboard.mavlink.transport import open_transport
 
 LIMIT = 20.0
 

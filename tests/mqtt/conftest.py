@@ -7,7 +7,6 @@ import time
 
 import pytest
 
-from onboard.daemon.mqtt import publisher as publisher_module
 from onboard.daemon.mqtt.publisher import Publisher
 from tests.mqtt.broker import Broker
 from tests.mqtt.published import Obedient, noticeboard, settings
@@ -15,10 +14,10 @@ from tests.mqtt.published import Obedient, noticeboard, settings
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    monkeypatch.setattr(publisher_module, "BACKOFF_BASE_S", 0.05)
-    monkeypatch.setattr(publisher_module, "BACKOFF_CAP_S", 0.2)
-    monkeypatch.setattr(publisher_module, "ANSWER_S", 3.0)
-    monkeypatch.setattr(publisher_module, "FAREWELL_S", 0.5)
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.BACKOFF_BASE_S", 0.05)
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.BACKOFF_CAP_S", 0.2)
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.ANSWER_S", 3.0)
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.FAREWELL_S", 0.5)
 
 
 @pytest.fixture

@@ -6,9 +6,7 @@ import json
 import jsonschema
 import pytest
 
-from onboard.daemon.learning import handover
 from onboard.daemon.mqtt import schema
-from onboard.daemon.process import service as service_module
 from onboard.daemon.pushing import pusher as pusher_module
 from onboard.mavlink.parameters import ClientSettings
 from onboard.push.course import TransactionSettings
@@ -22,8 +20,8 @@ TOPICS = ("state", "calibration", "event", "availability", "command/reply")
 @pytest.fixture(autouse=True)
 def hurry(monkeypatch):
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr(service_module, "TICK_S", 0.05)
-    monkeypatch.setattr(handover, "BATCH_S", 0.02)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 

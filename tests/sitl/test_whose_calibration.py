@@ -56,7 +56,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
             await daemons.until(
                 lambda: held_back(service).get(1, {}).keys() == {"disarmed_too_short"}, limit=600.0
             )
-            flights = service.learning.learned.flight
+            flights = service.handover.learned.flight
             assert set(flights.imus) == {1, 2}, "judged together"
             before = await six(sitl)
 
@@ -64,7 +64,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
             harness.simulator(kind, "copter", speedup=1.0, imus=2, board="0d0e0f") as other,
             daemons.running(document(other, tmp_path, disarmed_s=0.0)) as service,
         ):
-            await daemons.until(lambda: service.learning.identified)
+            await daemons.until(lambda: service.handover.identified)
             await daemons.until(lambda: service.snapshot().link.armed is False)
             await daemons.until(lambda: service.snapshot().uptime_s > 30.0)
             assert held_back(service) == {}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.process import service as service_module
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from sitl.builtin.autopilot import Autopilot
@@ -61,7 +60,7 @@ def six(autopilot):
 async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
     browser, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(service_module, "TICK_S", 0.1)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.1)
 
     def see(condition):
         return asyncio.to_thread(browser.until, condition)

@@ -26,6 +26,7 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.daemon.learning import limits
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.meaning import all_in_force, in_force
 from onboard.push.conditioning import CHI_SQUARE_999
@@ -34,9 +35,6 @@ from onboard.push.entries import Support
 from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)
-
-IN_FLIGHT_SHARE = 0.02
-"""Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later."""
 
 
 @dataclass(slots=True)
@@ -102,7 +100,7 @@ class Examiner:
         began = self._clock()
         if frozen.waiting:
             self._examine(frozen, frozen.waiting.pop(0))
-            self._not_before = began + (self._clock() - began) / IN_FLIGHT_SHARE
+            self._not_before = began + (self._clock() - began) / limits.IN_FLIGHT_SHARE
         if frozen.waiting:
             return None
         self._frozen = None

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import ParamSpec, Protocol, TypeVar
 
 from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.daemon.learning import limits
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learned, Learner
 from onboard.daemon.learning.worker import Worker
@@ -21,16 +22,6 @@ from onboard.outage import Outage
 P = ParamSpec("P")
 T = TypeVar("T")
 logger = logging.getLogger(__name__)
-
-BATCH_S = 0.25
-WAITING_LIMIT = 200_000
-"""Samples that wait while a flight is refined: ten minutes of the heaviest stream."""
-PARAMETERS_S = 30.0
-"""So long is waited for the parameters that say what the messages mean; what comes is kept."""
-BEHIND_S, CAUGHT_UP_S = 15.0, 2.0
-"""A diagnosis makes what comes in wait for some seconds; more is told, until it has caught up."""
-STEP_LIMIT_S = 120.0
-"""A refinement or a diagnosis takes seconds, on a slow companion a minute; longer is a hang."""
 
 
 class There(Protocol):
@@ -53,7 +44,7 @@ class There(Protocol):
         """Whether values may be written in flight."""
 
 
-class Learning:
+class Handover:
     """Decodes, batches, saves.
 
     Args:
@@ -107,8 +98,8 @@ class Learning:
         if samples and self._arrived is None:
             self._arrived = self._clock()
         self._samples += samples
-        if len(self._samples) > WAITING_LIMIT:
-            half = WAITING_LIMIT // 2
+        if len(self._samples) > limits.WAITING_LIMIT:
+            half = limits.WAITING_LIMIT // 2
             self.counters["samples_dropped"] += half
             del self._samples[:half]
         return samples
@@ -134,7 +125,7 @@ class Learning:
         self._worker = Worker("learner")
         while True:
             await self.step()
-            await asyncio.sleep(BATCH_S)
+            await asyncio.sleep(limits.BATCH_S)
 
     async def step(self) -> None:
         """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
@@ -165,7 +156,7 @@ class Learning:
         """Whether it is known who is there and what the messages mean, or is waited for in vain."""
         waited = 0.0 if self._arrived is None else now - self._arrived
         identity = self._there.identity
-        ready = self._there.introduced or waited > PARAMETERS_S or self._closing
+        ready = self._there.introduced or waited > limits.PARAMETERS_S or self._closing
         if identity is None or not ready:
             return False
         # The parameters before all else; a stable order: the latest report still comes last.
@@ -212,7 +203,7 @@ class Learning:
 
     def keeps_up(self, now: float) -> bool:
         """Whether the learner is not stuck in a batch."""
-        return self._busy_since is None or now - self._busy_since < STEP_LIMIT_S
+        return self._busy_since is None or now - self._busy_since < limits.STEP_LIMIT_S
 
     def behind(self, now: float) -> float:
         """How long ago the oldest sample came that is not learned yet, s."""
@@ -224,12 +215,12 @@ class Learning:
         lag = self.behind(now)
         if not self._begun:
             return
-        if not self._behind and lag > BEHIND_S:
+        if not self._behind and lag > limits.BEHIND_S:
             self._behind = True
             self.counters["fell_behind"] += 1
             text = f"the learner is {lag:.0f} s behind what comes in: answers come late"
             self._notices.post("learner_behind", text, warning=True)
-        elif self._behind and lag < CAUGHT_UP_S:
+        elif self._behind and lag < limits.CAUGHT_UP_S:
             self._behind = False
             self._notices.post("learner_caught_up", "the learner has caught up")
 

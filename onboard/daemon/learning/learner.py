@@ -28,6 +28,7 @@ from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.distrust import WindowClosed, WindowOpened
 from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.daemon.learning import limits
 from onboard.daemon.learning.examiner import Examiner
 from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
@@ -39,9 +40,6 @@ from onboard.daemon.learning.store import Store
 from onboard.daemon.view.snapshot import TrustView
 from onboard.daemon.view.trust import trust_view
 from onboard.errors import StateError
-
-SOLVING_SHARE = 0.005
-"""Of a core: after a solution that took 0.1 s, the next one is due 20 s later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +276,7 @@ class Learner:
             return
         self._stale = self._urgent = False
         self._answers = answers(self._calibrator)
-        self._next_solution = began + (self._clock() - began) / SOLVING_SHARE
+        self._next_solution = began + (self._clock() - began) / limits.SOLVING_SHARE
         for imu, answer in self._answers.items():
             if answer.status is Status.CALIBRATED and imu not in self._calibrated:
                 self._calibrated.add(imu)

@@ -10,10 +10,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
-T = TypeVar("T")
+from onboard.daemon.mqtt import limits
 
-EVENTS_MAX = 200
-"""Events that wait for the broker; beyond that the oldest are dropped and counted."""
+T = TypeVar("T")
 
 
 class Parcel(NamedTuple):
@@ -27,7 +26,7 @@ class Parcel(NamedTuple):
 class Outbox:
     """Keeps what is to be sent."""
 
-    def __init__(self, events_max: int = EVENTS_MAX) -> None:
+    def __init__(self, events_max: int = limits.EVENTS_MAX) -> None:
         self.dropped = 0
         self._retained: dict[str, bytes] = {}
         self._due: dict[str, None] = {}

@@ -23,14 +23,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from onboard.daemon.mqtt import limits
 from onboard.daemon.view.snapshot import ImuView, JournalLine, Record, Snapshot
 from onboard.errors import UsageError
 
 CALIBRATION_SCHEMA = "onboard.calibration/1"
 EVENT_SCHEMA = "onboard.event/1"
 REPLY_SCHEMA = "onboard.reply/1"
-COMMAND_MAX = 1024
-"""Bytes; a longer command is none of ours."""
 
 ImuNumber = Annotated[int, Meta(ge=1, le=5)]
 CommandName = Literal["approve", "reject", "rollback", "reset"]
@@ -109,8 +108,8 @@ def read_command(payload: bytes) -> CommandMessage:
     Raises:
         UsageError: not a command; says what is wrong.
     """
-    if len(payload) > COMMAND_MAX:
-        raise UsageError(f"a command has at most {COMMAND_MAX} bytes")
+    if len(payload) > limits.COMMAND_MAX:
+        raise UsageError(f"a command has at most {limits.COMMAND_MAX} bytes")
     text = payload.strip()
     if re.fullmatch(rb"[a-z]+", text):
         text = b'{"command":"' + text + b'"}'

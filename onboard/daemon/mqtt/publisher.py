@@ -11,26 +11,20 @@ import contextlib
 import logging
 import random
 import re
-import ssl
 from collections import Counter
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import aiomqtt
 
+from onboard.daemon.mqtt import limits
+from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.outbox import Outbox, newer
-from onboard.daemon.mqtt.payloads import (
-    ReplyMessage,
-    calibration_message,
-    document,
-    event_message,
-    read_command,
-)
+from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
+from onboard.daemon.mqtt.tls import tls_context
 from onboard.daemon.setup.configuration import MqttSettings, read_secret
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import JournalLine, Snapshot
-from onboard.errors import ConfigurationError, OnboardError, UsageError
 from onboard.mavlink.connection import Backoff
 from onboard.outage import Outage
 
@@ -43,15 +37,6 @@ library.setLevel(logging.CRITICAL)
 """The library's own log has a line for every attempt; what matters is told as a notice."""
 
 ONLINE, OFFLINE = b"online", b"offline"
-KEEPALIVE_S = 30
-ANSWER_S = 10.0
-"""A broker that confirms nothing for so long has hung."""
-BACKOFF_BASE_S = 1.0
-BACKOFF_CAP_S = 60.0
-STABLE_S = 10.0
-"""A connection that held this long starts the back-off from the beginning."""
-COMMANDS_WAITING = 16
-FAREWELL_S = 2.0
 _CODES = re.compile(r"^\[[^]]*\] | \(_ssl\.c:\d+\)$")
 """What is around the words of a system's or a broker's error: [Errno 111], [code:135]."""
 
@@ -80,9 +65,9 @@ class Publisher:
         rng: random.Random | None = None,
     ) -> None:
         self.counters: Counter[str] = Counter()
+        self._commands = Commands(actions, notices, self.counters)
         self.connected = False
         self._settings = settings
-        self._actions = actions
         self._notices = notices
         self._clock = clock
         self._password = (
@@ -92,7 +77,7 @@ class Publisher:
         )
         self._tls = tls_context(settings)
         jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
-        self._backoff = Backoff(jitter, BACKOFF_BASE_S, BACKOFF_CAP_S)
+        self._backoff = Backoff(jitter, limits.BACKOFF_BASE_S, limits.BACKOFF_CAP_S)
         self._outbox = Outbox()
         self._news = asyncio.Event()
         self._named = asyncio.Event()
@@ -101,8 +86,8 @@ class Publisher:
             self._named.set()
         self._journal: tuple[JournalLine, ...] | None = None
         self._next_state = 0.0
-        self._outage = Outage(STABLE_S)
-        self._refused = self._retained = False
+        self._outage = Outage(limits.STABLE_S)
+        self._refused = False
         self._closing = asyncio.Event()
         self._diagnosed = False
         self._task: asyncio.Task[None] | None = None
@@ -156,7 +141,7 @@ class Publisher:
                 self.connected = False
             if self._closing.is_set():
                 return
-            if self._clock() - began >= STABLE_S:
+            if self._clock() - began >= limits.STABLE_S:
                 self._backoff.reset()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(self._backoff.next()):
@@ -176,7 +161,7 @@ class Publisher:
         task = self._task
         if task is None or task.done():
             return
-        await asyncio.wait((task,), timeout=FAREWELL_S)
+        await asyncio.wait((task,), timeout=limits.FAREWELL_S)
         if not task.done():
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -194,12 +179,12 @@ class Publisher:
             password=self._password,
             will=aiomqtt.Will(self._topic("availability"), OFFLINE, qos=1, retain=True),
             tls_context=self._tls,
-            keepalive=KEEPALIVE_S,
+            keepalive=limits.KEEPALIVE_S,
             logger=library,
-            timeout=ANSWER_S,
+            timeout=limits.ANSWER_S,
             # Commands of an hour ago are not to be carried out when the line is back.
             clean_session=True,
-            max_queued_incoming_messages=COMMANDS_WAITING,
+            max_queued_incoming_messages=limits.COMMANDS_WAITING,
         )
         async with client:
             if settings.commands:
@@ -217,7 +202,11 @@ class Publisher:
                 # Leaving in good order keeps the broker from publishing the last will.
                 with contextlib.suppress(aiomqtt.MqttError):
                     await client.publish(
-                        self._topic("availability"), OFFLINE, qos=1, retain=True, timeout=FAREWELL_S
+                        self._topic("availability"),
+                        OFFLINE,
+                        qos=1,
+                        retain=True,
+                        timeout=limits.FAREWELL_S,
                     )
 
     async def _speak(self, client: aiomqtt.Client) -> None:
@@ -264,32 +253,10 @@ class Publisher:
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
             payload = message.payload if isinstance(message.payload, bytes) else b""
-            if message.retain:
-                # Somebody's mistake: it would be carried out anew at every connection.
-                self.counters["mqtt_commands_ignored"] += 1
-                if not self._retained:
-                    logger.warning("a retained command is ignored, and all further ones")
-                self._retained = True
-                continue
-            reply = await self._carry_out(payload)
-            self._outbox.event("command/reply", document(reply))
-            self._news.set()
-
-    async def _carry_out(self, payload: bytes) -> ReplyMessage:
-        try:
-            wanted = read_command(payload)
-        except UsageError as error:
-            self.counters["mqtt_commands_refused"] += 1
-            return ReplyMessage(command=None, error=str(error))
-        action = getattr(self._actions, wanted.command)
-        try:
-            done = await action(wanted.imus)
-        except OnboardError as error:
-            self.counters["mqtt_commands_refused"] += 1
-            return ReplyMessage(command=wanted.command, id=wanted.id, error=str(error))
-        self.counters["mqtt_commands"] += 1
-        self._notices.post("mqtt_command", f"over MQTT: {wanted.command}: {done}")
-        return ReplyMessage(command=wanted.command, id=wanted.id, done=done)
+            reply = await self._commands.take(payload, retained=message.retain)
+            if reply is not None:
+                self._outbox.event("command/reply", document(reply))
+                self._news.set()
 
     # How
 
@@ -318,45 +285,6 @@ class Publisher:
             self._notices.post(
                 "mqtt_connected", f"broker {self._where}: publishing again after {over}"
             )
-
-
-def tls_context(settings: MqttSettings) -> ssl.SSLContext | None:
-    """What [mqtt] says of TLS; None for plain text.
-
-    Raises:
-        ConfigurationError: a file that cannot be read or holds no certificate or key.
-    """
-    if not settings.tls:
-        return None
-    context = ssl.create_default_context()
-    if settings.ca_file is not None:
-        with _explained(settings.ca_file, "ca_file"):
-            # Only this authority: a broker of one's own is not vouched for by the web's.
-            context = ssl.create_default_context(cafile=str(Path(settings.ca_file).expanduser()))
-    if settings.certificate_file is not None and settings.key_file is not None:
-        with _explained(f"{settings.certificate_file}, {settings.key_file}", "certificate_file"):
-            context.load_cert_chain(
-                Path(settings.certificate_file).expanduser(),
-                Path(settings.key_file).expanduser(),
-                password=_no_passphrase,
-            )
-    return context
-
-
-def _no_passphrase() -> str:
-    """Instead of OpenSSL's question at a terminal that a service does not have."""
-    return ""
-
-
-@contextlib.contextmanager
-def _explained(files: str, key: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:  # ssl.SSLError is one
-        reason = error.strerror or str(error)
-        if isinstance(error, ssl.SSLError):
-            reason = f"no usable certificate or key ({error.reason or reason})"
-        raise ConfigurationError(f"{files} ([mqtt] {key}): {reason}") from None
 
 
 def _reason(error: Exception) -> str:

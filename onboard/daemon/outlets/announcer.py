@@ -15,18 +15,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+from onboard.daemon.outlets import limits
 from onboard.daemon.view.snapshot import Notice
 from onboard.mavlink.dialect import Message, mavlink
 
 TEXT_LENGTH = 50
 PREFIX = "OBC: "
-INTERVAL_S = 3.0
-"""Between two lines."""
-SILENCE_S = 30.0
-"""Before the same line is said again, if nothing else was said of its topic."""
-FLAPPING_S = 15.0
-"""Between two lines on whether GPS is trusted."""
-WAITING_MAX = 8
 
 ERROR = int(mavlink.MAV_SEVERITY_ERROR)
 WARNING = int(mavlink.MAV_SEVERITY_WARNING)
@@ -51,8 +45,8 @@ class Line:
 
 LINES: Final[Mapping[str, Line]] = MappingProxyType(
     {
-        "window_opened": Line(INFO, "GPS trusted, learning", "window", FLAPPING_S),
-        "window_closed": Line(NOTICE, "", "window", FLAPPING_S),
+        "window_opened": Line(INFO, "GPS trusted, learning", "window", limits.FLAPPING_S),
+        "window_closed": Line(NOTICE, "", "window", limits.FLAPPING_S),
         "calibrated": Line(NOTICE),
         "invalid": Line(WARNING),
         "imu_state": Line(NOTICE),
@@ -120,7 +114,7 @@ class Announcer:
         text = statustext((line.text or notice.text).replace("{imu}", imu).strip())
         topic = line.topic.replace("{imu}", imu) or text
         now = self._clock()
-        self._said = {t: said for t, said in self._said.items() if now - said[1] < SILENCE_S}
+        self._said = {t: said for t, said in self._said.items() if now - said[1] < limits.SILENCE_S}
         if self._waiting.pop(topic, None) is not None:
             self.counters["texts_overtaken"] += 1
         last, at = self._said.get(topic, ("", -math.inf))
@@ -128,7 +122,7 @@ class Announcer:
             self.counters["texts_repeated"] += 1
             return
         self._waiting[topic] = _Text(line.severity, text, at + line.pause)
-        if len(self._waiting) > WAITING_MAX:
+        if len(self._waiting) > limits.WAITING_MAX:
             # The least severe goes, of those the oldest.
             del self._waiting[max(self._waiting, key=self._severity)]
             self.counters["texts_dropped"] += 1
@@ -151,7 +145,7 @@ class Announcer:
             return ()
         topic = min(due, key=self._severity)
         said = self._waiting.pop(topic)
-        self._not_before = now + INTERVAL_S
+        self._not_before = now + limits.INTERVAL_S
         self._said[topic] = (said.text, now)
         self.counters["texts"] += 1
         return (mavlink.MAVLink_statustext_message(said.severity, said.text.encode("ascii")),)

@@ -35,14 +35,12 @@ import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
 from msgspec import Meta
 
+from onboard.daemon.outlets import limits
 from onboard.daemon.view.actions import Actions
 from onboard.errors import OnboardError, RefusedError
 
 logger = logging.getLogger(__name__)
 
-SEND_LIMIT_S = 10.0  # a viewer that takes longer for one snapshot is gone
-VIEWERS_MAX = 32
-BODY_MAX = 16 * 1024
 
 Page = Callable[[web.Application], None]
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -98,7 +96,7 @@ class ControlServer:
         self._runner: web.AppRunner | None = None
         self.live = Live()
         self.application = web.Application(
-            middlewares=[_errors_as_json, self._guard], client_max_size=BODY_MAX
+            middlewares=[_errors_as_json, self._guard], client_max_size=limits.BODY_MAX
         )
         self.application.router.add_get("/api/snapshot", self._snapshot)
         self.application.router.add_get("/api/live", self._live)
@@ -156,8 +154,8 @@ class ControlServer:
         )
 
     async def _live(self, request: web.Request) -> web.WebSocketResponse:
-        if self.live.viewers >= VIEWERS_MAX:
-            raise web.HTTPServiceUnavailable(text=f"{VIEWERS_MAX} viewers already")
+        if self.live.viewers >= limits.VIEWERS_MAX:
+            raise web.HTTPServiceUnavailable(text=f"{limits.VIEWERS_MAX} viewers already")
         viewer = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
         await viewer.prepare(request)
         self.live.viewers += 1
@@ -183,7 +181,7 @@ class ControlServer:
 
 
 async def _send(viewer: web.WebSocketResponse, document: bytes) -> None:
-    async with asyncio.timeout(SEND_LIMIT_S):
+    async with asyncio.timeout(limits.SEND_LIMIT_S):
         await viewer.send_str(document.decode())
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from onboard.core.physics.catalogue import bearing_of
 from onboard.core.physics.effect import Bearing
+from onboard.daemon.outlets import limits
 from onboard.daemon.outlets.announcer import Announcer
 from onboard.daemon.outlets.parameter_view import (
     POLICIES,
@@ -32,9 +33,6 @@ from onboard.push.policy import Mode
 
 if TYPE_CHECKING:
     from onboard.daemon.mqtt.publisher import Publisher
-
-REPEATED_S = 10.0
-"""A ground station gives up repeating a write well before."""
 
 
 class Operated(Protocol):
@@ -184,7 +182,7 @@ class Outlets:
         text, now = f"{name}: {sentence}", self._clock()
         last, at = self._last_denied
         self._last_denied = (text, now)
-        if text != last or now - at > REPEATED_S:
+        if text != last or now - at > limits.REPEATED_S:
             self._notices.post("parameter_denied", text, warning=True)
 
     def _tell_of_approval(self, snapshot: Snapshot) -> None:

@@ -6,10 +6,8 @@ import math
 
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import EkfHealth, Sample, VehicleState
+from onboard.daemon.process import limits
 from onboard.push.policy import VehicleCondition
-
-STALE_S = 5.0
-"""A flag not repeated for so long says nothing about now (HEARTBEAT comes every second)."""
 
 
 class Observed:
@@ -35,7 +33,7 @@ class Observed:
                 if armed is not None:
                     if armed:
                         self._disarmed_since = None
-                    elif self._disarmed_since is None or now - self._armed_at > STALE_S:
+                    elif self._disarmed_since is None or now - self._armed_at > limits.STALE_S:
                         self._disarmed_since = now
                     self._armed_at = now
                 if landed is not None:
@@ -47,11 +45,11 @@ class Observed:
 
     def condition(self, now: float) -> VehicleCondition:
         """What is known now; what is stale counts as unknown."""
-        armed = self._ground.armed if now - self._armed_at <= STALE_S else None
+        armed = self._ground.armed if now - self._armed_at <= limits.STALE_S else None
         since = self._disarmed_since
         return VehicleCondition(
             armed=armed,
             disarmed_for=now - since if armed is False and since is not None else 0.0,
-            landed=self._ground.landed if now - self._landed_at <= STALE_S else None,
-            ekf_flags=self._ekf if now - self._ekf_at <= STALE_S else None,
+            landed=self._ground.landed if now - self._landed_at <= limits.STALE_S else None,
+            ekf_flags=self._ekf if now - self._ekf_at <= limits.STALE_S else None,
         )

@@ -57,7 +57,7 @@ class Contact:
                 if self._silence.lost("no heartbeat", now):
                     post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
             case AutopilotReturned():
-                self._parts.learning.gap()
+                self._parts.handover.gap()
                 self._silence.works(now)
             case AutopilotRebooted():
                 counters["autopilot_rebooted"] += 1
@@ -91,7 +91,7 @@ class Contact:
         parts = self._parts
         who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
         parts.notices.post("autopilot_found", who)
-        parts.learning.decoder = Decoder(
+        parts.handover.decoder = Decoder(
             autopilot.system, autopilot.component, clock=parts.link.boot_clock
         )
         self._life.phase = "running"
@@ -110,4 +110,4 @@ class Contact:
     def _nothing_is_known(self) -> None:
         """Another autopilot, or another state of it, may be there when it is heard again."""
         self._parts.observed.forget()
-        self._parts.learning.gap()
+        self._parts.handover.gap()

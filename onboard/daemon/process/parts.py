@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Self
 
 from onboard.daemon.learning.diagnoses import Diagnoses
-from onboard.daemon.learning.handover import Learning
+from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.daemon.process.condition import Observed
@@ -48,7 +48,7 @@ class Parts:
     proposals: Proposals
     pusher: Pusher
     diagnoses: Diagnoses
-    learning: Learning
+    handover: Handover
 
     @classmethod
     def of(
@@ -106,7 +106,7 @@ class Parts:
             proposals=proposals,
             pusher=Pusher(ledger, proposals, witness, notices),
             diagnoses=Diagnoses(ledger.append, notices),
-            learning=Learning(
+            handover=Handover(
                 _learner(configuration, directory, clock, wall_clock),
                 notices,
                 there=situation,

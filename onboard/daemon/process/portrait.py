@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from onboard import __version__
 from onboard.daemon.outlets.outlets import Outlets
+from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Life
 from onboard.daemon.process.parts import Parts
 from onboard.daemon.view.accelerometers import imu_view
@@ -18,9 +19,6 @@ from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
 from onboard.daemon.view.state import INFO, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
 from onboard.push.policy import VehicleCondition
-
-JOURNAL_SHOWN = 50
-BEHIND_WORTH_SAYING_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class Portrait:
 
     def snapshot(self, now: float, *, uptime_s: float) -> Snapshot:
         """Everything, now."""
-        learned = self.parts.learning.learned
+        learned = self.parts.handover.learned
         condition = self.parts.observed.condition(now)
         push = self.parts.pusher.view()
         imus = self._imus(push, condition)
@@ -55,7 +53,7 @@ class Portrait:
             imus=imus,
             push=push,
             parameters=finite_values(self.parts.parameters.values),
-            journal=journal_view(self.parts.journal.entries[-JOURNAL_SHOWN:]),
+            journal=journal_view(self.parts.journal.entries[-limits.JOURNAL_SHOWN :]),
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,
@@ -64,7 +62,7 @@ class Portrait:
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
         """What is known of each accelerometer."""
-        learned = self.parts.learning.learned
+        learned = self.parts.handover.learned
         proposals = {proposal.imu: proposal for proposal in push.proposals}
         values = self.parts.parameters.values
         return tuple(
@@ -83,7 +81,7 @@ class Portrait:
 
     def _first_step(self) -> StepView | None:
         """What to do while no accelerometer has an answer; None: nothing is known of a vehicle."""
-        if self.parts.link.autopilot is None or self.parts.learning.learned is None:
+        if self.parts.link.autopilot is None or self.parts.handover.learned is None:
             return None
         return StepView(imu=None, text="fly: standing teaches nothing", severity=INFO)
 
@@ -91,29 +89,29 @@ class Portrait:
         """One line for systemctl status."""
         if self.parts.link.autopilot is None:
             return "waiting for an autopilot's heartbeat"
-        learned = self.parts.learning.learned
+        learned = self.parts.handover.learned
         if learned is None:
             return f"{self.parts.link.state.value}, nothing learned yet"
         views = self._imus(self.parts.pusher.view(), self.parts.observed.condition(now))
         imus = ", ".join(f"IMU {view.imu} {view.state.title}" for view in views)
         trust = "trusted" if learned.trust.open else "not trusted"
-        lag = self.parts.learning.behind(now)
-        late = f", {lag:.0f} s behind" if lag > BEHIND_WORTH_SAYING_S else ""
+        lag = self.parts.handover.behind(now)
+        late = f", {lag:.0f} s behind" if lag > limits.BEHIND_WORTH_SAYING_S else ""
         return f"{self.parts.link.state.value}, GPS {trust}, {imus or 'no accelerometer yet'}{late}"
 
     def _counters(self) -> dict[str, int]:
         total = Counter(self.life.counters)
         for part in (
-            self.parts.learning,
+            self.parts.handover,
             self.parts.parameters,
             self.parts.proposals,
             self.parts.pusher,
             self.outlets,
         ):
             total.update(part.counters)
-        if self.parts.learning.learned is not None:
-            total.update(self.parts.learning.learned.counters)
-        refused = self.parts.learning.decoder.refused
+        if self.parts.handover.learned is not None:
+            total.update(self.parts.handover.learned.counters)
+        refused = self.parts.handover.decoder.refused
         total.update({f"refused {name}": count for name, count in refused.items()})
         total["journal_damaged"] = self.parts.journal.damaged
         if self.parts.recorder is not None:

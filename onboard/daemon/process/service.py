@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from onboard.daemon.learning.learner import Learned
 from onboard.daemon.outlets.door import Door
 from onboard.daemon.outlets.outlets import Outlets
+from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Contact, Life
 from onboard.daemon.process.interrupts import stop_signals
 from onboard.daemon.process.notify import Notifier
@@ -37,11 +38,6 @@ if TYPE_CHECKING:
     from onboard.daemon.outlets.control import Page
 
 logger = logging.getLogger(__name__)
-
-TICK_S = 1.0
-SAVE_S = 5.0
-FINISH_PUSH_S = 8.0
-"""A transaction under way at shutdown gets so long; then it stays open, to be resumed."""
 
 
 class Service:
@@ -64,7 +60,7 @@ class Service:
     ) -> None:
         self.configuration = configuration
         self.parts = Parts.of(configuration, clock=clock, wall_clock=wall_clock)
-        self.link, self.learning = self.parts.link, self.parts.learning
+        self.link, self.handover = self.parts.link, self.parts.handover
         self.notices = self.parts.notices
         self.server: Door | None = None
         self.stopped_by: signal.Signals | None = None
@@ -79,7 +75,7 @@ class Service:
         self._started = clock()
         self._stopping = asyncio.Event()
         self._learner_task: asyncio.Task[None] | None = None
-        self.learning.listen(self._on_learned)
+        self.handover.listen(self._on_learned)
 
     @property
     def phase(self) -> str:
@@ -141,14 +137,14 @@ class Service:
         self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
 
     async def _main_loop(self) -> None:
-        due = self._clock() + TICK_S
+        due = self._clock() + limits.TICK_S
         while not self._stopping.is_set():
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(max(0.0, due - self._clock())):
                     await self._stopping.wait()
             await self.on_tick(self._clock())
             # A tick that came late is not made up for: the watchdog would be told lies.
-            due = max(due + TICK_S, self._clock())
+            due = max(due + limits.TICK_S, self._clock())
 
     async def on_tick(self, now: float) -> None:
         """Judge, save, tell; the watchdog is fed last, when all that worked."""
@@ -157,11 +153,11 @@ class Service:
         parts.traffic.tick(now)
         self.contact.tell_of_recovery(now)
         parts.pusher.judge(parts.witness.report(condition, now))
-        self.learning.tell_of_lag(now)
-        learned = self.learning.learned
+        self.handover.tell_of_lag(now)
+        learned = self.handover.learned
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
-        known = parts.parameters.complete and self.learning.identified
+        known = parts.parameters.complete and self.handover.identified
         if learned is not None and (known or parts.pusher.busy):
             parts.pusher.consider(
                 now,
@@ -174,7 +170,7 @@ class Service:
         if self.server is not None:
             self.server.publish()
         self._outlets.publish()
-        if self.learning.keeps_up(now):
+        if self.handover.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._portrait.sentence(self._clock()))
 
     def _on_learned(self, learned: Learned) -> None:
@@ -195,11 +191,11 @@ class Service:
         self.link.close()
         if self._learner_task is not None:
             self._learner_task.cancel()
-        await self.learning.close(SAVE_S)
+        await self.handover.close(limits.SAVE_S)
 
     async def _finish_push(self) -> None:
         try:
-            async with asyncio.timeout(FINISH_PUSH_S):
+            async with asyncio.timeout(limits.FINISH_PUSH_S):
                 await self.parts.pusher.idle.wait()
         except TimeoutError:
             logger.warning("a push is left open; it is finished or undone after the next start")
@@ -211,20 +207,20 @@ class Service:
         if self.server is not None:
             await self.server.close()
         self.parts.journal.close()
-        self.learning.let_go()
+        self.handover.let_go()
 
     async def _learn(self) -> None:
         await self.link.wait_autopilot(self.configuration.link.heartbeat_limit_s)
-        await self.learning.run()
+        await self.handover.run()
 
     # What comes in
 
     def on_message(self, now: float, message: Message) -> None:
         """Take one message of the link."""
-        if self.learning.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
+        if self.handover.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
             return
         self.parts.traffic.count(message.get_type())
-        for sample in self.learning.take(message):
+        for sample in self.handover.take(message):
             self.parts.observed.feed(sample, now)
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
@@ -244,7 +240,7 @@ class Service:
     async def reset(self, imus: tuple[int, ...]) -> str:
         """Forget what was learned, of all accelerometers: they share the window."""
         del imus
-        await self.learning.reset()
+        await self.handover.reset()
         self.parts.proposals.forget()
         self.parts.diagnoses.forget()
         self._life.counters["resets"] += 1

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.pushing import limits
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import (
     SendAction,
@@ -24,12 +25,6 @@ logger = logging.getLogger(__name__)
 
 IMUS = (1, 2, 3)
 """MAVLink has messages for three accelerometers."""
-REREAD_S = 30.0
-"""A change whose broadcast was lost is found this late at most."""
-RETRY_S = 10.0
-ABSENT_S = 300.0
-"""A name that was not answered may only have been unlucky: try again then."""
-OPTIONAL_ATTEMPTS = 2
 REQUIRED = tuple(
     name for imu in IMUS for name in (*parameter_names(imu).six, parameter_names(imu).device_id)
 )
@@ -122,8 +117,11 @@ class ParameterWatch:
             return ()
         messages = self._act(self._client.tick(now), now)
         if now >= self._next_read:
-            self._next_read = now + REREAD_S
-            for names, attempts in ((REQUIRED, None), (MEANING + KNOWLEDGE, OPTIONAL_ATTEMPTS)):
+            self._next_read = now + limits.REREAD_S
+            for names, attempts in (
+                (REQUIRED, None),
+                (MEANING + KNOWLEDGE, limits.OPTIONAL_ATTEMPTS),
+            ):
                 due = [name for name in names if self._absent.get(name, now) <= now]
                 messages += self._act(self._client.read(due, now, attempts), now)
         return messages
@@ -137,10 +135,10 @@ class ParameterWatch:
                 case ReadFailed(name):
                     self._answered.add(name)
                     self.counters["parameters_not_read"] += 1
-                    self._absent[name] = now + ABSENT_S
+                    self._absent[name] = now + limits.ABSENT_S
                     if name in FIRST:  # every autopilot that we write to has these: ask again soon
                         self._absent[name] = now
-                        self._next_read = min(self._next_read, now + RETRY_S)
+                        self._next_read = min(self._next_read, now + limits.RETRY_S)
                 case ValueChanged(name, previous, value) if previous is not None:
                     self.counters["parameters_changed"] += 1
                     logger.info("%s changed from %.7g to %.7g", name, previous, value)

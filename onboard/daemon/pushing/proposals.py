@@ -26,16 +26,13 @@ from onboard.core.estimate.result import Status
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
+from onboard.daemon.pushing import limits
 from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, Mode, PolicySettings, VehicleCondition, judge
 
-WAIT_AFTER_FAILURE_S = (30.0, 60.0, 120.0, 300.0)
-"""Between a transaction that did not complete and the next for that accelerometer."""
-MOVED_SIGMAS = 2.0
-"""An approval is of the values shown: it lapses when an estimate moves by more than this."""
 PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
 """Reasons that a person lifts."""
 DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
@@ -245,7 +242,9 @@ class Proposals:
         standing = self.standing(imu)
         if changed_by_other:
             standing.approved = standing.despite = None
-        wait = WAIT_AFTER_FAILURE_S[min(standing.failures, len(WAIT_AFTER_FAILURE_S) - 1)]
+        wait = limits.WAIT_AFTER_FAILURE_S[
+            min(standing.failures, len(limits.WAIT_AFTER_FAILURE_S) - 1)
+        ]
         standing.failures += 1
         standing.not_before = now + wait
 
@@ -347,7 +346,7 @@ def _lapsed(approved: PushPlan, plan: PushPlan) -> bool:
     return any(
         now.before != then.before
         or (
-            abs(now.wanted - then.wanted) > MOVED_SIGMAS * max(now.sigma, then.sigma)
+            abs(now.wanted - then.wanted) > limits.MOVED_SIGMAS * max(now.sigma, then.sigma)
             and not (then.kept and now.kept)
         )
         for then, now in zip(approved.changes, plan.changes, strict=True)

@@ -17,8 +17,8 @@ def link_view(
     """Health of the link, and who is behind it."""
     autopilot = link.autopilot
     counters: dict[str, int] = {
-        "standby": link.standby,
-        "echoed": link.echoed,
+        "standby": link.routes.standby,
+        "echoed": link.routes.echoed,
         "reboots": link.boot_clock.reboots,
     }
     for connection in link.connections:

@@ -1,0 +1,33 @@
+"""Every number of this room that decides something: its unit, and where it comes from.
+
+Provenance in brackets: *data* (rates of what comes in), *cost* (what a companion has to spare), or
+*tuned*.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Between the loop and the learner's thread
+
+BATCH_S: Final = 0.25
+"""s between two batches: a thread is woken four times a second, not for each message [cost]."""
+WAITING_LIMIT: Final = 200_000
+"""Samples that wait while a flight is refined: ten minutes of the heaviest stream [data]."""
+PARAMETERS_S: Final = 30.0
+"""s; so long is waited for the parameters that say what the messages mean, while what comes is kept
+[tuned: they take a few seconds to read]."""
+BEHIND_S: Final = 15.0
+"""s; a diagnosis makes what comes in wait for some seconds, more than this is told [tuned]."""
+CAUGHT_UP_S: Final = 2.0
+"""s; closer than this the learner has caught up again [tuned]."""
+STEP_LIMIT_S: Final = 120.0
+"""s; a refinement or a diagnosis takes seconds, on a slow companion a minute, longer is a hang
+[cost]."""
+
+# How often is computed
+
+SOLVING_SHARE: Final = 0.005
+"""Of a core: after a solution that took 0.1 s, the next one is due 20 s later [cost]."""
+IN_FLIGHT_SHARE: Final = 0.02
+"""Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later [cost]."""

@@ -1,0 +1,32 @@
+"""Every number of this room that decides something: its unit, and where it comes from.
+
+Provenance in brackets: *service* (systemd/onboard.service), *cost* (memory), or *tuned*.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# The connection
+
+KEEPALIVE_S: Final = 30
+"""s; the broker takes us for gone after one and a half times as long [tuned]."""
+ANSWER_S: Final = 10.0
+"""s; a broker that confirms nothing for so long has hung [tuned]."""
+BACKOFF_BASE_S: Final = 1.0
+"""s; ceiling of the first wait before the next try [tuned]."""
+BACKOFF_CAP_S: Final = 60.0
+"""s; ceiling of every wait: nothing hangs on a broker, and many vehicles may share it [tuned]."""
+STABLE_S: Final = 10.0
+"""s; a connection that held this long starts the back-off from the beginning [tuned]."""
+FAREWELL_S: Final = 2.0
+"""s for what waits and for the last word at shutdown [service: inside TimeoutStopSec]."""
+
+# What waits
+
+EVENTS_MAX: Final = 200
+"""Events that wait for the broker; beyond that the oldest are dropped and counted [cost]."""
+COMMANDS_WAITING: Final = 16
+"""Commands that wait to be carried out [cost: people do not send more at a time]."""
+COMMAND_MAX: Final = 1024
+"""bytes; a longer command is none of ours [cost]."""

@@ -1,0 +1,23 @@
+"""Every number of this room that decides something: its unit, and where it comes from.
+
+Provenance in brackets: *service* (systemd/onboard.service), *data* (rates of what comes in), or
+*tuned*.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+TICK_S: Final = 1.0
+"""s between two rounds of judging, saving and telling [service: a thirtieth of WatchdogSec]."""
+FINISH_PUSH_S: Final = 8.0
+"""s that a transaction under way gets at shutdown; then it stays open, to be resumed [service:
+inside TimeoutStopSec, with SAVE_S]."""
+SAVE_S: Final = 5.0
+"""s that the learner gets at shutdown for what has come and its last save [service: as before]."""
+STALE_S: Final = 5.0
+"""s; a flag not repeated for so long says nothing about now [data: five HEARTBEATs]."""
+JOURNAL_SHOWN: Final = 50
+"""Entries of the journal in a snapshot, the latest ones [tuned]."""
+BEHIND_WORTH_SAYING_S: Final = 5.0
+"""s that the learner may lie behind before the line of status says so [tuned]."""

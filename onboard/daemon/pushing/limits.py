@@ -1,0 +1,29 @@
+"""Every number of this room that decides something: its unit, and where it comes from.
+
+What a push itself must keep to is in :mod:`onboard.push.limits`.  Provenance in brackets: *cost*
+(of messages on a shared line), *probability* (of a false alarm), or *tuned*.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Reading the autopilot's parameters
+
+REREAD_S: Final = 30.0
+"""s; a change whose broadcast was lost is found this late at most [cost: 54 reads each time]."""
+RETRY_S: Final = 10.0
+"""s before a parameter that every autopilot has is read again, if it was not answered [tuned]."""
+ABSENT_S: Final = 300.0
+"""s; a name that was not answered may only have been unlucky, it is tried again then [cost]."""
+OPTIONAL_ATTEMPTS: Final = 2
+"""Tries of a name that not every firmware has: silence is its usual answer [cost]."""
+
+# Proposals
+
+WAIT_AFTER_FAILURE_S: Final = (30.0, 60.0, 120.0, 300.0)
+"""s between a transaction that did not complete and the next for that accelerometer, after one
+failure, two, and so on [tuned]."""
+MOVED_SIGMAS: Final = 2.0
+"""An approval is of the values shown: it lapses when an estimate moves by more than so many of its
+standard deviations [probability: 5 %]."""

@@ -1,0 +1,142 @@
+"""Every number that decides something on the link: its unit, and where it comes from.
+
+Numbers of the protocol itself (lengths, identities, epochs) stand where they are used.
+
+Provenance in brackets: *protocol* (MAVLink's specification), *ArduPilot* (how it behaves), *data*
+(rates and sizes of what travels), *cost* (more buys nothing), or *tuned*.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Bytes: transports, codec, endpoints
+
+LINGER_S: Final = 0.02
+"""s that a descriptor is left alone after a read: 50 wake-ups per second, and inertial samples come
+every 20 ms [data]."""
+CONNECT_TIMEOUT_S: Final = 5.0
+"""s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
+READ_SIZE: Final = 65536
+"""bytes; no datagram is longer [protocol: UDP]."""
+DATAGRAMS_PER_WAKE: Final = 128
+"""So many are read before the loop has its turn: above all that comes within a linger [data]."""
+WRITE_LIMIT: Final = 65536
+"""bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast: 11 s of a line
+of 57600 baud [tuned]."""
+PEER_LIMIT: Final = 8
+"""UDP peers that are answered: a router, a few ground stations; bounds what we send [tuned]."""
+PEER_SILENCE_S: Final = 30.0
+"""s; a UDP peer that sent nothing for so long has gone: 30 HEARTBEATs [tuned]."""
+DEFAULT_BAUD: Final = 57600
+"""baud of a serial endpoint that names none [ArduPilot: SERIAL1_BAUD 57]."""
+REORDERING: Final = 16
+"""Packets; a sequence number at most this far behind is a late one, further back some were lost
+[tuned: the number has 8 bits]."""
+NEW_STREAM_LAG_S: Final = 60
+"""s that the first signature of a stream may lie behind ours [protocol]."""
+
+# Connections
+
+BACKOFF_BASE_S: Final = 0.5
+"""s; ceiling of the first wait before the next try [tuned]."""
+BACKOFF_CAP_S: Final = 15.0
+"""s; a USB autopilot is back some seconds after a reboot, waiting longer loses flight [data]."""
+STABLE_S: Final = 10.0
+"""s; a connection that held this long starts the back-off from the beginning [tuned]."""
+SILENCE_S: Final = 15.0
+"""s; a TCP or serial line without one byte for so long is dead, whatever the system says: 15
+HEARTBEATs [data]."""
+
+# The autopilot
+
+TICK_S: Final = 0.1
+"""s between two polls of the participants: below every wait that one of them has [cost]."""
+HEARTBEAT_INTERVAL_S: Final = 1.0
+"""s between two of our own [protocol]."""
+HEARTBEAT_TIMEOUT_S: Final = 5.0
+"""s; five HEARTBEATs missed [ArduPilot: its own measure for losing a ground station]."""
+FAILOVER_S: Final = 1.5
+"""s of silence on the endpoint in use after which another one that hears the autopilot takes over:
+one HEARTBEAT missed [data]."""
+EARLY_SOURCES: Final = 8
+"""Senders whose parameters are kept until one of them turns out to be the autopilot [tuned]."""
+EARLY_PARAMETERS: Final = 3000
+"""Parameters kept of each: more than any firmware has [tuned]."""
+
+# Which board answers
+
+ANSWER_TIMEOUT_S: Final = (1.0, 1.0, 2.0, 4.0, 1.0, 1.0, 2.0, 4.0)
+"""s that each try waits before the next one.
+
+Half of them ask with the command of today, half with that of old firmware.  Where a link loses
+a third of all frames, question and answer both get through in 0.44 of the tries, so that all
+eight fail in one start out of a hundred; where it loses nothing the first is answered [data].  The
+longer waits are for a boot that is still busy and for parameters fetched at the same time [tuned].
+"""
+
+# The boot clock
+
+NEAR_WRAP_S: Final = 600.0
+"""s; a jump back by one wrap is a wrap only this close to it, else a reboot [tuned]."""
+UNIX_FROM_US: Final = 10**15
+"""us; a ``time_usec`` above this, 31 years of uptime, is Unix time: some autopilots send that
+[data]."""
+UNIX_STEP_S: Final = 10.0
+"""s; Unix time that departs this far from boot time has been set (by GPS, say): a crystal drifts by
+a few seconds a day [data]."""
+
+# Message rates
+
+LADDER_MS: Final = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 100, 200, 500, 1000)
+"""ms; intervals that are tried, whole ones and few [ArduPilot: ten buckets of equal interval]."""
+ACK_TIMEOUT_S: Final = 1.0
+"""s before a question is asked again [tuned]."""
+ASKS: Final = 4
+"""Tries of one question before the autopilot counts as mute on it: where a third of all frames is
+lost, they all fail in one case of ten [data]."""
+RECHECK_S: Final = 60.0
+"""s; a message found to be unsupported is asked for once more: an acknowledgement that came late or
+twice can have been about another message [tuned]."""
+MUTE_MESSAGES: Final = 2
+"""So many mute questions, while nothing was ever answered, mean firmware without the command
+[tuned]."""
+RATE_WINDOW_S: Final = 4.0
+"""s over which a rate is measured: four messages of the slowest [data]."""
+RATE_SHORTFALL: Final = 0.5
+"""Share of what was granted; below it the rate is asked for again [tuned]."""
+AGAIN_S: Final = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
+"""s before asking again [ArduPilot: slows streams itself while parameters are fetched]."""
+
+# Parameters of the autopilot
+
+READS_IN_FLIGHT: Final = 8
+"""Reads that wait for an answer at a time: leaves room for a ground station that reads, too
+[ArduPilot: queues 20 requests and 5 replies for *all* links together]."""
+ATTEMPTS: Final = 5
+"""Tries of one read or write: where a third of all frames is lost, they all fail in one case of
+eighteen [data]."""
+FIRST_TIMEOUT_S: Final = 0.7
+"""s before the second try [tuned]."""
+TIMEOUT_GROWTH: Final = 1.5
+"""Ratio of one wait to that before it [tuned]."""
+LONGEST_TIMEOUT_S: Final = 3.0
+"""s; no wait between two tries is longer [tuned]."""
+
+# Our own parameters
+
+LIST_HZ: Final = 50.0
+"""1/s; PARAM_VALUE is 37 bytes on the wire, so that a list takes 1.9 kB/s for its second [data]."""
+ANNOUNCE_HZ: Final = 5.0
+"""1/s; changes take 0.2 kB/s [data]."""
+BURST_S: Final = 0.2
+"""s; sending that was not possible for longer than this is not made up for [tuned]."""
+
+# The recording
+
+FLUSH_INTERVAL_S: Final = 1.0
+"""s; so much of a recording a power cut costs [tuned]."""
+PENDING_LIMIT: Final = 8 << 20
+"""bytes held for a disk that does not keep up, about ten minutes; more is dropped [data]."""
+CLOSE_TIMEOUT_S: Final = 3.0
+"""s that the disk gets for the last bytes, inside what the service manager gives us [tuned]."""
