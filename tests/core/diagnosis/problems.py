@@ -81,6 +81,6 @@ def least_squares(problem, free, at, rows=None):
     x = np.linalg.lstsq(A, c, rcond=None)[0]
     theta = held.copy()
     theta[index] = x
-    Q, R = np.linalg.qr(A)
+    R = np.linalg.qr(A)[1]
     inverse = np.linalg.inv(R)
     return theta, float(np.sum((c - A @ x) ** 2)), inverse @ inverse.T
