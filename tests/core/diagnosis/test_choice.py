@@ -243,21 +243,20 @@ def test_an_axis_that_stays_at_nothing_pays_for_chance_alone():
     )
 
 
-def test_twins_confound_each_other_and_strangers_do_not():
+def test_twins_confound_each_other_and_what_acts_beside_does_not():
     rng = np.random.default_rng(21)
-    problem = made(rng, "a", size=1.0)
+    problem = made(rng, "a", "f", size=1.0)
     h = problem.h.copy()
-    a, d, f = (problem.columns(n)[0] for n in "adf")
+    a, d = (problem.columns(n)[0] for n in "ad")
     h[..., d] = h[..., a] + 0.2 * rng.normal(size=h.shape[:2])
     twins = Problem(problem.model, h, problem.y)
     target, *others = candidates(twins)
-    found = confounders_of(twins.fitter(), range(6), target, others)
-    (only,) = found
+    # f has as much evidence, but it is not the same evidence.
+    (only,) = confounders_of(twins.fitter(), range(6), target, others)
     assert only.name == "d"
     at = np.zeros(twins.model.size)
     chi2 = [least_squares(twins, [*range(6), i], at)[1] for i in (a, d)]
     assert only.delta_bic == pytest.approx(chi2[1] - chi2[0], rel=1e-6)
-    assert least_squares(twins, [*range(6), f], at)[1] > chi2[1]
 
 
 def test_contradicting_blocks_are_reconciled_by_what_drives_them_apart():
