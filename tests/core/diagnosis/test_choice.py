@@ -1,0 +1,289 @@
+"""Which effects are taken, against all subsets of them, each fitted on the rows themselves."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from onboard.core.diagnosis.hypotheses import (
+    CHANCE,
+    MARGIN,
+    MOST_EFFECTS,
+    SIGNIFICANT,
+    Candidate,
+    Choice,
+    accepted,
+    choose,
+    confounders_of,
+    reconciles,
+)
+from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
+
+WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}
+"""Candidates and their unknowns."""
+SIX = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.05])
+DRAWS = 120
+
+
+def families():
+    return [Columns(name, width) for name, width in WIDTHS.items()]
+
+
+def made(rng, *present, size=0.6, noise=1.0, blocks=10, rows=60):
+    """A flight in which these effects act, each unknown by ``size`` or its negative."""
+    theta = np.concatenate([SIX, np.zeros(sum(WIDTHS.values()))])
+    at = 6
+    for name, width in WIDTHS.items():
+        if name in present:
+            theta[at : at + width] = size * rng.choice([-1.0, 1.0], width)
+        at += width
+    return drawn(rng, families(), theta, blocks=blocks, rows=rows, noise=noise)
+
+
+def candidates(problem, names=WIDTHS):
+    return [
+        Candidate(n, problem.columns(n), (5.0,) * len(problem.columns(n)), spent=0) for n in names
+    ]
+
+
+def chosen(problem, names=WIDTHS, inflation=1.0):
+    choice = choose(problem.fitter(inflation), list(range(6)), candidates(problem, names))
+    return {c.effect for c in choice.chosen}
+
+
+def best_subset(problem, names=WIDTHS):
+    """Of all subsets the one with the best BIC in which every effect pays by the margin."""
+    at, charge = np.zeros(problem.model.size), np.log(problem.y.size)
+    bic = {}
+    for k in range(len(names) + 1):
+        for subset in itertools.combinations(names, k):
+            free = [*range(6), *(i for n in subset for i in problem.columns(n))]
+            bic[frozenset(subset)] = least_squares(problem, free, at)[1] + charge * (len(free) - 6)
+    admissible = [s for s in bic if all(bic[s - {one}] - bic[s] >= MARGIN for one in s)]
+    return set(min(admissible, key=lambda s: bic[s]))
+
+
+def tail(degrees, x):
+    """Probability that chi-square of 1, 2 or 3 degrees of freedom is more than ``x``."""
+    match degrees:
+        case 1:
+            return math.erfc(math.sqrt(x / 2.0))
+        case 2:
+            return math.exp(-x / 2.0)
+        case 3:
+            return math.erfc(math.sqrt(x / 2.0)) + math.sqrt(2.0 * x / math.pi) * math.exp(-x / 2.0)
+    raise AssertionError(degrees)
+
+
+def test_these_tails_are_those_of_squares_of_normals():
+    squares = np.random.default_rng(0).normal(size=(3, 200_000)) ** 2
+    for degrees in (1, 2, 3):
+        found = np.mean(squares[:degrees].sum(axis=0) > 6.0)
+        assert tail(degrees, 6.0) == pytest.approx(found, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "present", [(), ("a",), ("b",), ("c", "f"), ("a", "e"), ("b", "d", "f"), ("a", "b", "c", "d")]
+)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_best_of_all_subsets_is_found_and_is_the_truth(present, seed):
+    problem = made(np.random.default_rng([seed, len(present)]), *present)
+    assert chosen(problem) == best_subset(problem) == set(present)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_effect_that_resembles_what_acts_does_not_stand_in_for_it(seed):
+    rng = np.random.default_rng(seed)
+    problem = made(rng, "a", "d", size=1.0)
+    h = problem.h.copy()
+    # f looks like both at once, and does better than either as long as it is alone.
+    a, d, f = (problem.columns(n)[0] for n in "adf")
+    at = np.zeros(problem.model.size)
+    signs = np.sign(least_squares(problem, range(problem.model.size), at)[0][[a, d]])
+    h[..., f] = (h[..., [a, d]] @ signs + rng.normal(size=h.shape[:2])) / 1.7
+    mixed = Problem(problem.model, h, problem.y)
+    alone = {n: least_squares(mixed, [*range(6), *mixed.columns(n)], at)[1] for n in "adf"}
+    assert min(alone, key=alone.get) == "f"
+    assert chosen(mixed) == best_subset(mixed) == {"a", "d"}
+
+
+def test_no_more_than_the_limit_is_taken():
+    problem = made(np.random.default_rng(1), *WIDTHS, size=1.0)
+    assert best_subset(problem) == set(WIDTHS)
+    assert len(chosen(problem)) == MOST_EFFECTS
+
+
+@pytest.mark.parametrize(("noise", "inflation"), [(1.0, 1.0), (2.0, 4.0)])
+def test_of_noise_nothing_is_made(noise, inflation):
+    """The margin bounds it: chi-square has to exceed it, and what BIC charges, for any of them."""
+    rng = np.random.default_rng(17)
+    blocks, rows = 8, 40
+    found = sum(
+        bool(chosen(made(rng, noise=noise, blocks=blocks, rows=rows), inflation=inflation))
+        for _ in range(DRAWS)
+    )
+    charge = math.log(blocks * rows)
+
+    def alarm(width, spent=0):
+        least = MARGIN + charge * (1 + spent) + CHANCE * (width - 1)
+        return tail(width, least)
+
+    each = sum(alarm(width) for width in WIDTHS.values()) + (blocks - 1) * alarm(3, spent=1)
+    assert DRAWS * each < 1e-3  # so that a single one is a fault
+    assert found == 0
+
+
+def test_evidence_of_what_is_not_there_is_chi_square():
+    """From this the rate of false alarms follows, however rare they are."""
+    rng = np.random.default_rng(23)
+    gains = {1: [], 2: [], 3: []}
+    for _ in range(DRAWS):
+        problem = made(rng, blocks=8, rows=40)
+        fitter = problem.fitter()
+        before = fitter.fit(range(6), held_out=False)
+        for c in candidates(problem):
+            after = fitter.fit([*range(6), *c.index], held_out=False)
+            gains[len(c.index)].append(fitter.gain(before, after))
+            used = c.bic(fitter, before, after)
+            # At least one unknown is always paid for, the rest by chance.
+            assert used <= gains[len(c.index)][-1] - fitter.log_rows - CHANCE * (len(c.index) - 1)
+    for width, found in gains.items():
+        for p in (0.2, 0.05, 0.01):
+            x = next(x for x in np.arange(0.0, 20.0, 0.01) if tail(width, x) <= p)
+            expected = tail(width, x) * len(found)
+            over = int(np.sum(np.array(found) > x))
+            assert over == pytest.approx(expected, abs=4.0 * math.sqrt(expected) + 1.0), (width, p)
+
+
+def test_a_jump_of_the_offsets_competes_and_is_placed():
+    rng = np.random.default_rng(5)
+    problem = made(rng, "d", blocks=12)
+    y = problem.y.copy()
+    y[7:] += problem.h[7:][..., 3:6] @ np.array([0.8, -0.5, 0.6])
+    choice = choose(
+        Problem(problem.model, problem.h, y).fitter(), list(range(6)), candidates(problem)
+    )
+    (jump,) = (c for c in choice.chosen if c.jump)
+    assert {c.effect for c in choice.chosen} == {"d", jump.effect}
+    fit = choice.fitter.fit(choice.free)
+    sigma = np.sqrt(np.diag(fit.covariance)[list(jump.index)])
+    off = np.abs(fit.theta[list(jump.index)] - [0.8, -0.5, 0.6])
+    assert np.all(off < 4.0 * sigma)
+
+
+# -- what each gate asks for ------------------------------------------------------------------
+
+
+@pytest.fixture
+def clear():
+    """One effect that is clearly there: fitter, fits without and with it, the effect."""
+    problem = made(np.random.default_rng(2), "a", size=1.0)
+    fitter, (c, *_) = problem.fitter(), candidates(problem)
+    return fitter, fitter.fit(range(6)), fitter.fit([*range(6), *c.index]), c
+
+
+def test_evidence_below_the_margin_is_not_enough(clear):
+    assert accepted(*clear, MARGIN)
+    assert not accepted(*clear, MARGIN - 1e-6)
+
+
+def test_a_size_that_is_not_to_be_believed_is_not(clear):
+    fitter, before, after, c = clear
+    size = abs(after.theta[c.index[0]])
+    sigma = np.sqrt(after.covariance[c.index[0], c.index[0]])
+    assert accepted(fitter, before, after, Candidate("a", c.index, (size - 0.9 * sigma,)), 1e3)
+    assert not accepted(fitter, before, after, Candidate("a", c.index, (size - 1.1 * sigma,)), 1e3)
+
+
+def test_what_gains_in_one_part_of_the_flight_alone_does_not_hold():
+    """One wild block is fitted by a column that the rest contradicts."""
+    rng = np.random.default_rng(6)
+    problem = made(rng)
+    y = problem.y.copy()
+    y[4] += 5.0 * problem.h[4][:, problem.columns("a")[0]]
+    wild = Problem(problem.model, problem.h, y)
+    fitter, (c, *_) = wild.fitter(), candidates(wild)
+    before, after = fitter.fit(range(6)), fitter.fit([*range(6), *c.index])
+    assert c.bic(fitter, before, after) > MARGIN
+    # The fit that has not seen that block fits it no better, all others fit theirs worse.
+    assert fitter.held_gain(before, after) < 0.0
+    assert not accepted(fitter, before, after, c, 1e3)
+
+
+def test_what_is_real_and_does_not_matter_is_left_alone():
+    """Sure, and held out; but it moves none of the six, and hardly the residual."""
+    rng = np.random.default_rng(12)
+    problem = made(rng, "a", size=0.15, blocks=10, rows=600)
+    fitter, (c, *_) = problem.fitter(), candidates(problem)
+    before, after = fitter.fit(range(6)), fitter.fit([*range(6), *c.index])
+    sigma = np.sqrt(after.covariance[c.index[0], c.index[0]])
+    assert abs(after.theta[c.index[0]]) > SIGNIFICANT * sigma
+    assert c.bic(fitter, before, after) > MARGIN
+    assert fitter.held_rms(after) > 0.97 * fitter.held_rms(before)
+    # Regressors that are independent of the six leave these where they are.
+    moved = np.abs(after.theta[:6] - before.theta[:6]).max()
+    assert moved < 0.005
+    assert not accepted(fitter, before, after, c, 1e3)
+
+
+def test_an_axis_that_stays_at_nothing_pays_for_chance_alone():
+    rng = np.random.default_rng(9)
+    problem = made(rng)
+    at = problem.columns("b")
+    y = problem.y + problem.h[..., at[0]]
+    one = Problem(problem.model, problem.h, y)
+    fitter, c = one.fitter(), candidates(one)[1]
+    before, after = fitter.fit(range(6)), fitter.fit([*range(6), *at])
+    cost = fitter.gain(before, after) - c.bic(fitter, before, after)
+    assert cost == pytest.approx(math.log(one.y.size) + 2.0 * CHANCE)
+    moment = Candidate("b", at, (5.0,) * 3, spent=1)
+    assert moment.bic(fitter, before, after) == pytest.approx(
+        c.bic(fitter, before, after) - math.log(one.y.size)
+    )
+
+
+def test_twins_confound_each_other_and_what_acts_beside_does_not():
+    rng = np.random.default_rng(21)
+    problem = made(rng, "a", "f", size=1.0)
+    h = problem.h.copy()
+    a, d = (problem.columns(n)[0] for n in "ad")
+    h[..., d] = h[..., a] + 0.2 * rng.normal(size=h.shape[:2])
+    twins = Problem(problem.model, h, problem.y)
+    target, *others = candidates(twins)
+    # f has as much evidence, but it is not the same evidence.
+    (only,) = confounders_of(twins.fitter(), range(6), target, others)
+    assert only.name == "d"
+    at = np.zeros(twins.model.size)
+    chi2 = [least_squares(twins, [*range(6), i], at)[1] for i in (a, d)]
+    assert only.delta_bic == pytest.approx(chi2[1] - chi2[0], rel=1e-6)
+
+
+def test_contradicting_blocks_are_reconciled_by_what_drives_them_apart():
+    rng = np.random.default_rng(31)
+    problem = made(rng, blocks=12, rows=100)
+    a = problem.columns("a")[0]
+    h = problem.h.copy()
+    h[..., a] = 0.7 * h[..., 3] * np.where(np.arange(12) % 2, 1.0, -1.0)[:, None]
+    apart = Problem(problem.model, h, problem.y + h[..., a]).fitter()
+    assert reconciles(apart, range(6), [a])
+    assert not reconciles(apart, range(6), problem.columns("d"))
+    assert not reconciles(problem.fitter(), range(6), [a])
+
+
+def test_what_was_found_leaves_the_bar_higher_for_what_follows():
+    """Columns are linear in what was found: a share of its evidence may be left over."""
+    problem = made(np.random.default_rng(14), "a", size=5.0, rows=200)
+    fitter, (c, *_) = problem.fitter(), candidates(problem)
+    nothing = fitter.fit(range(6))
+    with_it = fitter.fit([*range(6), *c.index])
+    plain = Choice(fitter, list(range(6)), [], [c])
+    assert plain.least(with_it) == MARGIN
+    counted = Choice(fitter, list(range(6)), [], [c], nothing=nothing)
+    gained = fitter.gain(nothing, with_it)
+    assert 5e-3 * gained > MARGIN
+    assert counted.least(with_it) == pytest.approx(5e-3 * gained)
+    blurred = Choice(
+        fitter, list(range(6)), [], [Candidate("a", c.index, (9.0,), unseen=0.01)], nothing=nothing
+    )
+    assert blurred.least(with_it) == pytest.approx(1.5e-2 * gained)
