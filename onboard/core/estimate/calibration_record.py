@@ -71,6 +71,7 @@ def calibration_of(
     held = {i: float(x) for i, x in enumerate(in_force.as_linear())}
     blocks, model = engine.all_blocks, engine.model
     long, short = _drifts(engine, in_force.as_linear(), solution.theta[:6])
+    before, after = (float("nan"),) * 2 if short is None else (float(x) for x in short.rms[:2])
     return Calibration(
         imu=imu,
         status=status,
@@ -91,13 +92,11 @@ def calibration_of(
         whitened_rms_after=fitted_rms(blocks, model),
         held_out_before=held_out(blocks, model, held),
         held_out_after=held_out(blocks, model),
-        velocity_rms_before=float("nan") if short is None else float(short.rms[0]),
-        velocity_rms_after=float("nan") if short is None else float(short.rms[1]),
+        velocity_rms_before=before,
+        velocity_rms_after=after,
         coverage=seen.coverage,
         certificate=_certificate(engine),
-        dead_reckoning=None
-        if long is None
-        else DeadReckoning(long.horizon_s, float(long.end[0]), float(long.end[1]), long.windows),
+        dead_reckoning=_dead_reckoning(long),
         temperature=_temperature(engine),
     )
 
@@ -206,6 +205,13 @@ def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, 
         free_drift(chain, states, (before, after), horizon_s=LONG_DRIFT_S, most=LONG_DRIFTS),
         free_drift(chain, states, (before, after), horizon_s=SHORT_DRIFT_S, most=SHORT_DRIFTS),
     )
+
+
+def _dead_reckoning(drift: Drift | None) -> DeadReckoning | None:
+    """How far velocity drifts without GPS, before and after."""
+    if drift is None:
+        return None
+    return DeadReckoning(drift.horizon_s, float(drift.end[0]), float(drift.end[1]), drift.windows)
 
 
 def _temperature(engine: Engine) -> Estimate | None:
