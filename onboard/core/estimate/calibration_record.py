@@ -59,9 +59,7 @@ def calibration_of(
     Raises:
         KeyError: no flight was processed.
     """
-    solution = engine.solution()
-    if solution is None:
-        raise KeyError(imu)
+    solution = _solved(engine, imu)
     in_force = parameters.six(imu)
     value = parameters_of(solution.theta)
     covariance = six_covariance(solution)
@@ -99,6 +97,13 @@ def calibration_of(
         dead_reckoning=_dead_reckoning(long),
         temperature=_temperature(engine),
     )
+
+
+def _solved(engine: Engine, imu: int) -> Solution:
+    solution = engine.solution()
+    if solution is None:
+        raise KeyError(imu)
+    return solution
 
 
 def _refused(before: Mapping[str, int], gates: Mapping[str, int]) -> dict[str, int]:
