@@ -167,7 +167,7 @@ class _Builtin:
             await self._step()
 
     async def land(self) -> None:
-        await self._do(lambda autopilot: autopilot.land())
+        await self._do(lambda autopilot: autopilot.control.land())
         while self.autopilot.armed or self.autopilot.flying:
             await self._step()
 

@@ -22,7 +22,7 @@ from onboard.answers.document import (
 )
 from onboard.answers.verdict import unused_in_words
 from onboard.answers.words import DISTRUST
-from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.diagnosis.records import Diagnosis, Mismatch, Rung, Unused
 from onboard.core.physics.finding import Finding, Where
 from onboard.push.diagnosed import headline, severity_of_effect
 
@@ -174,7 +174,6 @@ def explain_document(
     advice: Advice | None = None,
 ) -> ExplainDocument:
     """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
-    m = diagnosis.mismatch
     sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
     return ExplainDocument(
         recording=ExplainedRecording(
@@ -190,48 +189,54 @@ def explain_document(
         headline=sentence,
         severity=severity,
         note=" ".join(x for x in (diagnosis.note, *unused_in_words(diagnosis)) if x),
-        mismatch=MismatchDocument(
-            detected=m.detected,
-            whitened_rms_before=finite(m.whitened_rms_before),
-            whitened_rms_after=finite(m.whitened_rms_after),
-            p_value=finite(m.p_value),
-            velocity_rms_before_m_s=finite(m.velocity_rms_before),
-            velocity_rms_after_m_s=finite(m.velocity_rms_after),
-            held_out_whitened_rms_before=finite(m.held_out_before),
-            held_out_whitened_rms_after=finite(m.held_out_after),
-            held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
-            held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
-            where=[_where(w) for w in m.where],
-            fixes=m.fixes,
-            fixes_believed=m.believed,
-        ),
+        mismatch=_mismatch(diagnosis.mismatch),
         effects=[_effect(e, autopilot) for e in diagnosis.effects],
         ambiguous=[
             AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart)
             for a in diagnosis.ambiguous
         ],
         not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in diagnosis.not_testable],
-        ladder=[
-            RungDocument(
-                name=r.name,
-                whitened_rms=finite(r.whitened_rms),
-                held_out_whitened_rms=finite(r.held_out),
-                velocity_rms_m_s=finite(r.velocity_rms),
-                held_out_velocity_rms_m_s=finite(r.held_out_velocity),
-            )
-            for r in diagnosis.ladder
-        ],
-        unused=[
-            UnusedDocument(
-                start_s=finite(u.start_s),
-                end_s=finite(u.end_s),
-                reason=u.reason,
-                why=DISTRUST.get(u.reason, u.reason),
-                contradicted=u.contradicted,
-            )
-            for u in diagnosis.unused
-        ],
+        ladder=[_rung(rung) for rung in diagnosis.ladder],
+        unused=[_unused(stretch) for stretch in diagnosis.unused],
         advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
+    )
+
+
+def _mismatch(m: Mismatch) -> MismatchDocument:
+    return MismatchDocument(
+        detected=m.detected,
+        whitened_rms_before=finite(m.whitened_rms_before),
+        whitened_rms_after=finite(m.whitened_rms_after),
+        p_value=finite(m.p_value),
+        velocity_rms_before_m_s=finite(m.velocity_rms_before),
+        velocity_rms_after_m_s=finite(m.velocity_rms_after),
+        held_out_whitened_rms_before=finite(m.held_out_before),
+        held_out_whitened_rms_after=finite(m.held_out_after),
+        held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
+        held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
+        where=[_where(w) for w in m.where],
+        fixes=m.fixes,
+        fixes_believed=m.believed,
+    )
+
+
+def _rung(r: Rung) -> RungDocument:
+    return RungDocument(
+        name=r.name,
+        whitened_rms=finite(r.whitened_rms),
+        held_out_whitened_rms=finite(r.held_out),
+        velocity_rms_m_s=finite(r.velocity_rms),
+        held_out_velocity_rms_m_s=finite(r.held_out_velocity),
+    )
+
+
+def _unused(u: Unused) -> UnusedDocument:
+    return UnusedDocument(
+        start_s=finite(u.start_s),
+        end_s=finite(u.end_s),
+        reason=u.reason,
+        why=DISTRUST.get(u.reason, u.reason),
+        contradicted=u.contradicted,
     )
 
 

@@ -139,35 +139,13 @@ def line_chart(
     if len(xs) == 0:
         return Markup('<p class="muted">{}: no data to draw.</p>').format(title)
     x0, x1 = x_range or (float(xs.min()), float(xs.max()))
-    x1 = x1 if x1 > x0 else x0 + 1.0
-    y0, y1 = y_range or _range(ys, symmetric=symmetric)
-
-    def px(x: float) -> float:
-        return WIDTH * (x - x0) / (x1 - x0)
-
-    def py(y: float) -> float:
-        return HEIGHT * (y1 - min(max(y, y0), y1)) / (y1 - y0)
-
-    shapes = [_band(px(max(b.start, x0)), px(min(b.end, x1)), b.kind) for b in bands]
-    labels = []
-    marks, unit_s, x_unit = time_ticks(x0, x1) if x_unit == "s" else (ticks(x0, x1), 1.0, x_unit)
-    for v in marks:
-        shapes.append(f'<path class="grid" d="M{px(v):.1f} 0V{HEIGHT:.0f}"/>')
-        labels.append(_label("x", "left", px(v) / WIDTH, v / unit_s))
-    along = f"{x_label}, {x_unit}" if x_unit else x_label
-    for v in ticks(y0, y1, 4):
-        kind = "zero" if v == 0 else "grid"
-        shapes.append(f'<path class="{kind}" d="M0 {py(v):.1f}H{WIDTH:.0f}"/>')
-        labels.append(_label("y", "top", py(v) / HEIGHT, v))
-    for r in ribbons:
-        there = [f"{px(float(v)):.1f} {py(float(h)):.1f}" for v, h in zip(r.x, r.high, strict=True)]
-        back = [f"{px(float(v)):.1f} {py(float(w)):.1f}" for v, w in zip(r.x, r.low, strict=True)]
-        outline = "L".join(there + back[::-1])
-        if outline:
-            shapes.append(f'<path class="ribbon {escape(r.kind)}" d="M{outline}Z"/>')
-    for x, y, line in drawn:
-        d = _path([px(float(v)) for v in x], [py(float(v)) for v in y], x)
-        shapes.append(f'<path class="line {escape(line.kind)}" d="{d}"/>')
+    sheet = _Sheet(x0, x1 if x1 > x0 else x0 + 1.0, *(y_range or _range(ys, symmetric=symmetric)))
+    shapes = [sheet.band(band) for band in bands]
+    x_marks, x_labels, x_unit = sheet.time_axis(x_unit)
+    y_marks, y_labels = sheet.value_axis()
+    shapes += [*x_marks, *y_marks]
+    shapes += [sheet.ribbon(ribbon) for ribbon in ribbons]
+    shapes += [sheet.curve(x, y, line.kind) for x, y, line in drawn]
     return Markup(
         "<figure><figcaption>{}{}</figcaption>"
         '<div class="plot"><svg viewBox="0 0 {:.0f} {:.0f}" preserveAspectRatio="none" role="img" '
@@ -179,9 +157,68 @@ def line_chart(
         HEIGHT,
         f"{title}: {summary}" if summary else title,
         Markup("".join(shapes)),  # noqa: S704  numbers and escaped classes only
-        Markup("".join(labels)),  # noqa: S704
-        along,
+        Markup("".join(x_labels + y_labels)),  # noqa: S704
+        f"{x_label}, {x_unit}" if x_unit else x_label,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """The ranges of a chart, and how what lies in them is drawn, as SVG."""
+
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+
+    def px(self, x: float) -> float:
+        return WIDTH * (x - self.x0) / (self.x1 - self.x0)
+
+    def py(self, y: float) -> float:
+        return HEIGHT * (self.y1 - min(max(y, self.y0), self.y1)) / (self.y1 - self.y0)
+
+    def time_axis(self, unit: str) -> tuple[list[str], list[str], str]:
+        """Marks, their labels and their unit, which becomes minutes or hours if it is seconds."""
+        marks, unit_s = ticks(self.x0, self.x1), 1.0
+        if unit == "s":
+            marks, unit_s, unit = time_ticks(self.x0, self.x1)
+        grid = [f'<path class="grid" d="M{self.px(v):.1f} 0V{HEIGHT:.0f}"/>' for v in marks]
+        labels = [_label("x", "left", self.px(v) / WIDTH, v / unit_s) for v in marks]
+        return grid, labels, unit
+
+    def value_axis(self) -> tuple[list[str], list[str]]:
+        """Marks and their labels; the one at zero stands out."""
+        marks = ticks(self.y0, self.y1, 4)
+        grid = [
+            f'<path class="{"zero" if v == 0 else "grid"}" d="M0 {self.py(v):.1f}H{WIDTH:.0f}"/>'
+            for v in marks
+        ]
+        return grid, [_label("y", "top", self.py(v) / HEIGHT, v) for v in marks]
+
+    def band(self, band: Band) -> str:
+        a, b = self.px(max(band.start, self.x0)), self.px(min(band.end, self.x1))
+        if not (math.isfinite(a) and math.isfinite(b)) or b < a:
+            return ""
+        return (
+            f'<rect class="band {escape(band.kind)}" x="{a:.1f}" y="0" '
+            f'width="{max(b - a, 2.0):.1f}" height="{HEIGHT:.0f}"/>'
+        )
+
+    def ribbon(self, ribbon: Ribbon) -> str:
+        there = self._corners(ribbon.x, ribbon.high)
+        outline = "L".join(there + self._corners(ribbon.x, ribbon.low)[::-1])
+        if not outline:
+            return ""
+        return f'<path class="ribbon {escape(ribbon.kind)}" d="M{outline}Z"/>'
+
+    def _corners(self, x: Array, y: Array) -> list[str]:
+        return [
+            f"{self.px(float(a)):.1f} {self.py(float(b)):.1f}" for a, b in zip(x, y, strict=True)
+        ]
+
+    def curve(self, x: Array, y: Array, kind: str) -> str:
+        d = _path([self.px(float(v)) for v in x], [self.py(float(v)) for v in y], x)
+        return f'<path class="line {escape(kind)}" d="{d}"/>'
 
 
 def pair_bar(before: float, after: float, longest: float, title: str) -> Markup:
@@ -216,15 +253,6 @@ def _range(ys: Array, *, symmetric: bool) -> tuple[float, float]:
     low, high = (float(v) for v in np.percentile(ys, [0.0, 99.5]))
     margin = 0.05 * (high - low) or 1.0
     return low - margin, high + margin
-
-
-def _band(a: float, b: float, kind: str) -> str:
-    if not (math.isfinite(a) and math.isfinite(b)) or b < a:
-        return ""
-    return (
-        f'<rect class="band {escape(kind)}" x="{a:.1f}" y="0" '
-        f'width="{max(b - a, 2.0):.1f}" height="{HEIGHT:.0f}"/>'
-    )
 
 
 def _label(axis: str, side: str, share: float, value: float) -> str:

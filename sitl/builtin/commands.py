@@ -18,7 +18,8 @@ from sitl.builtin.messages import Message
 from sitl.builtin.params import Notice
 
 if TYPE_CHECKING:
-    from sitl.builtin.autopilot import Autopilot, Link
+    from sitl.builtin.autopilot import Autopilot
+    from sitl.builtin.links import Link
 
 FORCE = 21196.0
 """Magic number of a forced arming or disarming."""
@@ -82,18 +83,18 @@ def _request_data_stream(autopilot: Autopilot, link: Link, message: Message) -> 
     for stream in wanted:
         autopilot.parameters.set(autopilot.now, f"MAV1_{stream}", rate)
         for name in streams.STREAMS[stream]:
-            autopilot.set_rate(link, name, rate)
+            autopilot.links.set_rate(link, name, rate)
 
 
 def _timesync(autopilot: Autopilot, link: Link, message: Message) -> None:
     if message.tc1 == 0:
         now_ns = int(autopilot.now * 1e9)
-        autopilot.send(link, mav.MAVLink_timesync_message(now_ns, message.ts1))
+        autopilot.links.send(link, mav.MAVLink_timesync_message(now_ns, message.ts1))
 
 
 def _set_mode(autopilot: Autopilot, link: Link, message: Message) -> None:
     del link
-    autopilot.set_mode(message.custom_mode)
+    autopilot.control.set_mode(message.custom_mode)
 
 
 def _mission_request_list(autopilot: Autopilot, link: Link, message: Message) -> None:
@@ -117,7 +118,7 @@ def _command_int(autopilot: Autopilot, link: Link, message: Message) -> None:
 def _command(autopilot: Autopilot, link: Link, message: Message, command: Command) -> None:
     handler = COMMANDS.get(command.number)
     result = UNSUPPORTED if handler is None else handler(autopilot, link, command)
-    autopilot.send(
+    autopilot.links.send(
         link,
         mav.MAVLink_command_ack_message(
             command.number, result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
@@ -133,10 +134,10 @@ def _set_message_interval(autopilot: Autopilot, link: Link, command: Command) ->
     if microseconds < -1:
         return DENIED
     if microseconds == 0:
-        autopilot.set_interval(link, name, autopilot.default_interval(name))
+        autopilot.links.set_interval(link, name, autopilot.links.default_interval(name))
         return ACCEPTED
     interval = 0 if microseconds == -1 else streams.interval_ms(microseconds)
-    if not autopilot.set_interval(link, name, interval):
+    if not autopilot.links.set_interval(link, name, interval):
         text = f"Requested rate for message ID {int(command.p1)} too fast"
         autopilot.say(Notice(f"{text}. Increase SCHED_LOOP_RATE"[:50], 6))
         return DENIED
@@ -146,7 +147,7 @@ def _set_message_interval(autopilot: Autopilot, link: Link, command: Command) ->
 def _get_message_interval(autopilot: Autopilot, link: Link, command: Command) -> int:
     name = messages.IDS.get(int(command.p1))
     interval_us = 0 if name is None else link.schedule.interval(name) * 1000 or -1
-    autopilot.send(link, mav.MAVLink_message_interval_message(int(command.p1), interval_us))
+    autopilot.links.send(link, mav.MAVLink_message_interval_message(int(command.p1), interval_us))
     return FAILED if name is None else ACCEPTED
 
 
@@ -154,7 +155,7 @@ def _request_message(autopilot: Autopilot, link: Link, command: Command) -> int:
     name = messages.IDS.get(int(command.p1))
     if name is None:
         return FAILED
-    autopilot.send(link, messages.BUILDERS[name](autopilot.instant()))
+    autopilot.links.send(link, messages.BUILDERS[name](autopilot.instant()))
     return ACCEPTED
 
 
@@ -162,7 +163,7 @@ def _request_capabilities(autopilot: Autopilot, link: Link, command: Command) ->
     """What AUTOPILOT_VERSION was asked for with before there was MAV_CMD_REQUEST_MESSAGE."""
     if command.p1 != 1.0:
         return FAILED
-    autopilot.send(link, messages.autopilot_version(autopilot.instant()))
+    autopilot.links.send(link, messages.autopilot_version(autopilot.instant()))
     return ACCEPTED
 
 
@@ -171,7 +172,7 @@ def _arm_disarm(autopilot: Autopilot, link: Link, command: Command) -> int:
     force = command.p2 == FORCE
     if command.p1 == 1.0:
         return FAILED if autopilot.arm(force=force) else ACCEPTED
-    return ACCEPTED if autopilot.disarm() else FAILED
+    return ACCEPTED if autopilot.control.disarm() else FAILED
 
 
 def _take_off(autopilot: Autopilot, link: Link, command: Command) -> int:
@@ -181,12 +182,12 @@ def _take_off(autopilot: Autopilot, link: Link, command: Command) -> int:
 
 def _land(autopilot: Autopilot, link: Link, command: Command) -> int:
     del link, command
-    return ACCEPTED if autopilot.land() else FAILED
+    return ACCEPTED if autopilot.control.land() else FAILED
 
 
 def _do_set_mode(autopilot: Autopilot, link: Link, command: Command) -> int:
     del link
-    autopilot.set_mode(int(command.p2))
+    autopilot.control.set_mode(int(command.p2))
     return ACCEPTED
 
 

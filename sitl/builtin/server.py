@@ -15,8 +15,9 @@ from typing import Protocol, cast
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.builtin.autopilot import Autopilot, Link
+from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.impairment import Impairment
+from sitl.builtin.links import Link
 from sitl.builtin.messages import Message, packed
 
 TICK = 0.005
@@ -189,7 +190,7 @@ class Server:
         for client in self._leaving:
             if client in self._clients:
                 self._clients.remove(client)
-                self.autopilot.disconnect(client.link)
+                self.autopilot.links.disconnect(client.link)
         self._joining.clear()
         self._leaving.clear()
 

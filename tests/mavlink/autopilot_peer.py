@@ -1,4 +1,4 @@
-"""ArduPilot's side of MAV_CMD_SET_MESSAGE_INTERVAL and of TIMESYNC, for tests."""
+"""ArduPilot's side of MAV_CMD_SET_MESSAGE_INTERVAL, for tests."""
 
 from __future__ import annotations
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Self
 
 from onboard.daemon.learning.diagnoses import Diagnoses
@@ -106,14 +105,7 @@ class Parts:
             proposals=proposals,
             pusher=Pusher(ledger, proposals, witness, notices),
             diagnoses=Diagnoses(ledger.append, notices),
-            handover=Handover(
-                _learner(configuration, directory, clock, wall_clock),
-                notices,
-                there=situation,
-                clock=clock,
-                wall_clock=wall_clock,
-                save_every_s=configuration.estimator.save_every_s,
-            ),
+            handover=_handover(configuration, notices, situation, clock, wall_clock),
         )
 
     @property
@@ -129,15 +121,24 @@ def _proposals(configuration: Configuration, ledger: Ledger) -> Proposals:
     )
 
 
-def _learner(
+def _handover(
     configuration: Configuration,
-    directory: Path,
+    notices: Notices,
+    there: Situation,
     clock: Callable[[], float],
     wall_clock: Callable[[], float],
-) -> Learner:
-    return Learner(
-        Store(directory),
+) -> Handover:
+    learner = Learner(
+        Store(configuration.state.path()),
         settings.estimator_settings(configuration.estimator),
         clock=clock,
         wall_clock=wall_clock,
+    )
+    return Handover(
+        learner,
+        notices,
+        there=there,
+        clock=clock,
+        wall_clock=wall_clock,
+        save_every_s=configuration.estimator.save_every_s,
     )
