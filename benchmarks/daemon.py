@@ -62,8 +62,8 @@ def record_landed(path: str, seconds: float, rates: dict[str, float]) -> None:
     autopilot = Simulated("plane", Truth(imus=random_imus(3), seed=3), loop_rate=400)
     link = autopilot.connect()
     for name, rate in {**DEFAULT_RATES, **rates}.items():
-        autopilot.set_rate(link, name, rate)
-    autopilot.request_parameters(link)
+        autopilot.links.set_rate(link, name, rate)
+    autopilot.links.request_parameters(link)
     packer = mav.MAVLink(None, srcSystem=1, srcComponent=1)
     with Path(path).open("wb") as file:
         while autopilot.clock < seconds:

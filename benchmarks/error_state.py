@@ -13,6 +13,7 @@ import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +33,10 @@ from benchmarks.recorded import (
 from onboard.core.inputs.parameters import filter_delay
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
 from onboard.core.maths.earth import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from pyins.measurements import Measurement
 
 RECORDINGS = ("a02.tlog", "b02.tlog", "c01.BIN")
 BEFORE_S = 8.0
@@ -86,24 +91,9 @@ def pyins_six(s: Streams, force: Array, delay: float) -> Array:
         delay: taken off the fixes' stamps, s.
     """
     import pandas as pd
-    from pyins import earth, filters, inertial_sensor, measurements, strapdown
+    from pyins import filters, inertial_sensor, strapdown
 
-    class Horizontal(measurements.NedVelocity):  # type: ignore[misc] # pyins has no types
-        """Velocity without its vertical component, which GPS_RAW_INT does not have."""
-
-        def compute_matrices(self, *where: object) -> tuple[Array, ...] | None:
-            found = super().compute_matrices(*where)
-            return None if found is None else (found[0][:2], found[1][:2], found[2][:2, :2])
-
-    fixes = s.fixes.copy()
-    fixes[:, 0] -= delay
-    fixes[:, 1:3] = np.degrees(fixes[:, 1:3])
-    # Its gravity is the earth's, the recordings' is constant: heights go to where both agree.
-    here = float(earth.gravity(fixes[0, 1], 0.0))
-    slope = float(earth.gravity(fixes[0, 1], 1.0)) - here
-    fixes[:, 3] += (STANDARD_GRAVITY - here) / slope - fixes[0, 3]
-    known = (fixes[:, 0] > s.imu[1, 0] + 0.1) & (fixes[:, 0] < s.imu[-1, 0])
-    fixes = fixes[known]
+    fixes = _where_gravity_agrees(s, delay)
     gps = pd.DataFrame(
         fixes[:, 1:], index=fixes[:, 0], columns=["lat", "lon", "alt", "VN", "VE", "VD"]
     )
@@ -129,17 +119,48 @@ def pyins_six(s: Streams, force: Array, delay: float) -> Array:
     gyro = inertial_sensor.EstimationModel(
         bias_sd=0.01, noise=GYRO_NOISE, bias_walk=3e-5, scale_misal_sd=np.diag([0.01] * 3)
     )
-    velocity = (measurements.NedVelocity if s.vertical else Horizontal)(gps, VELOCITY_SD)
-    position = measurements.Position(gps, HEIGHT_SD if s.vertical else POSITION_SD)
     result = filters.run_feedback_filter(
         pva, 1.0, 0.5, 2.0, 5.0,
         strapdown.compute_increments_from_imu(imu, "rate"),
-        gyro, accel, [velocity, position], time_step=0.2,
+        gyro, accel, _measured(gps, vertical=s.vertical), time_step=0.2,
     )  # fmt: skip
     last = result.accel.iloc[-1]
     bias = np.array([last[f"bias_{a}"] for a in "xyz"])
     gain = 1.0 + np.array([last[f"sm_{a}{a}"] for a in "xyz"])
     return np.concatenate([force[:3] / gain, force[3:] + bias / force[:3]])
+
+
+def _where_gravity_agrees(s: Streams, delay: float) -> Array:
+    """(m, 7) fixes with inertial samples around them, degrees; ``delay`` is taken off the stamps.
+
+    Its gravity is the earth's, the recordings' is constant: heights go to where both agree.
+    """
+    from pyins import earth
+
+    fixes = s.fixes.copy()
+    fixes[:, 0] -= delay
+    fixes[:, 1:3] = np.degrees(fixes[:, 1:3])
+    here = float(earth.gravity(fixes[0, 1], 0.0))
+    slope = float(earth.gravity(fixes[0, 1], 1.0)) - here
+    fixes[:, 3] += (STANDARD_GRAVITY - here) / slope - fixes[0, 3]
+    known = (fixes[:, 0] > s.imu[1, 0] + 0.1) & (fixes[:, 0] < s.imu[-1, 0])
+    out: Array = fixes[known]
+    return out
+
+
+def _measured(gps: DataFrame, *, vertical: bool) -> list[Measurement]:
+    """Velocity and position; GPS_RAW_INT's velocity has no vertical component."""
+    from pyins import measurements
+
+    class Horizontal(measurements.NedVelocity):  # type: ignore[misc] # pyins has no types
+        """Velocity without its vertical component."""
+
+        def compute_matrices(self, *where: object) -> tuple[Array, ...] | None:
+            found = super().compute_matrices(*where)
+            return None if found is None else (found[0][:2], found[1][:2], found[2][:2, :2])
+
+    velocity = (measurements.NedVelocity if vertical else Horizontal)(gps, VELOCITY_SD)
+    return [velocity, measurements.Position(gps, HEIGHT_SD if vertical else POSITION_SD)]
 
 
 def _line(name: str, what: str, error: Array, limit: Array, spent: float, unit: float) -> str:

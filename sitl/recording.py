@@ -104,8 +104,8 @@ def run(spec: FlightSpec) -> Flight:
     )
     link = autopilot.connect()
     for name in list(_names(spec)):
-        autopilot.set_rate(link, name, _rate(spec, name))
-    autopilot.request_parameters(link)
+        autopilot.links.set_rate(link, name, _rate(spec, name))
+    autopilot.links.request_parameters(link)
     autopilot.advance(LEAD)
     autopilot.arm(force=True)
     autopilot.take_off(spec.duration - LEAD)

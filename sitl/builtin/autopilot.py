@@ -23,6 +23,7 @@ from sitl.builtin.messages import Message
 from sitl.builtin.navigation import Navigation
 from sitl.builtin.params import Notice, ParameterStore, Value
 from sitl.builtin.sensors import Barometer
+from sitl.builtin.supply import Supply
 from sitl.builtin.trajectory import Start
 from sitl.builtin.truth import ImuTruth, Truth
 from sitl.builtin.world import Filters, Vehicle, World
@@ -62,15 +63,14 @@ class Autopilot:
         self.truth = truth
         self._dull = dull
         self._loop_rate = loop_rate
-        self._dirty_world = False
-        self.parameters = self._stored(parameters or {})
+        self.parameters = self._store(parameters or {})
         self._time = BootClock()
         self.links = Links(self._time, self.parameters)
         self._boot(Start())
 
     def _boot(self, start: Start) -> None:
         """Power on: clock at zero, filters fresh, intervals from the stream rates."""
-        self._unpowered: tuple[float, Start] | None = None
+        self._supply = Supply(self._time)
         self._orders: Orders = Orders()
         self._time.boot()
         self._loops = 0
@@ -78,19 +78,18 @@ class Autopilot:
         self.truth = truth_in_force(self.truth, self.parameters)
         self._dirty_world = False
         self.world = World(
-            self.vehicle, self.truth, filters=self._filters(), dull=self._dull, start=start
+            self.vehicle,
+            self.truth,
+            filters=_filters(self.parameters),
+            dull=self._dull,
+            start=start,
         )
         self.world.ensure(1.0)
         self.corrections = Corrections(self.parameters, len(self.truth.imus))
         self.navigation = Navigation(self.world, self.parameters)
         self.barometer = Barometer(self.truth.seed)
         self.control = FlightControl(
-            self.vehicle,
-            self.world,
-            clock=self._time,
-            orders=self._orders,
-            say=self.say,
-            longest=self._longest,
+            self.vehicle, self.world, self._time, self._orders, say=self.say, longest=self._longest
         )
         self._consumed = 0.0
         self.links.boot()
@@ -99,21 +98,11 @@ class Autopilot:
 
     def connect(self, link: Link | None = None) -> Link:
         """A new client; it gets a heartbeat and the stream rates of the parameters."""
-        link = link or Link()
-        self.links.connect(link)
-        return link
-
-    def set_rate(self, link: Link, name: str, rate_hz: float) -> bool:
-        """Rate of a message on a link; 0 stops it.  False where ArduPilot refuses."""
-        return self.links.set_rate(link, name, rate_hz)
-
-    def request_parameters(self, link: Link) -> None:
-        """As PARAM_REQUEST_LIST does."""
-        link.listing = 0.0
+        return self.links.connect(link)
 
     def receive(self, link: Link, message: Message) -> None:
         """Takes a message that a client has sent; without power nothing is heard."""
-        if self._unpowered is None:
+        if self._supply.on:
             commands.receive(self, link, message)
 
     def say(self, item: Value | Notice, link: Link | None = None) -> None:
@@ -136,10 +125,10 @@ class Autopilot:
         """Runs the main loop for so long; messages appear in the links' outboxes."""
         end = self.clock + seconds - 1e-9
         while self.clock < end:
-            if self._unpowered is None:
+            if self._supply.on:
                 self._loop()
-            else:
-                self._wait_for_power(*self._unpowered, end + 1e-9)
+            elif self._supply.back_by(end + 1e-9):
+                self._boot(self._supply.start)
 
     def _loop(self) -> None:
         while self._orders:
@@ -151,7 +140,7 @@ class Autopilot:
         if self._dirty_world:
             self._dirty_world = False
             self.truth = truth_in_force(self.truth, self.parameters)
-            self.world.rebuild(self.truth, self._filters())
+            self.world.rebuild(self.truth, _filters(self.parameters))
         while self.navigation.due(self.now):
             self._filter_step()
         if self.parameters.saving:
@@ -265,33 +254,24 @@ class Autopilot:
             return False
         speedup = self.parameters["SIM_SPEEDUP"]
         self.truth = replace(self.truth, board=board, imus=imus)
-        self.parameters = self._stored({"SIM_SPEEDUP": speedup, **(parameters or {})})
+        self.parameters = self._store({"SIM_SPEEDUP": speedup, **(parameters or {})})
         self.links.parameters = self.parameters
         self._cut_power(off)
         return True
 
-    def _stored(self, parameters: Mapping[str, float]) -> ParameterStore:
-        """What a board has stored: defaults, but for these."""
-        store = ParameterStore(
-            initial_parameters(self.vehicle, self.truth, self._loop_rate), self._changed
-        )
-        store.load(parameters)
-        return store
-
     def _cut_power(self, seconds: float) -> None:
-        start = self.world.at(self.now).trajectory.end
-        if seconds > 0.0:
-            self._unpowered = (self.clock + seconds, start)
-        else:
-            self._boot(start)
-
-    def _wait_for_power(self, until: float, start: Start, end: float) -> None:
-        """Lets time pass without power until ``until``, or until ``end`` if that is earlier."""
-        self._time.total = min(until, end)
-        if self.clock == until:
-            self._boot(start)
+        self._supply.cut(seconds, self.world.at(self.now).trajectory.end)
+        if seconds <= 0.0:
+            self._boot(self._supply.start)
 
     # -- parameters ------------------------------------------------------------------------
+
+    def _store(self, stored: Mapping[str, float]) -> ParameterStore:
+        """Parameters of a board: defaults, but for what it has stored."""
+        defaults = initial_parameters(self.vehicle, self.truth, self._loop_rate)
+        store = ParameterStore(defaults, self._changed)
+        store.load(stored)
+        return store
 
     def _changed(self, name: str) -> None:
         if name == "SIM_SPEEDUP":
@@ -301,5 +281,7 @@ class Autopilot:
         elif name.startswith(("INS_ACC", "AHRS_")) and hasattr(self, "corrections"):
             self.corrections = Corrections(self.parameters, len(self.truth.imus))
 
-    def _filters(self) -> Filters:
-        return Filters(self.parameters["INS_ACCEL_FILTER"], self.parameters["INS_GYRO_FILTER"])
+
+def _filters(parameters: ParameterStore) -> Filters:
+    """The sensors' low-passes in force."""
+    return Filters(parameters["INS_ACCEL_FILTER"], parameters["INS_GYRO_FILTER"])

@@ -68,7 +68,7 @@ def _param_request_list(autopilot: Autopilot, link: Link, message: Message) -> N
     del message
     name = "ArduPlane" if autopilot.vehicle == "plane" else "ArduCopter"
     autopilot.say(Notice(f"{name} V4.7.0-dev (built-in simulation)", 6))
-    autopilot.request_parameters(link)
+    autopilot.links.request_parameters(link)
 
 
 def _request_data_stream(autopilot: Autopilot, link: Link, message: Message) -> None:

@@ -45,9 +45,9 @@ class FlightControl:
         self,
         vehicle: Vehicle,
         world: World,
-        *,
         clock: BootClock,
         orders: Orders,
+        *,
         say: Callable[[Notice], None],
         longest: float,
     ) -> None:

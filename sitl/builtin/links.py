@@ -48,10 +48,12 @@ class Links:
 
     # -- who is there ----------------------------------------------------------------------
 
-    def connect(self, link: Link) -> None:
+    def connect(self, link: Link | None = None) -> Link:
         """A new client; it gets a heartbeat and the stream rates of the parameters."""
+        link = link or Link()
         self._links.append(link)
         self._default_intervals(link)
+        return link
 
     def disconnect(self, link: Link) -> None:
         """The client has gone."""
@@ -92,6 +94,10 @@ class Links:
             return False
         link.schedule.set(name, interval, self._clock.now * 1e3)
         return True
+
+    def request_parameters(self, link: Link) -> None:
+        """As PARAM_REQUEST_LIST does."""
+        link.listing = 0.0
 
     # -- sending ---------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl.builtin import effects as fx
 from sitl.builtin.effects.base import turned
@@ -154,13 +155,7 @@ def read_imu(
     raw = f_s / np.array(imu.scale) + np.array(imu.offset)
     raw += stream(2).standard_normal((n, 3)) * (imu.accel_noise * np.sqrt(RATE / 2.0))
     raw += np.cumsum(stream(3).standard_normal((n, 3)), axis=0) * (imu.bias_walk * np.sqrt(DT))
-    limit = min(
-        [RANGE]
-        + [e.limit for e in truth.effects if isinstance(e, fx.Saturation) and _hits(e.imu, index)]
-    )
-    raw = np.round(raw / RESOLUTION) * RESOLUTION
-    rail = np.any(np.abs(raw) >= limit, axis=1)
-    raw = np.clip(raw, -limit, limit)
+    raw, rail = _converted(raw, _limit(truth, index))
     gyro = _gyro(trajectory.w_b @ board, imu, stream(4), stream(5), t)
     return ImuReadings(
         raw=raw,
@@ -175,6 +170,18 @@ def read_imu(
 
 def _hits(wanted: int, index: int) -> bool:
     return wanted in (0, index + 1)
+
+
+def _limit(truth: Truth, index: int) -> float:
+    """Rail of IMU ``index``, m/s^2: the chip's range, or less."""
+    lower = (e for e in truth.effects if isinstance(e, fx.Saturation) and _hits(e.imu, index))
+    return min([RANGE, *(e.limit for e in lower)])
+
+
+def _converted(raw: Array, limit: float) -> tuple[Array, NDArray[np.bool_]]:
+    """(n, 3) what the converter makes of it, and (n,) which samples are at the rail."""
+    steps = np.round(raw / RESOLUTION) * RESOLUTION
+    return np.clip(steps, -limit, limit), np.any(np.abs(steps) >= limit, axis=1)
 
 
 def _lever(trajectory: Trajectory, imu: ImuTruth) -> Array:
