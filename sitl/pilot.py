@@ -10,24 +10,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import math
-import random
 from collections.abc import AsyncIterator, Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 from mavsdk.asyncio import Configuration, Mavsdk, MavsdkConnectionError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.logging import log_subscribe
-from mavsdk.plugins.mavlink_direct import MavlinkMessage
 from mavsdk.plugins.param import ParamError
 
 from sitl.errors import SitlError
+from sitl.manoeuvres import GROUND_STATION, Manoeuvres, Plugin, mavlink_message
 
-GROUND_STATION = (255, 190)
-"""MAV_GCS_SYSID: the only one whose stick inputs ArduPilot takes."""
-Plugin: TypeAlias = Any
-"""Objects of MAVSDK, which has no types."""
 ARMED = 128
 ACCEPTED = 0
 SILENCE = 60.0
@@ -40,8 +34,6 @@ ARM_DISARM, TAKE_OFF, SET_MODE, SET_INTERVAL, REBOOT = 400, 22, 176, 511, 246
 INTERVALS = ((30, 50_000), (33, 100_000), (24, 200_000))
 """Messages that it needs, by number, us."""
 REBOOT_TRIES, REBOOT_PAUSE = 60, 1.0
-GUIDED_VELOCITY_AND_YAW = 0b0000_1001_1100_0111
-"""Type mask of SET_POSITION_TARGET_LOCAL_NED: velocity and yaw count, nothing else."""
 
 
 class Pilot:
@@ -51,7 +43,7 @@ class Pilot:
         self.vehicle = vehicle
         self._direct = MavlinkDirectAsync(system)
         self._param = ParamAsync(system)
-        self._random = random.Random(seed)  # noqa: S311 - manoeuvres, not secrets
+        self._manoeuvres = Manoeuvres(self, self._direct, seed=seed)
         self._state: dict[str, dict[str, Any]] = {}
         self._news = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -182,7 +174,7 @@ class Pilot:
         padded = [*parameters, *[0.0] * (7 - len(parameters))]
         fields: dict[str, float] = {f"param{i}": p for i, p in enumerate(padded, start=1)}
         fields |= {"target_system": 1, "target_component": 1, "command": number, "confirmation": 0}
-        message = _message("COMMAND_LONG", fields)
+        message = mavlink_message("COMMAND_LONG", fields)
         acknowledged = await self._direct.send_command(message)
         return int(json.loads(acknowledged.fields_json).get("result", -1)) == ACCEPTED
 
@@ -216,16 +208,12 @@ class Pilot:
         end = self.time + seconds
         if self.vehicle == "plane":
             await self.set_mode("fly by wire")
-        while self.time < end:
-            if self.vehicle == "copter":
-                await self._velocity_step()
-            else:
-                await self._stick_step()
+        await self._manoeuvres.fly(self.vehicle, end)
 
     async def land(self) -> None:
         """Comes down and waits until it has disarmed."""
         if self.vehicle == "copter":
-            await self._set_velocity((0.0, 0.0, 0.0), self.yaw)
+            await self._manoeuvres.set_velocity((0.0, 0.0, 0.0), self.yaw)
             await self.wait(3.0)
         await self.set_mode("land")
         await self._until(lambda: not self.armed or self.standing, "the landing")
@@ -246,7 +234,7 @@ class Pilot:
         fields = {f"param{i}": 1.0 if i == 1 else 0.0 for i in range(1, 8)}
         fields |= {"target_system": 1, "target_component": 1, "command": REBOOT, "confirmation": 0}
         # Not as a command that is waited for: it may be gone before its answer is.
-        await self._direct.send_message(_message("COMMAND_LONG", fields))
+        await self._direct.send_message(mavlink_message("COMMAND_LONG", fields))
         for _ in range(REBOOT_TRIES):
             await asyncio.sleep(REBOOT_PAUSE)
             if self.time < before:
@@ -254,84 +242,11 @@ class Pilot:
             # What was asked for before the reboot is forgotten: nothing tells the time.
             for message, interval_us in INTERVALS:
                 fields |= {"command": SET_INTERVAL, "param1": message, "param2": interval_us}
-                await self._direct.send_message(_message("COMMAND_LONG", fields))
+                await self._direct.send_message(mavlink_message("COMMAND_LONG", fields))
         raise SitlError("waited in vain for the reboot")
-
-    async def _velocity_step(self) -> None:
-        """One velocity and heading for a few seconds, kept within a band of heights."""
-        course = self._random.uniform(-math.pi, math.pi)
-        speed = self._random.uniform(3.0, 9.0)
-        climb = self._random.uniform(-2.0, 2.5)
-        if not 12.0 < self.height + 4.0 * climb < 60.0:
-            climb = -climb
-        velocity = (speed * math.cos(course), speed * math.sin(course), -climb)
-        yaw = self.yaw + self._random.uniform(-2.0, 2.0)
-        end = self.time + self._random.uniform(2.5, 4.5)
-        while self.time < end:  # ArduPilot stops when it hears nothing for 3 s
-            await self._set_velocity(velocity, yaw)
-            await self.wait(0.5)
-
-    async def _set_velocity(self, velocity_n: tuple[float, float, float], yaw: float) -> None:
-        vx, vy, vz = velocity_n
-        fields = {
-            "time_boot_ms": 0,
-            "target_system": 1,
-            "target_component": 1,
-            "coordinate_frame": 1,
-            "type_mask": GUIDED_VELOCITY_AND_YAW,
-            "x": 0.0,
-            "y": 0.0,
-            "z": 0.0,
-            "vx": vx,
-            "vy": vy,
-            "vz": vz,
-            "afx": 0.0,
-            "afy": 0.0,
-            "afz": 0.0,
-            "yaw": math.remainder(yaw, 2.0 * math.pi),
-            "yaw_rate": 0.0,
-        }
-        await self._direct.send_message(_message("SET_POSITION_TARGET_LOCAL_NED", fields))
-
-    async def _stick_step(self) -> None:
-        """One position of the sticks (-1000 ... 1000) for a few seconds."""
-        roll = self._random.choice([-1.0, 1.0]) * self._random.uniform(0.3, 1.0)
-        pitch = self._random.uniform(-1.0, 1.0)
-        if self.height < 60.0:
-            pitch = -abs(pitch)  # stick back: climb
-        if self.height > 150.0:
-            pitch = abs(pitch)
-        rudder = self._random.choice([0.0, 0.0, -0.5, 0.5])
-        throttle = self._random.uniform(0.3, 0.9)
-        end = self.time + self._random.uniform(2.5, 6.0)
-        while self.time < end:
-            await self._sticks(roll, pitch, throttle, rudder)
-            await self.wait(0.4)
-
-    async def _sticks(self, roll: float, pitch: float, throttle: float, rudder: float) -> None:
-        fields = {
-            "target": 1,
-            "x": round(1000 * pitch),
-            "y": round(1000 * roll),
-            "z": round(1000 * throttle),
-            "r": round(1000 * rudder),
-            "buttons": 0,
-        }
-        await self._direct.send_message(_message("MANUAL_CONTROL", fields))
 
 
 def _quiet(level: object, message: str, file: str | None, line: int) -> bool:
     """Keeps MAVSDK's log off the terminal; what matters comes back as results."""
     del level, message, file, line
     return True
-
-
-def _message(name: str, fields: dict[str, Any]) -> Plugin:
-    return MavlinkMessage(
-        message_name=name,
-        system_id=GROUND_STATION[0],
-        component_id=GROUND_STATION[1],
-        target_system_id=1,
-        target_component_id=1,
-        fields_json=json.dumps(fields),
-    )
