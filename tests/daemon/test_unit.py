@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from onboard.daemon.mqtt import limits as mqtt_limits
 from onboard.daemon.process import limits
 
 UNIT = Path(__file__).parents[2] / "systemd" / "onboard.service"
@@ -50,5 +51,7 @@ def test_the_watchdog_and_the_timeouts_fit_the_service():
     assert settings["Type"] == "notify"
     assert settings["StateDirectory"] == "onboard"
     assert float(settings["WatchdogSec"]) > 10.0
-    assert float(settings["TimeoutStopSec"]) > limits.FINISH_PUSH_S + 2.0
+    # One after the other at the worst: the page and the recorder take a second or two besides.
+    farewell = limits.FINISH_PUSH_S + mqtt_limits.FAREWELL_S + limits.SAVE_S
+    assert float(settings["TimeoutStopSec"]) >= farewell + 5.0
     assert settings["RestartPreventExitStatus"] == "2"

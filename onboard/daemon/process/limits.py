@@ -12,7 +12,7 @@ TICK_S: Final = 1.0
 """s between two rounds of judging, saving and telling [service: a thirtieth of WatchdogSec]."""
 FINISH_PUSH_S: Final = 8.0
 """s that a transaction under way gets at shutdown; then it stays open, to be resumed [service:
-inside TimeoutStopSec, with SAVE_S]."""
+with SAVE_S and the broker's farewell inside TimeoutStopSec]."""
 SAVE_S: Final = 5.0
 """s that the learner gets at shutdown for what has come and its last save [service: as before]."""
 STALE_S: Final = 5.0
