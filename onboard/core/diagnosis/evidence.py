@@ -13,6 +13,11 @@ from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.limits import AMBIGUOUS, MARGIN, SIGNIFICANT
+from onboard.core.diagnosis.nuisance_effects import (
+    constant_unknowns,
+    nuisance_kinds,
+    timing_unknowns,
+)
 from onboard.core.diagnosis.plain import plain_six
 from onboard.core.diagnosis.records import (
     Ambiguity,
@@ -27,11 +32,6 @@ from onboard.core.diagnosis.regimes import (
     regime_residuals,
 )
 from onboard.core.diagnosis.selection import Fit
-from onboard.core.diagnosis.standing import (
-    constant_unknowns,
-    standing_kinds,
-    timing_unknowns,
-)
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
@@ -82,11 +82,11 @@ class Judge:
 
     def diagnosis(self) -> Diagnosis:
         """Everything that is said about the recording."""
-        standing = self.final.standing(self.imu)
+        nuisances = self.final.nuisances(self.imu)
         families = self.final.families
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
-        effects = self.findings.made(standing, self.evidence.doubts) + self.excluded
+        effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
         # What was clipped is left out of the fit, and was flown all the same.
         insufficient = not (self.engine.moving or self.calibrator.engine(self.imu).moving)
         mismatch = self._mismatch(before, after, effects, ladder)
@@ -99,7 +99,7 @@ class Judge:
             imu=self.imu,
             verdict=verdict,
             calibration=self.calibration,
-            timing=dict(standing.timing),
+            timing=dict(nuisances.timing),
             mismatch=mismatch,
             effects=tuple(effects),
             ambiguous=self._ambiguous(effects),
@@ -183,7 +183,7 @@ class Judge:
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
             if (
-                e.name in standing_kinds()
+                e.name in nuisance_kinds()
                 and self.final.evidence(e.name, self.final.all)[0] < MARGIN
             ):
                 # It holds only with the antenna where it was told to be.
@@ -193,7 +193,7 @@ class Judge:
                     if k.instead_of == LeverArmError.name
                 ]
         out += [
-            Ambiguity((name, *others), standing_kinds()[name].apart)
+            Ambiguity((name, *others), nuisance_kinds()[name].apart)
             for name, others in self.evidence.doubts.items()
         ]
         return tuple(out)

@@ -23,7 +23,7 @@ from onboard.core.diagnosis.limits import (
     STILL_INCONSISTENT,
     WORTH_A_PASS,
 )
-from onboard.core.diagnosis.standing import attitude_unknowns
+from onboard.core.diagnosis.nuisance_effects import attitude_unknowns
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.solution import Solution, solve

@@ -9,21 +9,21 @@ import numpy as np
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.epochs import Epochs, rms
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.records import Rung, Series
-from onboard.core.diagnosis.regimes import Residuals, axis_of, located
-from onboard.core.diagnosis.selection import Fit, Fitter
-from onboard.core.diagnosis.standing import (
+from onboard.core.diagnosis.nuisance_effects import (
     constant_unknowns,
-    standing_kinds,
+    nuisance_kinds,
     timing_unknowns,
     without,
 )
+from onboard.core.diagnosis.records import Rung, Series
+from onboard.core.diagnosis.regimes import Residuals, axis_of, located
+from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.model.nuisances import LeverArmError
-from onboard.core.physics.effect import Effect, Origin, Standing
+from onboard.core.physics.effect import Effect, NuisanceFit, Origin
 from onboard.core.physics.finding import Where
 
 
@@ -61,9 +61,9 @@ class FinalModel:
         self.all = list(range(engine.model.size))
         self._axes = self._body_axes()
 
-    def standing(self, imu: int) -> Standing:
+    def nuisances(self, imu: int) -> NuisanceFit:
         """The unknowns of every model, as effects measure themselves by them."""
-        return Standing(
+        return NuisanceFit(
             timing=timing_of(self.engine, self.solution),
             theta=self.solution.theta,
             sigma=np.sqrt(np.diag(self.solution.covariance)),
@@ -126,7 +126,7 @@ class FinalModel:
 
     def evidence(self, name: str, among: Sequence[int]) -> tuple[float, float]:
         """Fall of BIC, and of held-out chi-square, by timing or a constant attitude error."""
-        columns = standing_kinds()[name].in_every_model
+        columns = nuisance_kinds()[name].in_every_model
         target = Candidate(name, tuple(self.index[c] for c in columns), ())
         rest = [i for i in among if i not in target.index]
         absent, with_it = self.fitter.fit(rest, self.held(columns)), self.fitter.fit(among)
@@ -167,7 +167,7 @@ class FinalModel:
 
     def places_of(self, names: Collection[str]) -> list[int]:
         """Places of the unknowns of effects; of the calibration parameters where there is none."""
-        standing = standing_kinds().items()
-        out = [self.index[u] for n, k in standing if n in names for u in k.in_every_model]
+        nuisances = nuisance_kinds().items()
+        out = [self.index[u] for n, k in nuisances if n in names for u in k.in_every_model]
         out += self.engine.indices_of([f for f in self.families if f.effect in names])
         return out or list(range(6))

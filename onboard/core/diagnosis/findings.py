@@ -11,12 +11,12 @@ from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
 from onboard.core.diagnosis.limits import HELD_OUT_GAIN, MARGIN, ONSET_S
+from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
-from onboard.core.diagnosis.standing import standing_effects, standing_kinds, without
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
-from onboard.core.physics.effect import Cure, Effect, Standing
+from onboard.core.physics.effect import Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Confounder, Finding, Quantity
 
 
@@ -27,29 +27,29 @@ class Findings:
         """Take the final model, the choice that led to it, and what the choice is counted from."""
         self._final, self._choice, self._full_point = final, choice, full_point
 
-    def made(self, standing: Standing, doubts: Mapping[str, Sequence[str]]) -> list[Finding]:
+    def made(self, nuisances: NuisanceFit, doubts: Mapping[str, Sequence[str]]) -> list[Finding]:
         """Everything that was found in the sums.
 
         Args:
-            standing: the unknowns of every model.
+            nuisances: the unknowns of every model.
             doubts: effects of them that something else could stand for.
         """
         # A name has one effect: what stands beside regressors of its own is their consequence.
         named = {f.effect for f in self._final.families}
         out = [
-            self._standing(name, quantities, cure)
-            for name, (quantities, cure) in standing_effects(standing).items()
+            self._nuisance(name, quantities, cure)
+            for name, (quantities, cure) in nuisance_effects(nuisances).items()
             if name not in doubts and name not in named and self._holds(name)
         ]
         return out + [self._effect(f) for f in self._final.families]
 
-    def _standing(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
+    def _nuisance(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
         final = self._final
-        columns = standing_kinds()[name].in_every_model
+        columns = nuisance_kinds()[name].in_every_model
         index = [final.index[c] for c in columns]
         held = final.held(columns)
         made = self._record(name, quantities, index, held, cure)
-        return replace(made, confounders=self._standing_confounders(name, columns))
+        return replace(made, confounders=self._nuisance_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
         """Whether timing or a constant attitude error is needed, also on data not fitted.
@@ -63,7 +63,7 @@ class Findings:
         )
         return any(bic >= MARGIN and held >= HELD_OUT_GAIN for bic, held in every)
 
-    def _standing_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
+    def _nuisance_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""
         final = self._final
         choice, full = self._choice, self._choice.fitter.model.index

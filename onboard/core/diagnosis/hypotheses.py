@@ -162,7 +162,7 @@ def choose(
     return choice
 
 
-def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> bool:
+def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bool:
     """Whether something else explains what is taken for an effect that is always in the model.
 
     Timing and constant attitude errors are estimated anyway, so they take what they can of a small
@@ -171,18 +171,18 @@ def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> boo
 
     Args:
         choice: what was chosen so far; the other is added to it.
-        standing: the columns in question.
+        nuisances: the columns in question.
         held: (m,) values of what is not in the model.
     """
     fitter = choice.fitter
-    rest = [i for i in choice.free if i not in standing.index]
+    rest = [i for i in choice.free if i not in nuisances.index]
     before = fitter.fit(rest, held)
-    with_it = fitter.fit([*rest, *standing.index], held, held_out=False)
-    own = standing.bic(fitter, before, with_it)
+    with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
+    own = nuisances.bic(fitter, before, with_it)
     better = own
     taken: Candidate | None = None
     for other in choice.candidates:
-        if other in choice.chosen or other.effect == standing.effect:
+        if other in choice.chosen or other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
         bic = other.bic(fitter, before, after)
@@ -195,7 +195,7 @@ def reconsider_standing(choice: Choice, standing: Candidate, held: Array) -> boo
 
 
 def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> list[str]:
-    """Effects beside any one of which a standing unknown would not reach the size of an effect.
+    """Effects beside any one of which a nuisances unknown would not reach the size of an effect.
 
     Args:
         choice: what was chosen.

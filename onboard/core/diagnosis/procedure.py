@@ -21,29 +21,29 @@ from onboard.core.diagnosis.hypotheses import (
     Choice,
     choose,
     doubtful,
-    reconsider_standing,
+    reconsider_nuisance,
 )
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
 from onboard.core.diagnosis.limits import CONTRADICTING, LEAST_BLOCKS, RECONCILED, SUSPECT
+from onboard.core.diagnosis.nuisance_effects import (
+    Measured,
+    attitude_unknowns,
+    nuisance_effects,
+    nuisance_kinds,
+    reduced,
+    without,
+)
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
-from onboard.core.diagnosis.standing import (
-    Measured,
-    attitude_unknowns,
-    reduced,
-    standing_effects,
-    standing_kinds,
-    without,
-)
 from onboard.core.diagnosis.testability import unseen_share
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
-from onboard.core.physics.effect import Effect, Origin, Standing
+from onboard.core.physics.effect import Effect, NuisanceFit, Origin
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -77,9 +77,9 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         other = _chosen(jumped[0].doubting(), jumped[1], kept)
         if _wanders(choice) or _wanders(other):
             full, testable, choice = *jumped, other
-    standing, doubts = _second_thoughts(choice, full, calibrator, imu)
+    nuisances, doubts = _second_thoughts(choice, full, calibrator, imu)
     families = families_of(choice)
-    if "gps_smoothing" in standing and "gps_smoothing" not in doubts:
+    if "gps_smoothing" in nuisances and "gps_smoothing" not in doubts:
         families = [f.averaged() for f in families]
     final, families = settled(full, choice, families, named_only=clear.clipped)
     asked = not clear.clipped
@@ -179,8 +179,8 @@ def _second_thoughts(
     clock = fix_clock(calibrator.parameters, full.batches)
     told = clock.configured_on_stamp
     index = choice.fitter.model.index
-    standing: Measured = {}
-    unknowns = {name: kind.in_every_model for name, kind in standing_kinds().items()}
+    nuisances: Measured = {}
+    unknowns = {name: kind.in_every_model for name, kind in nuisance_kinds().items()}
     for _ in range(len(unknowns)):
         fit = choice.fitter.fit(choice.free, held_out=False)
         solution = Solution(
@@ -191,8 +191,8 @@ def _second_thoughts(
             1.0,
             1.0,
         )
-        standing = standing_effects(
-            Standing(
+        nuisances = nuisance_effects(
+            NuisanceFit(
                 timing=timing_of(full, solution),
                 theta=solution.theta,
                 sigma=np.sqrt(np.diag(solution.covariance)),
@@ -204,18 +204,18 @@ def _second_thoughts(
             )
         )
         taken = False
-        for name in standing:
+        for name in nuisances:
             target = Candidate(name, tuple(index[c] for c in unknowns[name]), ())
             held = without(unknowns[name], index, full.point, choice.fitter.absent, told)
-            taken = taken or reconsider_standing(choice, target, held)
+            taken = taken or reconsider_nuisance(choice, target, held)
         if not taken:
             break
-    timed = [name for name in standing if standing_kinds()[name].least is not None]
-    return set(standing), {n: d for n in timed if (d := _doubts(choice, full, n, told))}
+    timed = [name for name in nuisances if nuisance_kinds()[name].least is not None]
+    return set(nuisances), {n: d for n in timed if (d := _doubts(choice, full, n, told))}
 
 
 def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
     """Other effects beside which one of timing would be too small to mention."""
-    column = choice.fitter.model.index[standing_kinds()[name].in_every_model[0]]
+    column = choice.fitter.model.index[nuisance_kinds()[name].in_every_model[0]]
     start, least = reduced(name, full.point, told)
     return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)

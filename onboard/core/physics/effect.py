@@ -86,7 +86,7 @@ class Cure:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class NuisanceFit:
     """The unknowns of every model as one fit has them.
 
     Attributes:
@@ -207,7 +207,7 @@ class Effect(Family):
         return ""
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:  # noqa: ARG003
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:  # noqa: ARG003
         """Its size and cure by the unknowns of every model; None while too small or not sure."""
         return None
 

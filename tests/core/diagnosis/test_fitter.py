@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.selection import JUMP_SIGMA, OFFSETS, SETTLED_S, Fitter
+from onboard.core.diagnosis.limits import SETTLED_S
+from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model, Unknown
+from onboard.core.physics.effects.bias_step import LARGEST
 from tests.core.diagnosis.problems import BLOCK_S, Columns, Problem, drawn, least_squares
 
 INFLATION = 2.5
@@ -153,7 +155,7 @@ def jumped(problem, boundary):
     after = np.arange(len(problem.y))[:, None, None] >= boundary
     wide = np.concatenate([problem.h, problem.h[..., OFFSETS] * after], axis=-1)
     family = Columns("jump", 0)
-    family.unknowns = tuple(Unknown(f"jump_{i}", "m/s^2", 0.0, JUMP_SIGMA) for i in range(3))
+    family.unknowns = tuple(Unknown(f"jump_{i}", "m/s^2", 0.0, LARGEST) for i in range(3))
     return Problem(Model([*problem.model.families, family]), wide, problem.y)
 
 

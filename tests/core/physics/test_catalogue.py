@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.standing import standing_kinds
+from onboard.core.diagnosis.nuisance_effects import nuisance_kinds
 from onboard.core.inputs.segments import SLOW_SIGNALS
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import ATTITUDE_UNKNOWNS
@@ -93,10 +93,10 @@ def test_its_unknowns_have_names_units_bounds_and_priors(kind):
 
 def test_those_of_every_model_know_what_nothing_is():
     point = Linearisation(delay=0.1, window=0.2, attitude_delay=0.03, heading=0.04)
-    for kind in standing_kinds().values():
+    for kind in nuisance_kinds().values():
         absent = kind.absent(point, told=0.1)
         assert set(absent) == set(kind.in_every_model)
-    attitude = {u for kind in standing_kinds().values() for u in kind.in_every_model}
+    attitude = {u for kind in nuisance_kinds().values() for u in kind.in_every_model}
     assert attitude & ATTITUDE_UNKNOWNS == ATTITUDE_UNKNOWNS
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, Standing
+from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import first, measured
 
@@ -27,14 +27,14 @@ class GpsLatency(Effect):
     least: ClassVar[float] = 0.05
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """The whole delay, where it is another one than the autopilot was told."""
-        delay = standing.timing["gps_delay_s"]
-        off = abs(delay.value - standing.clock.configured_on_stamp)
+        delay = nuisances.timing["gps_delay_s"]
+        off = abs(delay.value - nuisances.clock.configured_on_stamp)
         if off <= cls.least or off <= SURE * delay.sigma:
             return None
         size = {"delay": Quantity(delay.value, delay.sigma, "s")}
-        return size, cls._cured_by(delay.value, standing.clock)
+        return size, cls._cured_by(delay.value, nuisances.clock)
 
     @classmethod
     def absent(cls, point: Linearisation, told: float) -> dict[str, float]:

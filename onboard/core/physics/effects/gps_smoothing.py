@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, Standing
+from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import first, measured
 
@@ -29,9 +29,9 @@ class GpsSmoothing(Effect):
     least: ClassVar[float] = 0.15
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """The span, where it is longer than most receivers'."""
-        window = standing.timing["gps_smoothing_window_s"]
+        window = nuisances.timing["gps_smoothing_window_s"]
         if window.value <= cls.least or window.value <= SURE * window.sigma:
             return None
         return {"window": Quantity(window.value, window.sigma, "s")}, Cure(cls.cure)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, Standing
+from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import DEGREE, first, measured
 
@@ -33,11 +33,11 @@ class HeadingError(Effect):
     in_every_model: ClassVar[tuple[str, ...]] = ("heading",)
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """By how much the recorded yaw is too large."""
-        at = standing.index["heading"]
-        heading = standing.point.heading + float(standing.theta[at])
-        sigma = float(np.hypot(standing.sigma[at], EKF_SIGMA_RAD))
+        at = nuisances.index["heading"]
+        heading = nuisances.point.heading + float(nuisances.theta[at])
+        sigma = float(np.hypot(nuisances.sigma[at], EKF_SIGMA_RAD))
         if abs(heading) <= LEAST_RAD or abs(heading) <= SURE * sigma:
             return None
         return {"yaw": Quantity(heading, sigma, "rad")}, Cure(cls.cure)

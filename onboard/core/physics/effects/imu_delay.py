@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, Standing
+from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import first, measured
 
@@ -27,9 +27,9 @@ class ImuDelay(Effect):
     least: ClassVar[float] = 0.03
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """The delay, late attitude positive."""
-        lag = standing.timing["imu_delay_s"]
+        lag = nuisances.timing["imu_delay_s"]
         if abs(lag.value) <= cls.least or abs(lag.value) <= SURE * lag.sigma:
             return None
         return {"delay": Quantity(lag.value, lag.sigma, "s")}, Cure(cls.cure)

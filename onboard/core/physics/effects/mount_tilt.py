@@ -42,7 +42,7 @@ from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.regressors import Unknown
-from onboard.core.physics.effect import SURE, Bearing, Cure, Origin, Standing
+from onboard.core.physics.effect import SURE, Bearing, Cure, NuisanceFit, Origin
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.proportional import Proportional
 from onboard.core.physics.wording import DEGREE, each
@@ -105,13 +105,13 @@ class MountTilt(Proportional):
         return np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
 
     @classmethod
-    def measured(cls, standing: Standing) -> tuple[dict[str, Quantity], Cure] | None:
+    def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """The constant error of the recorded attitude, as it is and as it is reported."""
-        at = [standing.index[name] for name in cls.in_every_model]
-        tilt = standing.theta[at]
-        sigma = np.hypot(standing.sigma[at], EKF_SIGMA_RAD)
+        at = [nuisances.index[name] for name in cls.in_every_model]
+        tilt = nuisances.theta[at]
+        sigma = np.hypot(nuisances.sigma[at], EKF_SIGMA_RAD)
         # As it is reported: a trim that makes it right again is its cure, whatever was meant by it.
-        reported = tilt - np.array(standing.parameters.trim[:2])
+        reported = tilt - np.array(nuisances.parameters.trim[:2])
         if min(np.hypot(*tilt), np.hypot(*reported)) <= LEAST_RAD:
             return None
         if float(np.max(np.abs(tilt) / sigma)) <= SURE:
@@ -120,7 +120,7 @@ class MountTilt(Proportional):
             key: Quantity(float(value), float(s), "rad")
             for key, value, s in zip(cls.keys, tilt, sigma, strict=True)
         }
-        return size, attitude_cure(tilt, standing.theta[:6], standing.parameters, standing.imu)
+        return size, attitude_cure(tilt, nuisances.theta[:6], nuisances.parameters, nuisances.imu)
 
     def cured(self, values: Mapping[str, float]) -> Cure:
         """To leave AHRS_TRIM alone, or to take out of it what was put there for this tilt.

@@ -14,39 +14,39 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import ATTITUDE_UNKNOWNS
 from onboard.core.physics.catalogue import kinds
-from onboard.core.physics.effect import Cure, Effect, Standing
+from onboard.core.physics.effect import Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Quantity
 
 Measured = dict[str, tuple[dict[str, Quantity], Cure]]
 
 
 @cache
-def standing_kinds() -> dict[str, type[Effect]]:
+def nuisance_kinds() -> dict[str, type[Effect]]:
     """Effects whose unknowns are in every model, by name, in the order of the catalogue."""
     return {kind.effect: kind for kind in kinds() if kind.in_every_model}
 
 
 def timing_unknowns() -> list[str]:
     """Unknowns of the timing that are effects from a size on."""
-    return [u for k in standing_kinds().values() if k.least is not None for u in k.in_every_model]
+    return [u for k in nuisance_kinds().values() if k.least is not None for u in k.in_every_model]
 
 
 def attitude_unknowns() -> list[str]:
     """Unknowns of the recorded attitude that are effects from a size on."""
     return [
-        u for k in standing_kinds().values() for u in k.in_every_model if u in ATTITUDE_UNKNOWNS
+        u for k in nuisance_kinds().values() for u in k.in_every_model if u in ATTITUDE_UNKNOWNS
     ]
 
 
 def constant_unknowns() -> list[str]:
     """Unknowns that are effects from a size on and no timing."""
     timing = set(timing_unknowns())
-    return [u for k in standing_kinds().values() for u in k.in_every_model if u not in timing]
+    return [u for k in nuisance_kinds().values() for u in k.in_every_model if u not in timing]
 
 
-def standing_effects(standing: Standing) -> Measured:
+def nuisance_effects(nuisances: NuisanceFit) -> Measured:
     """Effects that are always in the model, and large enough and sure enough to report."""
-    measured = {name: kind.measured(standing) for name, kind in standing_kinds().items()}
+    measured = {name: kind.measured(nuisances) for name, kind in nuisance_kinds().items()}
     return {name: found for name, found in measured.items() if found is not None}
 
 
@@ -69,7 +69,7 @@ def without(
     at = absent.copy()
     values = {
         unknown: value
-        for kind in standing_kinds().values()
+        for kind in nuisance_kinds().values()
         for unknown, value in kind.absent(point, told).items()
     }
     for name in names:
@@ -92,7 +92,7 @@ def reduced(name: str, point: Linearisation, told: float) -> tuple[float, float]
     Raises:
         ValueError: that effect is no timing.
     """
-    kind = standing_kinds()[name]
+    kind = nuisance_kinds()[name]
     if kind.least is None:
         raise ValueError(f"{name} has no least size")
     unknown = kind.in_every_model[0]

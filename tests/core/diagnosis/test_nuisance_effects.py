@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.standing import (
+from onboard.core.diagnosis.nuisance_effects import (
     attitude_unknowns,
     constant_unknowns,
+    nuisance_effects,
+    nuisance_kinds,
     reduced,
-    standing_effects,
-    standing_kinds,
     timing_unknowns,
     without,
 )
@@ -16,7 +16,7 @@ from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.result import Estimate
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.physics.effect import SURE, Standing
+from onboard.core.physics.effect import SURE, NuisanceFit
 from onboard.core.physics.effects.heading_error import EKF_SIGMA_RAD as HEADING_SIGMA
 from onboard.core.physics.effects.heading_error import LEAST_RAD as LEAST_HEADING
 from onboard.core.physics.effects.mount_tilt import EKF_SIGMA_RAD as TILT_SIGMA
@@ -33,7 +33,7 @@ POINT = Linearisation(delay=0.13, window=0.2, attitude_delay=0.011, heading=0.03
 TOLD = 0.1
 
 
-def standing(
+def nuisances(
     *,
     delay=(TOLD, SURELY),
     window=(0.0, SURELY),
@@ -51,7 +51,7 @@ def standing(
     sigma[INDEX["heading"]] = heading[1]
     for name, value in zip(("tilt_roll", "tilt_pitch"), tilt[0], strict=True):
         theta[INDEX[name]], sigma[INDEX[name]] = value, tilt[1]
-    return Standing(
+    return NuisanceFit(
         timing={
             "gps_delay_s": Estimate(*delay),
             "gps_smoothing_window_s": Estimate(*window),
@@ -68,24 +68,24 @@ def standing(
 
 
 def found(**numbers):
-    return standing_effects(standing(**numbers))
+    return nuisance_effects(nuisances(**numbers))
 
 
 LEAST = {
-    "gps_latency": ("delay", standing_kinds()["gps_latency"].least, TOLD),
-    "gps_smoothing": ("window", standing_kinds()["gps_smoothing"].least, 0.0),
-    "imu_delay": ("lag", standing_kinds()["imu_delay"].least, 0.0),
+    "gps_latency": ("delay", nuisance_kinds()["gps_latency"].least, TOLD),
+    "gps_smoothing": ("window", nuisance_kinds()["gps_smoothing"].least, 0.0),
+    "imu_delay": ("lag", nuisance_kinds()["imu_delay"].least, 0.0),
     "heading_error": ("heading", LEAST_HEADING, 0.0),
 }
 """Effects: their number, the size from which it counts, and what it is counted from."""
 
 
 def test_these_are_all():
-    assert set(standing_kinds()) == {*LEAST, "mount_tilt"}
+    assert set(nuisance_kinds()) == {*LEAST, "mount_tilt"}
     assert sorted(timing_unknowns()) == ["attitude_delay", "gps_delay", "window_squared"]
     assert sorted(attitude_unknowns()) == ["attitude_delay", "heading", "tilt_pitch", "tilt_roll"]
     assert sorted(constant_unknowns()) == ["heading", "tilt_pitch", "tilt_roll"]
-    every = {u for kind in standing_kinds().values() for u in kind.in_every_model}
+    every = {u for kind in nuisance_kinds().values() for u in kind.in_every_model}
     assert every == {*timing_unknowns(), *constant_unknowns()}
 
 
