@@ -7,10 +7,6 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.hypotheses import (
-    CHANCE,
-    MARGIN,
-    MOST_EFFECTS,
-    SIGNIFICANT,
     Candidate,
     Choice,
     accepted,
@@ -18,6 +14,7 @@ from onboard.core.diagnosis.hypotheses import (
     confounders_of,
     reconciles,
 )
+from onboard.core.diagnosis.limits import CHANCE, MARGIN, MOST_EFFECTS, SIGNIFICANT
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
 
 WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.selection import JUMP_SIGMA, OFFSETS, SETTLED_S, Fitter
+from onboard.core.diagnosis.limits import SETTLED_S
+from onboard.core.diagnosis.selection import JUMP_SIGMA, OFFSETS, Fitter
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
