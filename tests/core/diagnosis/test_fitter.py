@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.limits import SETTLED_S
-from onboard.core.diagnosis.selection import JUMP_SIGMA, OFFSETS, Fitter
+from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model, Unknown
+from onboard.core.physics.effects.bias_step import LARGEST
 from tests.core.diagnosis.problems import BLOCK_S, Columns, Problem, drawn, least_squares
 
 INFLATION = 2.5
+JUMP_SIGMA = LARGEST
 
 
 @pytest.fixture
