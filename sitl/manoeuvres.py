@@ -88,9 +88,7 @@ class Manoeuvres:
             "yaw": math.remainder(yaw, 2.0 * math.pi),
             "yaw_rate": 0.0,
         }
-        await self._direct.sendmavlink_message(
-            mavlink_message("SET_POSITION_TARGET_LOCAL_NED", fields)
-        )
+        await self._direct.send_message(mavlink_message("SET_POSITION_TARGET_LOCAL_NED", fields))
 
     async def _stick_step(self) -> None:
         """One position of the sticks (-1000 ... 1000) for a few seconds."""
@@ -116,7 +114,7 @@ class Manoeuvres:
             "r": round(1000 * rudder),
             "buttons": 0,
         }
-        await self._direct.sendmavlink_message(mavlink_message("MANUAL_CONTROL", fields))
+        await self._direct.send_message(mavlink_message("MANUAL_CONTROL", fields))
 
 
 def mavlink_message(name: str, fields: dict[str, Any]) -> Plugin:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.clipping import FEWEST_CLIPPED, saturation_effect
+from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.limits import FEWEST_CLIPPED
 from tests.core.diagnosis.flights import G, batches, flown, resting
 
 T0 = 100.0

@@ -14,6 +14,7 @@ from onboard.core.physics.effects.bias_step import LARGEST
 from tests.core.diagnosis.problems import BLOCK_S, Columns, Problem, drawn, least_squares
 
 INFLATION = 2.5
+JUMP_SIGMA = LARGEST
 
 
 @pytest.fixture

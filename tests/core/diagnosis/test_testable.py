@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis import testability
-from onboard.core.diagnosis.testability import LEAST_SPREAD
+from onboard.core.diagnosis.limits import LEAST_SPREAD
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from tests.core.diagnosis.flights import batches, resting
