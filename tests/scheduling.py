@@ -5,12 +5,13 @@ from __future__ import annotations
 from xdist.scheduler import LoadFileScheduling
 
 SHARED = {
+    "tests/cli/test_replay_verb.py": "explained recordings",
     "tests/core/diagnosis/test_diagnosis.py": "explained recordings",
     "tests/report/test_one_answer.py": "explained recordings",
     "tests/report/test_recorded_advice.py": "explained recordings",
     "tests/report/test_report_page.py": "explained recordings",
 }
-"""Files that ask :func:`tests.explained.explained` for the same recordings."""
+"""Files that ask :mod:`tests.explained` for the same recordings."""
 
 
 class SharedWork(LoadFileScheduling):

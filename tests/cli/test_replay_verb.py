@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from onboard.cli.main import run
+from tests.explained import replayed
 from tests.recordings.dataflash_writer import modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
 
@@ -13,7 +14,7 @@ from tests.recordings.telemetry_writer import px4_log, telemetry
 @pytest.fixture
 def log(tmp_path) -> Path:
     path = tmp_path / "short.BIN"
-    path.write_bytes(bytes(modern_log(20)))
+    path.write_bytes(bytes(modern_log(6)))
     return path
 
 
@@ -109,13 +110,12 @@ def test_a_cut_log_is_read_and_the_damage_told(log, capsys):
 
 
 @pytest.fixture(scope="module")
-def c01(recordings, tmp_path_factory):
+def c01(recordings):
     """One flight as its two recordings tell it, and its truth."""
     told = []
     for name in ("c01.tlog", "c01.BIN"):
-        out = tmp_path_factory.mktemp("c01") / "out.json"
-        assert run(["replay", str(recordings / "sitl" / name), "--json", str(out)]) == 0
-        told.append(json.loads(out.read_text())["imus"])
+        document = replayed(recordings / "sitl" / name).document()
+        told.append(json.loads(document.to_json())["imus"])
     answers = json.loads((recordings / "sitl/answers.json").read_text())
     return told, answers["recordings"]["c01"]
 

@@ -16,7 +16,7 @@ TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
 def replayed(tmp_path, *hidden, **about):
     """The answer to a flight, and its recording."""
     spec = FlightSpec(
-        **{"vehicle": "plane", "duration": 200.0, "imus": (TRUE,), "effects": hidden, "seed": 3}
+        **{"vehicle": "plane", "duration": 120.0, "imus": (TRUE,), "effects": hidden, "seed": 3}
         | about
     )
     path = tmp_path / "flight.tlog"
@@ -53,7 +53,9 @@ def test_an_untold_antenna_spoils_nothing(tmp_path):
 
 @pytest.mark.slow
 def test_axes_that_are_not_square_are_taken_into_account(tmp_path):
-    given, _ = replayed(tmp_path, effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05))
+    given, _ = replayed(
+        tmp_path, effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05), duration=200.0
+    )
     assert given.calibration.status is Status.CALIBRATED
     assert off(given.calibration).max() < min(4.0, plain_off(given).max())
     assert "cross_axis" in given.calibration.note
@@ -63,7 +65,7 @@ def test_axes_that_are_not_square_are_taken_into_account(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden",
-    [effects.BiasStep(time=110.0, x=0.4, y=-0.3, z=0.3), effects.BiasRamp(x=3e-3, y=-2e-3, z=2e-3)],
+    [effects.BiasStep(time=65.0, x=0.4, y=-0.3, z=0.3), effects.BiasRamp(x=3e-3, y=-2e-3, z=2e-3)],
     ids=["step", "ramp"],
 )
 def test_what_is_no_one_number_is_not_called_calibrated(tmp_path, hidden):

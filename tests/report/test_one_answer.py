@@ -11,11 +11,11 @@ import pytest
 from onboard.answers.answer import answer
 from onboard.answers.explain import explain
 from onboard.answers.recorded import Recorded
-from onboard.answers.replay import read, replay
+from onboard.answers.replay import read
 from onboard.cli.main import run
 from sitl.builtin import effects
 from sitl.recording import FlightSpec, write_tlog
-from tests.explained import explained
+from tests.explained import explained, replayed
 from tests.report.test_answer import TRUE
 
 OTHER = type(TRUE)(scale=(0.99, 1.01, 0.985), offset=(-0.1, 0.15, 0.2))
@@ -84,6 +84,6 @@ RECORDINGS = ("sitl/c01.BIN", "real/real-fixedwing-03.BIN")  # streams are simul
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_recordings_have_one_answer(recordings, name):
-    theirs = replay([recordings / name], Recorded()).answers[0]
+    theirs = replayed(recordings / name).answers[0]
     ours = explained(recordings / name).answer
     assert repr(ours.calibration) == repr(theirs.calibration)  # what is no number is equal, too

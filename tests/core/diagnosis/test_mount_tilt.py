@@ -26,7 +26,7 @@ MISTAKEN = {"AHRS_TRIM_X": -0.03, "AHRS_TRIM_Y": 0.024}
 def spec(*effects, **parameters):
     return FlightSpec(
         vehicle="copter",
-        duration=150.0,
+        duration=110.0,
         seed=3,
         imus=(ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3)),),
         gps=GpsTruth(delay=0.04),
@@ -64,7 +64,7 @@ def attitude_error(flown):
     off = []
     for _, message in flight.messages:
         t = getattr(message, "time_boot_ms", 0) * 1e-3
-        if message.get_type() == "ATTITUDE" and 60.0 < t < 140.0:
+        if message.get_type() == "ATTITUDE" and 55.0 < t < 105.0:
             true = rotation.one_to_euler(flying.trajectory.R_nb[flying.index(t)])
             off.append([message.roll - true[0], message.pitch - true[1]])
     return np.mean(off, axis=0)
@@ -86,11 +86,6 @@ def test_an_accelerometer_turned_against_its_gyroscope_is_no_reason_for_a_trim()
     # And it is so: the reported attitude is right, and a trim would turn it.
     assert np.abs(attitude_error(flown)).max() < 0.01
     assert np.abs(attitude_error(spec(TURNED, **MISTAKEN))).max() > 0.02
-
-
-@pytest.mark.slow
-def test_after_the_sensor_is_replaced_the_next_flight_is_clean():
-    assert diagnosed(spec()).effects == ()
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def complaining(health, begin, end):
     return replace(health, flags=EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0))
 
 
-def flagged(seed, gps, complaint, *effects, duration=200.0):
+def flagged(seed, gps, complaint, *effects, duration=140.0):
     """Diagnosed with an EKF that complains of GPS from and to the times of ``complaint``, s."""
     spec = FlightSpec(
         vehicle="copter",
@@ -53,8 +53,8 @@ def flagged(seed, gps, complaint, *effects, duration=200.0):
 
 @pytest.mark.slow
 def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
-    fault = concealed.GpsFault(start=90.0, end=123.0, north=1.2, east=-0.9)
-    said, first = flagged(70, NOISY, (91.0, 128.0), fault)
+    fault = concealed.GpsFault(start=60.0, end=93.0, north=1.2, east=-0.9)
+    said, first = flagged(70, NOISY, (61.0, 98.0), fault)
     assert said.verdict is Verdict.EXPLAINED
     (effect,) = said.effects
     assert effect.name == "gps_fault"
@@ -70,10 +70,10 @@ def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
 
 @pytest.mark.slow
 def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_clean():
-    said, first = flagged(41, PROMPT, (70.0, 90.0), duration=150.0)
+    said, first = flagged(41, PROMPT, (60.0, 75.0), duration=110.0)
     assert said.verdict is Verdict.CLEAN
     (unused,) = said.unused
-    assert unused.start_s + first == pytest.approx(70.0, abs=1.0)
+    assert unused.start_s + first == pytest.approx(60.0, abs=1.0)
     assert unused.contradicted is False
     assert "where GPS was believed" in headline(said)
     (sentence,) = unused_in_words(said)

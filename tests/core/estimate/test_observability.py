@@ -74,10 +74,11 @@ def test_axes_that_were_not_excited_are_named_one_by_one():
     assert "to both sides" in result.weak[1].advice
 
 
-@pytest.mark.slow
 def test_each_kind_of_vehicle_is_told_what_it_can_do():
+    known = information(flight(1_000_000, 3, 0.01, 3))
+
     def advised(kind):
-        return assess(information(flight(1_000_000, 3, 0.01, 3)), kind=kind).coverage.advice
+        return assess(known, kind=kind).coverage.advice
 
     assert "sideslip" in advised("plane")
     for kind in ("copter", "rover", "boat", "", "submarine"):
