@@ -38,12 +38,12 @@ def truth_of(record, first_sample):
             }
         case "cross_axis":
             return {"xy": 0.03, "xz": 0.0, "yx": 0.0, "yz": 0.0, "zx": 0.0, "zy": 0.02}
-        case "imu_delay":
-            return {"delay": record["delay_s"]}
+        case "scale_nonlinearity":
+            return dict(zip("xyz", record["per_g"], strict=True))
     raise AssertionError(record)
 
 
-@pytest.mark.parametrize("name", ["a03", "b04", "i01", "i03", "i04"])
+@pytest.mark.parametrize("name", ["a03", "b04", "i01", "i03", "i05"])
 def test_the_concealed_effect_is_named_and_measured(recordings, answers, name):
     got, first = diagnosed(recordings, name)
     (record,) = answers[name]["effects"]
@@ -59,6 +59,6 @@ def test_the_concealed_effect_is_named_and_measured(recordings, answers, name):
 
 
 def test_a_clean_recording_comes_out_clean(recordings):
-    got, _ = diagnosed(recordings, "a05")
+    got, _ = diagnosed(recordings, "a01")
     assert got.verdict is Verdict.CLEAN, [e.name for e in got.effects]
     assert got.effects == ()

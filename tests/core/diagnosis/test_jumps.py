@@ -6,6 +6,7 @@ import pytest
 from benchmarks.explaining import heard
 from onboard.core.diagnosis import jumps
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.testability import testable_of
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -18,18 +19,19 @@ AT = 70.0
 
 @pytest.fixture(scope="module", params=["copter", "plane"])
 def full(request):
-    """A flight of 220 s whose offsets jump at :data:`AT`, with the columns of the catalogue."""
+    """A flight of 160 s whose offsets jump at :data:`AT`, with the columns of the catalogue."""
     spec = FlightSpec(
         vehicle=request.param,
         seed=5,
-        duration=220.0,
+        duration=160.0,
         imus=random_imus(5),
         effects=(concealed.BiasStep(time=AT, x=0.15, y=-0.1, z=0.08),),
     )
     calibrator = heard(spec)
     t0 = calibrator.first_sample
     engine = calibrator.engine(1)
-    return Examination(engine, catalogue(Origin(t0)), t0=t0, batches=engine.batches).with_noise()
+    testable, _ = testable_of(catalogue(Origin(t0)), engine.batches)
+    return Examination(engine, testable, t0=t0, batches=engine.batches).with_noise()
 
 
 def gains(full, times):

@@ -37,6 +37,7 @@ def diagnosed(vehicle, seed, *effects, duration=110.0, imus=None, gps=PROMPT):
     return said, calibrator.first_sample
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is_hidden():
     said, _ = diagnosed("copter", 41)
     assert said.verdict is Verdict.CLEAN
