@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
-from onboard.core.diagnosis import jumps
+from onboard.core.diagnosis import jumps, testability
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.testability import testable_of
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -30,7 +29,7 @@ def full(request):
     calibrator = heard(spec)
     t0 = calibrator.first_sample
     engine = calibrator.engine(1)
-    testable, _ = testable_of(catalogue(Origin(t0)), engine.batches)
+    testable, _ = testability.testable_of(catalogue(Origin(t0)), engine.batches)
     return Examination(engine, testable, t0=t0, batches=engine.batches).with_noise()
 
 
@@ -53,4 +52,4 @@ def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeyp
 def test_it_is_found_to_the_second(full):
     begun = full.point.skew_from  # the first sample, on the ground
     found = jumps.jump_near(full, (), begun + AT + 30.0)
-    assert found.at - begun == pytest.approx(AT, abs=1.5)
+    assert found.moment - begun == pytest.approx(AT, abs=1.5)
