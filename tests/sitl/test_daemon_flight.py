@@ -13,7 +13,7 @@ from tests.daemon.daemons import running, until
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 TRUTH = np.array(SCALE + OFFSET)
 SIX = parameter_names(1).six
-FLIGHT_S = 200.0
+FLIGHT_S = 140.0
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from tests.daemon import daemons
 
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 SIX = parameter_names(1).six
-FLIGHT_S = 150.0
+FLIGHT_S = 110.0
 LONG_S = 3600.0
 
 
