@@ -24,7 +24,7 @@ SETTINGS = CalibratorSettings(refine=False, buffer_s=60.0)
 @pytest.fixture(scope="module")
 def flight():
     decoder, out = Decoder(1, 1), []
-    for _, message in fly_messages(FlightSpec(vehicle="copter", duration=110.0, imus=TWO)):
+    for _, message in fly_messages(FlightSpec(vehicle="copter", duration=85.0, imus=TWO)):
         out += decoder.decode(message)
     told = [s for s in out if isinstance(s, ParameterValue)]
     return told + [s for s in out if not isinstance(s, ParameterValue)]

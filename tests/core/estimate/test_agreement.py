@@ -66,7 +66,7 @@ def test_a_second_flight_of_the_same_board_adds_up(saved):
 
 @pytest.mark.parametrize("imu", [OURS, ANOTHER])
 def test_a_hop_that_would_not_notice_another_sensor_confirms_nothing(saved, imu):
-    flight = samples(imu, seed=4)
+    flight = samples(imu, seed=4, duration=50.0)
     took_off = next(s.t for s in flight if isinstance(s, ImuSample) and s.f_b[2] < -10.5)
     hop = [s for s in flight if s.t is None or s.t < took_off + 12.0]
     got = flown(hop, saved)
