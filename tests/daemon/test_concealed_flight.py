@@ -13,7 +13,7 @@ from tests.daemon.daemons import until
 from tests.daemon.flights import TRUE_SIX, GroundStation, flying, six
 
 ANTENNA = (0.3, 0.2, -0.2)
-FLIGHT_S = 240.0
+FLIGHT_S = 160.0
 SPEEDUP = 15.0
 WARMING = TemperatureDrift(x=0.01, y=-0.008, z=0.01)
 """Nobody sends its temperature: it shows as a ramp."""

@@ -43,7 +43,7 @@ def assert_true(got, truth, vehicle):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["a02", "a07", "b01", "b06"])
+@pytest.mark.parametrize("name", ["a07", "b01"])
 def test_stream_gives_the_truth(recordings, answers, name):
     truth = answers[name]
     got = calibrated(recordings / "sitl" / f"{name}.tlog").calibration(1)
