@@ -13,7 +13,7 @@ from tests.daemon import daemons
 
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 SIX = parameter_names(1).six
-FLIGHT_S = 110.0
+FLIGHT_S = {"builtin": 110.0, "ardupilot": 150.0}
 LONG_S = 3600.0
 
 
@@ -50,7 +50,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
         async with daemons.running(document(sitl, tmp_path, disarmed_s=LONG_S)) as service:
             await daemons.until(lambda: service.snapshot().parameters.keys() >= set(SIX))
-            await sitl.fly(FLIGHT_S)
+            await sitl.fly(FLIGHT_S[kind])
             await sitl.land()
             await sitl.set_parameter("SIM_SPEEDUP", 1.0)  # nothing to see any more, much to compute
             await daemons.until(
@@ -87,7 +87,7 @@ async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, tmp_path)
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
         async with daemons.running(document(sitl, tmp_path, disarmed_s=0.0)) as service:
             await daemons.until(lambda: service.snapshot().parameters.keys() >= set(SIX))
-            await sitl.fly(FLIGHT_S)
+            await sitl.fly(FLIGHT_S[kind])
             await sitl.land()
             await sitl.set_parameter("SIM_SPEEDUP", 1.0)
             states = {"writing", "settling", "verifying"}
