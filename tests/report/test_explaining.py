@@ -54,6 +54,7 @@ def test_the_second_is_diagnosed_as_if_all_had_been_read(write):
     np.testing.assert_array_equal(ours.diagnosis.calibration.offset, theirs.calibration.offset)
 
 
+@pytest.mark.slow
 def test_without_the_first_the_second_is_diagnosed(write):
     result = explain([write("RAW_IMU", "HIGHRES_IMU")])
     assert result.imu == 2

@@ -102,6 +102,7 @@ def test_without_process_noise_windows_add_up_as_in_the_criterion_of_the_paper()
     np.testing.assert_allclose(N_whitened, N_literal, rtol=0.0, atol=1e-6 * np.abs(N_literal).max())
 
 
+@pytest.mark.slow
 def test_what_a_fit_leaves_is_chi_square():
     noise, rng = 0.1, np.random.default_rng(5)
     t = np.arange(0.0, 201.0, 5e-3)
@@ -215,6 +216,7 @@ def white():
     return [rows_of_its_own_model(seed, 500) for seed in range(4)]
 
 
+@pytest.mark.slow
 def test_rows_have_unit_variance(white):
     y = np.vstack(white)
     n = len(y)
@@ -222,6 +224,7 @@ def test_rows_have_unit_variance(white):
     assert abs(np.mean(y**2) - 1.0) < 4.5 * np.sqrt(2.0 / y.size)
 
 
+@pytest.mark.slow
 def test_rows_are_independent(white):
     n = sum(map(len, white))
     for lag in (0, 1, 2, 5, 20):
