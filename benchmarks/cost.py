@@ -61,7 +61,7 @@ def by_columns(samples: list[Sample]) -> list[str]:
     """Lines on the same pass with more and more unknowns."""
     batches = _seconds(samples, ONCE)[1].engine(1).batches
     epochs = sum(len(c.fixes) for c in batches)
-    families = [f for f in catalogue(Origin(batches[0].fixes.t[0])) if not f.needs]
+    families = [f for f in catalogue(Origin(batches[0].fixes.t[0])) if f.unknowns and not f.needs]
     out, least = [], 0.0
     for count in (0, 2, len(families)):
         spent = []
