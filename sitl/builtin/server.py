@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol, cast
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
@@ -157,7 +158,7 @@ class Server:
         """Sends what is in the outboxes."""
         for client in self._clients:
             for frame in client.frames():
-                self._carry(lambda f=frame, c=client: c.send(f))  # type: ignore[misc]
+                self._carry(partial(client.send, frame))
 
     def _listen(self) -> None:
         """Takes what has come in, and what else is asked for."""

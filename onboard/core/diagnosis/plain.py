@@ -17,6 +17,7 @@ from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibration_record import six_covariance
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.accelerometer import parameters_of
+from onboard.core.maths.arrays import vector3
 from onboard.core.maths.blocks import Block
 from onboard.core.physics.effect import Effect
 
@@ -49,6 +50,6 @@ def plain_six(final: Examination, families: Sequence[Effect]) -> Plain:
     value = parameters_of(solution.theta)
     sigma = np.sqrt(np.diag(six_covariance(solution)))
     return Plain(
-        tuple(float(x) for x in value),  # type: ignore[arg-type] # six by construction
-        tuple(float(x) for x in sigma),  # type: ignore[arg-type] # six by construction
+        (*vector3(value[:3]), *vector3(value[3:])),
+        (*vector3(sigma[:3]), *vector3(sigma[3:])),
     )

@@ -11,7 +11,7 @@ from onboard.core.estimate.limits import (
     LONGEST_WINDOW_S,
 )
 from onboard.core.estimate.observability import Needs
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, vector3
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import (
     AttitudeOffset,
@@ -72,8 +72,8 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
     i = model.index
     square = point.window**2 + theta[i["window_squared"]]
     return Linearisation(
-        scale=tuple(float(x) for x in theta[0:3]),  # type: ignore[arg-type] # three by construction
-        beta=tuple(float(x) for x in theta[3:6]),  # type: ignore[arg-type] # three by construction
+        scale=vector3(theta[0:3]),
+        beta=vector3(theta[3:6]),
         delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
         window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
         attitude_delay=float(

@@ -34,7 +34,7 @@ from onboard.core.estimate.solution import Solution, fitted_rms, held_out
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
-from onboard.core.maths.arrays import Array, Vector3
+from onboard.core.maths.arrays import Array, vector3
 
 
 def calibration_of(
@@ -73,10 +73,10 @@ def calibration_of(
     return Calibration(
         imu=imu,
         status=status,
-        scale=_three(value[:3]),
-        offset=_three(value[3:]),
-        scale_sigma=_three(sigma[:3]),
-        offset_sigma=_three(sigma[3:]),
+        scale=vector3(value[:3]),
+        offset=vector3(value[3:]),
+        scale_sigma=vector3(sigma[:3]),
+        offset_sigma=vector3(sigma[3:]),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
         observable=seen.observed,
         note=note,
@@ -226,7 +226,3 @@ def _temperature(engine: Engine) -> Estimate | None:
         return None
     every = np.concatenate(values)
     return Estimate(float(every.mean()), float(every.std()))
-
-
-def _three(x: Array) -> Vector3:
-    return (float(x[0]), float(x[1]), float(x[2]))

@@ -56,6 +56,11 @@ order [physics]."""
 SYMMETRY_UPDATES: Final = 16
 """Updates after which the covariance is made symmetric again: rounding drifts slowly [cost]."""
 
+EAGER_EPOCHS: Final = 60
+"""While so few epochs are in, the running estimate is solved anew after each [cost]."""
+LAZY_EPOCHS: Final = 5
+"""Later after each so many: it moves no more within half a second [cost]."""
+
 # Correlation times of Gauss-Markov errors (noise).
 
 COLOUR_TIME_S: Final = 3.0

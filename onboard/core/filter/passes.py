@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import WhitenedInnovations
-from onboard.core.filter.limits import HEADING_START_RAD, TILT_START_RAD
+from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
@@ -18,11 +18,6 @@ from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import BankSums, NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Model
-
-EAGER_EPOCHS = 60
-"""While so few epochs are in, the running estimate is solved anew after each."""
-LAZY_EPOCHS = 5
-"""Later after each so many: it moves no more within half a second."""
 
 
 class Pass:

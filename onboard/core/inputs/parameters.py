@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, vector3
 from onboard.core.maths.board_orientation import board_rotation, is_axis_aligned
 
 DEFAULT_FILTER_HZ = 20.0
@@ -64,8 +64,8 @@ class ParametersInForce:
         s = [self.values.get(n, 1.0) for n in names.scale]
         o = [self.values.get(n, 0.0) for n in names.offset]
         return SixParameters(
-            tuple(x if x != 0.0 else 1.0 for x in s),  # type: ignore[arg-type] # three by construction
-            tuple(o),  # type: ignore[arg-type] # three by construction
+            vector3(x if x != 0.0 else 1.0 for x in s),
+            vector3(o),
         )
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -13,3 +14,13 @@ Mask: TypeAlias = NDArray[np.bool_]
 """Boolean array."""
 Vector3: TypeAlias = tuple[float, float, float]
 """Three numbers of one place or direction, in a record that never changes."""
+
+
+def vector3(values: Iterable[float]) -> Vector3:
+    """Three numbers for a record.
+
+    Raises:
+        ValueError: there are more or fewer.
+    """
+    x, y, z = values
+    return (float(x), float(y), float(z))

@@ -14,10 +14,11 @@ from onboard.core.model.quadrature import Signals
 from onboard.core.physics.effect import Bearing, Effect, Origin, on_axes
 
 LARGEST_TAKEN = 0.8
-"""Of the play, m/s^2: a loop as high as its play is wide has no inverse."""
+"""Of the play, m/s^2: a loop as high as its play is wide has no inverse [physics]."""
 PLAY = 1.0
 """Half-width of the play, m/s^2: what turns back by less stays on one branch of the loop.  A tenth
-of g is more than vibration leaves after the autopilot's low-pass, and less than any manoeuvre."""
+of g is more than vibration leaves after the autopilot's low-pass, and less than any manoeuvre
+[assumed, not measured: the height that is found belongs to this width]."""
 
 
 class AccelerometerHysteresis(Effect):

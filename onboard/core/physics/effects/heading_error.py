@@ -14,7 +14,8 @@ from onboard.core.physics.wording import DEGREE, first, measured
 LEAST_RAD = float(np.deg2rad(2.5))
 """A compass that is calibrated well is off by less."""
 EKF_SIGMA_RAD = 0.005
-"""What an EKF's mean heading is off by without anything being wrong (ten simulated flights)."""
+"""What an EKF's mean heading is off by without anything being wrong [tuned: ten flights of
+ArduPlane's SITL; to be derived]."""
 
 
 class HeadingError(Effect):

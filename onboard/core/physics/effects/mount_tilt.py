@@ -51,7 +51,8 @@ LEAST_RAD = float(np.deg2rad(1.0))
 """What a user can see on a horizon; less is within what an EKF's mean attitude may be off by."""
 EKF_SIGMA_RAD = (0.003, 0.006)
 """What an EKF's mean roll and pitch are off by without anything being wrong: ArduPlane's mean pitch
-was off by up to 0.011 (0.007 RMS) in ten simulated flights, its roll by up to 0.0025."""
+was off by up to 0.011 (0.007 RMS) in ten simulated flights, its roll by up to 0.0025 [tuned;
+to be derived]."""
 
 TRIM_RAD = float(np.deg2rad(0.5))
 """A trim worth a word, and what levelling by hand is good for (a bubble's width, 0.09 m/s^2 of
