@@ -24,6 +24,7 @@ from onboard.core.physics.effect import Effect
 class Candidate:
     """Columns that stand for one effect; ``columns`` is None for a jump at a block's start.
 
+    ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
     ``spent`` are unknowns that were chosen outside the fit (a jump's moment), ``unseen`` the share
     of the columns' own variance that happens between the samples they are made of.  ``jump`` is
     True for a jump of the offsets at one moment.
@@ -36,6 +37,11 @@ class Candidate:
     spent: int = 0
     unseen: float = 0.0
     jump: bool = False
+
+    @property
+    def sizes(self) -> list[int]:
+        """Columns of the sizes, without the shapes."""
+        return list(self.index[: len(self.plausible)])
 
     def bic(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """Fall of BIC from ``before`` to ``after``, the fit with the effect in.
@@ -60,9 +66,8 @@ def convincing(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     """Whether an effect is significant, holds on other data, is believable and matters."""
     if fitter.held_gain(before, after) < HELD_OUT_GAIN:
         return False
-    index = list(c.index)
-    value = after.theta[index] - fitter.absent[index]
-    sigma = np.sqrt(np.diag(after.covariance)[index])
+    value = after.theta[c.sizes] - fitter.absent[c.sizes]
+    sigma = np.sqrt(np.diag(after.covariance)[c.sizes])
     if np.max(np.abs(value) / sigma) < SIGNIFICANT:
         return False
     if np.any(np.abs(value) - sigma > np.array(c.plausible)):

@@ -208,7 +208,7 @@ class Judge:
             index = list(c.index)
             rest = [i for i in self.choice.free if i not in index]
             fit = self.choice.fitter.fit([*rest, *index], held_out=False)
-            sigma = np.sqrt(np.diag(fit.covariance)[index])
+            sigma = np.sqrt(np.diag(fit.covariance)[c.sizes])
             if np.all(sigma * SIGNIFICANT > np.array(c.plausible)):
                 out.append(
                     NotTestable(

@@ -78,8 +78,8 @@ class FinalModel:
         """Body axis of each column that acts on one."""
         keys = {i: name.rsplit("_", 1)[-1] for name, i in self.index.items() if i < 6}
         keys |= {self.index["tilt_roll"]: "roll", self.index["tilt_pitch"]: "pitch"}
-        for f in self.families:
-            keys |= dict(zip(self.engine.indices(f), f.keys, strict=True))
+        for f in self.families:  # which have no keys for their shapes
+            keys |= dict(zip(self.engine.indices(f), f.keys, strict=False))
         return {i: axis for i, key in keys.items() if (axis := axis_of(key)) is not None}
 
     def held(self, names: Sequence[str]) -> Array:

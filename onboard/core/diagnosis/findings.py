@@ -79,11 +79,12 @@ class Findings:
         index = [i for i in final.all if i in final.engine.indices(f)]
         sigma = np.sqrt(np.diag(final.solution.covariance))
         taken = {"clock_rate": final.engine.point.skew}
+        # The sizes come first; there are no keys for the shapes after them.
         quantities = {
             key: Quantity(
                 float(final.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
             )
-            for key, i, u in zip(f.keys, index, f.unknowns, strict=True)
+            for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
         }
         if f.onset is not None:
             quantities = {"time": Quantity(f.onset - final.origin.t0, ONSET_S, "s"), **quantities}

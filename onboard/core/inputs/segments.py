@@ -14,7 +14,7 @@ from onboard.core.maths.frames import interpolate_rotation
 from onboard.core.maths.interpolation import Hermite
 
 Signal: TypeAlias = tuple[Array, Array]
-"""A slow signal: times (j,), s, and values (j,) or (j, 3)."""
+"""A slow signal: times (j,), s, and values (j,) or (j, k)."""
 SLOW_SIGNALS = {
     "temperature": "of the accelerometer, degC",
     "throttle": "0 to 1",
@@ -66,7 +66,7 @@ class Segment:
         t_attitude: (k,) s.
         R_attitude: (k, 3, 3) recorded attitude of the accelerometer's body axes.
         R_bs: (3, 3) board orientation.
-        slow: other signals by name: times (j,) and values (j,) or (j, 3).
+        slow: other signals by name: times (j,) and values (j,) or (j, k).
         lever_arm_b: (3,) configured lever arm, accelerometer to GPS antenna, body axes, m.
     """
 

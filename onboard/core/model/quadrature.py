@@ -40,7 +40,7 @@ class Signals:
     segment: Segment
 
     def slow(self, name: str) -> Array | None:
-        """Slow signal at these times, S or (*S, 3); None if the recording lacks it."""
+        """Slow signal at these times, S or (*S, k); None if the recording lacks it."""
         return self.segment.slow_at(name, self.t)
 
     @property

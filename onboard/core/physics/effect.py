@@ -122,7 +122,9 @@ class Effect(Family):
         cure: what a user does about it.
         apart: the manoeuvre that tells it from what looks alike.
         needs: slow signals of the recording that it follows.
-        keys: names of the unknowns in a finding, in their order.
+        keys: names of the sizes in a finding, in the order of the unknowns, which begin with them.
+            Unknowns that follow are *shapes*: how it acts and not how much.  They are estimated and
+            charged for like the sizes, whose sigmas hold them that way, and are not reported.
         plausible: sizes beyond which the explanation is not believed, in the order of ``keys``.
         response: how it goes with one signal; None if with no single one.
         tilts_ekf: it changes the offset in flight, which an EKF takes for tilt at first.
@@ -187,13 +189,17 @@ class Effect(Family):
         self.plausible = (bound,) * 3
         self.unknowns = tuple(Unknown(f"{self.name}_{a}", unit, 0.0, bound) for a in AXES)
 
+    def take_shapes(self, names: Sequence[str], unit: str, sigma: float) -> None:
+        """Take shapes after the sizes, of one unit and with one sigma of the prior about zero."""
+        self.unknowns += tuple(Unknown(f"{self.name}_{n}", unit, 0.0, sigma) for n in names)
+
     # -- how it is looked for -------------------------------------------------------------------
 
     def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
         """The effect for a next linearisation, about its own size and those of others.
 
         Args:
-            size: (k,) its unknowns.
+            size: (k,) its unknowns, shapes among them.
             beside: others that change the force, with theirs.
         """
         return self

@@ -1,7 +1,8 @@
 """An accelerometer that lags behind its load: the loop, its memory, and a flight that conceals it.
 
-The concealed effect moves from turning point to turning point of the true load; the regressors
-follow what was read, sample by sample.  They share the law and nothing else.
+The concealed effect has one width, and moves from turning point to turning point of the true load;
+the regressors have three, and follow what was read, sample by sample.  They share the law and
+nothing else.
 """
 
 from dataclasses import replace
@@ -16,11 +17,18 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.inputs.segments import Segment
 from onboard.core.model.regressors import Model
 from onboard.core.physics.effect import Origin
-from onboard.core.physics.effects.accelerometer_hysteresis import PLAY, AccelerometerHysteresis
+from onboard.core.physics.effects.accelerometer_hysteresis import (
+    PLAYS,
+    WEIGHTS,
+    AccelerometerHysteresis,
+)
 from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis as Concealed
 
 ORIGIN = Origin(t0=0.0)
-SIZES = np.array([0.3, -0.2, 0.4])
+SHARED = np.array([[0.05, 0.15, 0.1], [0.1, -0.25, -0.05], [-0.1, 0.2, 0.3]])
+"""Weights of the plays (axis, play), of either sign."""
+ALONE = [0.3 * np.outer([1.0, -0.6, 1.2], play) for play in np.eye(len(PLAYS))]
+"""One play on all axes: the loops whose widths the effect has among its own."""
 
 
 def load(seconds=40.0, rate=100.0, seed=5):
@@ -38,33 +46,71 @@ def segment(t, f_b):
     return Segment(t, still, f_b, t[:2], np.stack([np.eye(3)] * 2), np.eye(3))
 
 
-def read(f_b):
-    """What the concealed sensor reads."""
-    concealed = Concealed(x=SIZES[0], y=SIZES[1], z=SIZES[2], width=2.0 * PLAY)
-    return f_b + concealed.reads_too_much(SimpleNamespace(f_b=f_b))
+def read(f_b, weights):
+    """What a sensor reads that conceals a loop of each width at once."""
+    scene = SimpleNamespace(f_b=f_b)
+    loops = [
+        Concealed(x=x, y=y, z=z, width=2.0 * play).reads_too_much(scene)
+        for play, (x, y, z) in zip(PLAYS, weights.T.tolist(), strict=True)
+    ]
+    return f_b + np.sum(loops, axis=0)
 
 
-def taken_off(effect, made, t):
+def unknowns_of(weights):
+    """Sizes and shapes (9,) that stand for weights (axis, play)."""
+    return np.linalg.solve(WEIGHTS.T, weights.T).ravel()
+
+
+def taken_off(effect, made, t, weights):
     """By the regressors: what is added to the reading for the true load, (n, 3)."""
     nodes = SimpleNamespace(t=t, slow=lambda name: made.slow_at(name, t))
-    return effect.acceleration(nodes) @ SIZES
+    return effect.acceleration(nodes) @ unknowns_of(weights)
 
 
-def test_about_its_size_the_regressors_give_the_true_load_back():
+def test_sizes_are_the_whole_of_the_loop_and_shapes_none_of_it():
+    assert WEIGHTS.sum(axis=1) == pytest.approx([1.0, 0.0, 0.0])
+    assert unknowns_of(SHARED)[:3] == pytest.approx(SHARED.sum(axis=1))
+    effect = AccelerometerHysteresis(ORIGIN)
+    assert effect.keys == ("x", "y", "z")
+    assert len(effect.unknowns) == WEIGHTS.size
+
+
+@pytest.mark.parametrize("weights", [SHARED, *ALONE])
+def test_about_its_size_the_regressors_give_the_true_load_back(weights):
     t, f_b = load()
-    reading = read(f_b)
-    effect = AccelerometerHysteresis(ORIGIN).about(SIZES)
+    reading = read(f_b, weights)
+    effect = AccelerometerHysteresis(ORIGIN).about(unknowns_of(weights))
     made = Model([effect]).remembering(segment(t, reading), {})
-    assert reading + taken_off(effect, made, t) == pytest.approx(f_b, abs=1e-9)
+    assert reading + taken_off(effect, made, t, weights) == pytest.approx(f_b, abs=1e-9)
 
 
-def test_without_its_size_they_are_right_to_first_order():
+@pytest.mark.parametrize("weights", [SHARED, *ALONE])
+def test_without_its_size_they_are_right_to_first_order(weights):
     t, f_b = load()
-    reading = read(f_b)
+    reading = read(f_b, weights)
     effect = AccelerometerHysteresis(ORIGIN)
     made = Model([effect]).remembering(segment(t, reading), {})
-    left = reading + taken_off(effect, made, t) - f_b
-    assert np.sqrt(np.mean(left**2)) < 0.4 * np.sqrt(np.mean((reading - f_b) ** 2))
+    left = reading + taken_off(effect, made, t, weights) - f_b
+    taken_back = np.max(np.sum(np.abs(weights) / PLAYS, axis=1))
+    assert np.sqrt(np.mean(left**2)) < taken_back * np.sqrt(np.mean((reading - f_b) ** 2))
+
+
+def test_a_loop_that_has_no_inverse_is_taken_off_in_part():
+    t, f_b = load()
+    effect = AccelerometerHysteresis(ORIGIN).about(unknowns_of(5.0 * ALONE[0]))
+    made = Model([effect]).remembering(segment(t, f_b), {})
+    assert np.max(np.abs(made.slow_at(effect.name, t))) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("weights", ALONE)
+def test_noise_of_the_reading_does_not_make_the_loop_look_higher(weights):
+    t, f_b = load(seconds=200.0)
+    noise = np.random.default_rng(6).normal(0.0, 0.06, f_b.shape)
+    effect = AccelerometerHysteresis(ORIGIN).about(unknowns_of(weights))
+    made = Model([effect]).remembering(segment(t, read(f_b, weights) + noise), {})
+    found, true = -taken_off(effect, made, t, weights), read(f_b, weights) - f_b
+    higher = np.sum(found * true, axis=0) / np.sum(found**2, axis=0)
+    assert higher == pytest.approx(1.0, abs=0.04)
 
 
 def test_the_memory_goes_on_from_segment_to_segment_and_ends_at_a_gap():
@@ -92,10 +138,11 @@ def test_a_model_without_memory_leaves_the_segment_as_it_is():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("width", [1.0, 2.0, 4.0])
 @pytest.mark.parametrize("vehicle", ["copter", "plane"])
-def test_a_flight_that_conceals_it_is_explained(vehicle):
-    concealed = Concealed(x=0.2, y=-0.16, z=0.2)
-    said = diagnose(heard(replace(Secret(501, vehicle, "control").spec(), effects=(concealed,))), 1)
+def test_a_flight_that_conceals_it_is_explained_however_wide_it_is(vehicle, width):
+    concealed = Concealed(x=0.2, y=-0.16, z=0.2, width=width)
+    said = diagnose(heard(replace(Secret(601, vehicle, "control").spec(), effects=(concealed,))), 1)
     assert [e.name for e in said.effects] == ["accelerometer_hysteresis"]
     for key, q in said.effects[0].unknowns.items():
         true = getattr(concealed, key)

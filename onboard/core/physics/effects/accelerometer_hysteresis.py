@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from typing import Self
@@ -11,22 +12,49 @@ import numpy as np
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
-from onboard.core.physics.effect import Bearing, Effect, Origin, on_axes
+from onboard.core.physics.effect import AXES, Bearing, Effect, Origin, on_axes
 
-LARGEST_TAKEN = 0.8
-"""Of the play, m/s^2: a loop as high as its play is wide has no inverse [physics]."""
-PLAY = 1.0
-"""Half-width of the play, m/s^2: what turns back by less stays on one branch of the loop.  A tenth
-of g is more than vibration leaves after the autopilot's low-pass, and less than any manoeuvre
-[assumed, not measured: the height that is found belongs to this width]."""
+PLAYS = (0.5, 1.0, 2.0)
+"""Half-widths of the plays, m/s^2, an octave apart: what lies between two is much like both.  A
+narrower one is driven by what vibration leaves after the autopilot's low-pass; a wider one is run
+through by few flights, and to the others it is a scale [physics]."""
+LARGEST = 1.0
+"""Half the height of the largest loop that is believed, m/s^2 [assumed]."""
+SHAPES = ("narrow", "ends")
+"""Names of the shapes: more of the narrow play than of the wide, more of both than in between."""
+WEIGHTS = np.array(
+    [
+        np.full(3, 1.0) / 3.0,
+        np.array([1.0, 0.0, -1.0]) / math.sqrt(2.0),
+        np.array([1.0, -2.0, 1.0]) / math.sqrt(6.0),
+    ]
+)
+"""(3, 3) weights of the plays by one unit of the half height and of each shape, which add nothing
+to the height and have nothing of each other."""
+SHAPE_SIGMA = LARGEST / math.sqrt(12.0)
+"""Prior of a shape, m/s^2: that of the largest loop if all ways to share it among the plays are
+equally likely [probability]."""
+MOST_TAKEN_BACK = 0.8
+"""Share of a rise of the load that its branches may take back again: at one, the reading stands
+still while the load rises, and nothing can tell the load from it [physics]."""
+NORMAL_MEDIAN = 0.6745
+"""Median size of what is normally distributed, in sigmas [probability]."""
+MOST_NOISE = 0.03 * PLAYS[0]
+"""Noise of a reading that drags no follower about, m/s^2: more than that, and a follower rides on
+the peaks, its branch is too small, and the loop would be found too high by some per cent
+[physics]."""
+LONGEST_MEAN_S = 0.15
+"""Readings are averaged over no more than this, s: what vehicles do takes longer [physics]."""
 
 
 class AccelerometerHysteresis(Effect):
     """Reading that lags behind the load: too small while it rises, too large while it falls.
 
-    Half the height of the loop is the unknown.  The branch is that of a play operator: a follower
-    that the load drags along once it has moved by :data:`PLAY` away from it, and which remembers
-    its place from segment to segment.
+    How wide the loop is nobody knows beforehand.  Each axis reads a weighted sum of the branches of
+    three play operators, one for each half-width of :data:`PLAYS`: a play has a follower that the
+    load drags along once it is that far away from it, and which remembers its place from segment to
+    segment.  The sum of the weights is half the height of the loop; how it is shared among the
+    plays is the loop's shape, an unknown too, so that the height's sigma holds it.
     """
 
     effect = "accelerometer_hysteresis"
@@ -35,7 +63,7 @@ class AccelerometerHysteresis(Effect):
     sentence = "the accelerometer's reading depends on where the load came from"
     meaning = "`x`, `y`, `z`, m/s²: half the height of the loop, too small on the way up"
     bearing = Bearing.WITHIN
-    source = "play operator of Prandtl and Ishlinskii; hysteresis error of IEEE Std 1293"
+    source = "play operators of Prandtl and Ishlinskii; hysteresis error of IEEE Std 1293"
     cure = "ArduPilot has no parameter for it: replace the sensor"
     apart = "load and unload in turn: steep turns both ways, accelerate and brake, climb and dive"
     changes_force = True
@@ -43,52 +71,109 @@ class AccelerometerHysteresis(Effect):
     def __init__(self, origin: Origin) -> None:
         """No reference is needed."""
         super().__init__(origin)
-        self.take_axes("m/s^2", 1.0)
-        self.taken = np.zeros(3)
+        self.take_axes("m/s^2", LARGEST)
+        self.take_shapes([f"{shape}_{a}" for shape in SHAPES for a in AXES], "m/s^2", SHAPE_SIGMA)
+        self.weights = np.zeros((3, len(PLAYS)))
 
     def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
-        """The follower of the load that is left when ``size`` (3,) is taken off what was read."""
+        """The followers of the load that is left when ``size`` (9,) is taken off what was read."""
         made = copy(self)
-        made.taken = np.clip(size, -LARGEST_TAKEN, LARGEST_TAKEN)
+        made.weights = _invertible(size.reshape(len(WEIGHTS), 3).T @ WEIGHTS)
         return made
 
     def remembers(self, segment: Segment, before: Signal | None) -> Signal:
-        """Where the follower is against the load, (n, 3): -1 while it rises and 1 while it falls.
+        """Where the followers are against the load, (n, 9): -1 while it rises and 1 while it falls.
 
-        A raw force will do: a scale is a per cent, and an offset moves load and follower alike.
+        Play by play of x, then of y and z.  A raw force will do: a scale is a per cent, and an
+        offset moves load and followers alike.
         """
-        f_b = segment.raw_s @ segment.R_bs.T
-        place = np.zeros(3)
+        f_b = _averaged(segment.t, segment.raw_s @ segment.R_bs.T)
+        count = len(PLAYS)
+        places = np.zeros((3, count))
         if before is not None:
             t, x = before
-            place = np.array([np.interp(segment.t[0], t, x[:, j]) for j in range(3)])
-        return segment.t, np.column_stack(
-            [_branch(f_b[:, j], place[j], self.taken[j]) for j in range(3)]
-        )
+            places = np.array([np.interp(segment.t[0], t, b) for b in x.T]).reshape(3, count)
+        branches = [_branches(f_b[:, j], places[j], self.weights[j]) for j in range(3)]
+        return segment.t, np.hstack(branches)
 
     def acceleration(self, nodes: Signals) -> Array:
-        """``-h_i e_i`` with the branch ``h`` at the nodes."""
-        branch = nodes.slow(self.name)
-        return on_axes(np.zeros((*nodes.t.shape, 3)) if branch is None else branch)
+        """``-h_i e_i`` with the mean branch ``h`` of the plays, then the same of each shape."""
+        branches = nodes.slow(self.name)
+        if branches is None:
+            return np.zeros((*nodes.t.shape, 3, len(self.unknowns)))
+        by_play = branches.reshape(*nodes.t.shape, 3, len(PLAYS))
+        return np.concatenate([on_axes(by_play @ w) for w in WEIGHTS], axis=-1)
 
 
-def _branch(reading: Array, start: float, size: float) -> Array:
-    """The follower less the load (n,), in units of the play.
+def _invertible(weights: Array) -> Array:
+    """Weights (axis, play), made smaller where the reading would not rise with the load.
+
+    While the narrower plays are dragged along and the wider ones rest, the resting ones take back
+    their weights over their half-widths of what the load rises by.
+    """
+    taken_back = np.cumsum((weights / PLAYS)[:, ::-1], axis=1).max(axis=1)
+    out: Array = weights / np.maximum(1.0, taken_back / MOST_TAKEN_BACK)[:, None]
+    return out
+
+
+def _averaged(t: Array, f_b: Array) -> Array:
+    """Readings (n, 3) averaged over as many samples as their noise asks for; over one if it is nil.
+
+    The noise is that of second differences, in which a load that goes straight is not.
+    """
+    if len(t) < 3:
+        return f_b
+    noise = np.median(np.abs(np.diff(f_b, 2, axis=0)), axis=0) / (NORMAL_MEDIAN * math.sqrt(6.0))
+    step = float(t[-1] - t[0]) / (len(t) - 1)
+    most = min(int(0.5 * LONGEST_MEAN_S / step), len(t) - 1)
+    out = f_b.copy()
+    for j in range(3):
+        beside = min(math.ceil(0.5 * ((noise[j] / MOST_NOISE) ** 2 - 1.0)), most)
+        if beside > 0:
+            # Turned about its ends, a straight line goes on straight.
+            padded = np.pad(f_b[:, j], beside, mode="reflect", reflect_type="odd")
+            count = 2 * beside + 1
+            out[:, j] = np.convolve(padded, np.full(count, 1.0 / count), mode="valid")
+    return out
+
+
+def _branches(reading: Array, start: Array, weights: Array) -> Array:
+    """The followers less the load (n, plays), each in units of its play, by exact inversion.
+
+    The reading is the load, and the weighted branches on top of it.  From sample to sample it is a
+    line of straight pieces over the load, and a new piece begins where another play begins to be
+    dragged.  They do so in the order of their widths: two followers are never further from each
+    other than one play is wider than the other.
 
     Args:
-        reading: (n,) of one axis, m/s^2: the load, and ``size`` times the branch on top of it.
-        start: branch at the first reading.
-        size: half the height of the loop as far as it is known, m/s^2.
+        reading: (n,) of one axis, m/s^2.
+        start: (plays,) branches at the first reading.
+        weights: (plays,) as far as they are known, m/s^2.
     """
+    plays = np.array(PLAYS)
+    shares = (weights / plays).tolist()
+    followers = (float(reading[0]) - start @ weights + start * plays).tolist()
+    narrowest, at_rest = PLAYS[0], 1.0 - sum(shares)
+    held = sum(share * place for share, place in zip(shares, followers, strict=True))
     out = []
-    branch, share = start, size / PLAY
-    follower = float(reading[0]) - size * start + start * PLAY
     for read in reading.tolist():
-        # At rest the branch is what the load leaves of it: read = load + size branch.
-        load = (read - share * follower) / (1.0 - share)
-        branch = (follower - load) / PLAY
-        if branch < -1.0 or branch > 1.0:
-            branch = -1.0 if branch < 0.0 else 1.0
-            follower = read - size * branch + branch * PLAY
-        out.append(branch)
-    return np.array(out)
+        load = (read - held) / at_rest
+        if not -narrowest <= load - followers[0] <= narrowest:  # else all of them rest
+            up = 1.0 if load > followers[0] else -1.0
+            free, rising, dragged = read - held, at_rest, 0
+            for share, place, play in zip(shares, followers, PLAYS, strict=True):
+                if (load - place) * up <= play:
+                    break
+                # Dragged along, it is its play away and takes back no more.
+                free += share * (place + up * play)
+                rising += share
+                load = free / rising
+                dragged += 1
+            for k in range(dragged):
+                place = load - up * PLAYS[k]
+                held += shares[k] * (place - followers[k])
+                followers[k] = place
+        out.append((load, *followers))
+    found = np.array(out)
+    branches: Array = (found[:, 1:] - found[:, :1]) / plays
+    return branches
