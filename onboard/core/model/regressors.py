@@ -26,6 +26,7 @@ import numpy as np
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Around, Intervals, Signals
+from onboard.errors import OnboardError
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ class Family:
             before: the signal over the segment before, None after a gap.
 
         Returns:
-            Times (j,) and values (j,) or (j, 3).
+            Times (j,) and values (j,) or (j, k).
         """
         return None
 
@@ -148,7 +149,15 @@ class Model:
     """
 
     def __init__(self, families: Sequence[Family]) -> None:
-        """Take the families; their unknowns are numbered in this order."""
+        """Take the families; their unknowns are numbered in this order.
+
+        Raises:
+            OnboardError: one has no unknowns (a jump without its moment, a product without its
+                signals), so nothing of it can be estimated.
+        """
+        empty = [f.name or type(f).__name__ for f in families if not f.unknowns]
+        if empty:
+            raise OnboardError(f"nothing can be estimated of {', '.join(empty)}: no unknowns")
         self.families = tuple(families)
         self.unknowns = tuple(u for f in self.families for u in f.unknowns)
         self.slices: dict[str, slice] = {}

@@ -10,7 +10,7 @@ from onboard.core.diagnosis.nuisance_effects import nuisance_kinds
 from onboard.core.inputs.segments import SLOW_SIGNALS
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import ATTITUDE_UNKNOWNS
-from onboard.core.model.regressors import Family
+from onboard.core.model.regressors import Family, Model
 from onboard.core.physics import catalogue as found
 from onboard.core.physics import effects
 from onboard.core.physics.catalogue import catalogue, kinds, phrase_of, size_of, title_of
@@ -18,6 +18,7 @@ from onboard.core.physics.effect import STATEMENTS, Bearing, Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.empirical import Empirical
 from onboard.core.physics.finding import Finding, Quantity
+from onboard.errors import OnboardError
 from sitl.builtin.effects import ALL
 
 ORIGIN = Origin(t0=10.0)
@@ -83,12 +84,21 @@ def test_it_is_looked_for_in_some_way_or_says_why_not(kind):
 @every
 def test_its_unknowns_have_names_units_bounds_and_priors(kind):
     effect = placed(kind)
-    assert len(effect.keys) == len(effect.plausible) == len(effect.unknowns)
-    for unknown, bound in zip(effect.unknowns, effect.plausible, strict=True):
+    assert len(effect.keys) == len(effect.plausible) <= len(effect.unknowns)
+    for unknown in effect.unknowns:
         assert unknown.unit
         assert unknown.prior == 0.0, "an effect that nobody has seen is nothing"
-        assert 0.0 < unknown.prior_sigma <= bound * 1.5
+        assert 0.0 < unknown.prior_sigma < np.inf
+    for unknown, bound in zip(effect.unknowns, effect.plausible, strict=False):
+        assert unknown.prior_sigma <= bound * 1.5
     assert set(kind.needs) <= set(SLOW_SIGNALS)
+
+
+@pytest.mark.parametrize("kind", [BiasStep, Empirical])
+def test_what_has_no_moment_and_no_formula_yet_is_in_no_model(kind):
+    with pytest.raises(OnboardError, match=kind.effect):
+        Model([kind(ORIGIN)])
+    assert Model([placed(kind)]).size == 3
 
 
 def test_those_of_every_model_know_what_nothing_is():
