@@ -14,6 +14,21 @@ from sitl.builtin.trajectory import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ByAxis(Effect):
+    """What has a size ``x, y, z`` for each axis, on accelerometer ``imu`` (0: on all)."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    imu: int = 0
+
+    @property
+    def sizes(self) -> Array:
+        """(3,) the sizes of the axes."""
+        return np.array((self.x, self.y, self.z))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CrossAxis(Effect):
     """``f += M f``, M without diagonal; ``xy`` is what x reads too much per unit along y."""
 
@@ -58,7 +73,7 @@ class AccelerometerTilt(Effect):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TemperatureDrift(Effect):
+class TemperatureDrift(ByAxis):
     """``f += (x, y, z) (T - reference)``, m/s^2/K."""
 
     name: ClassVar[str] = "temperature_drift"
@@ -67,19 +82,15 @@ class TemperatureDrift(Effect):
         "plane": {"x": 0.015, "y": 0.015, "z": 0.006},
     }
     kind: ClassVar[str] = "offset in time"
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
     reference: float = 35.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.temperature - self.reference, (self.x, self.y, self.z))
+        return np.outer(scene.temperature - self.reference, self.sizes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BiasRamp(Effect):
+class BiasRamp(ByAxis):
     """``f += (x, y, z) (t - t0)``, m/s^3, t0 the start of the recording."""
 
     name: ClassVar[str] = "bias_ramp"
@@ -88,18 +99,14 @@ class BiasRamp(Effect):
         "plane": {"x": 0.0011, "y": 0.0012, "z": 0.0004},
     }
     kind: ClassVar[str] = "offset in time"
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.elapsed, (self.x, self.y, self.z))
+        return np.outer(scene.elapsed, self.sizes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BiasStep(Effect):
+class BiasStep(ByAxis):
     """``f += (x, y, z)`` from ``time`` seconds after the start of the recording on, m/s^2."""
 
     name: ClassVar[str] = "bias_step"
@@ -109,37 +116,29 @@ class BiasStep(Effect):
     }
     kind: ClassVar[str] = "offset in time"
     time: float
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.elapsed >= self.time, (self.x, self.y, self.z))
+        return np.outer(scene.elapsed >= self.time, self.sizes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ScaleNonlinearity(Effect):
+class ScaleNonlinearity(ByAxis):
     """``f_i += c_i f_i^2 / g``, c in 1/g."""
 
     name: ClassVar[str] = "scale_nonlinearity"
     units: ClassVar[Mapping[str, Sizes]] = {"plane": {"x": 0.02, "z": 0.01}}
     most: ClassVar[float] = 0.05
     kind: ClassVar[str] = "offset with the flight"
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        out: Array = np.array((self.x, self.y, self.z)) * scene.f_b**2 / STANDARD_GRAVITY
+        out: Array = self.sizes * scene.f_b**2 / STANDARD_GRAVITY
         return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VibrationRectification(Effect):
+class VibrationRectification(ByAxis):
     """``f_i += c_i vibe_i^2``, vibe as VIBRATION reports it, c in s^2/m."""
 
     name: ClassVar[str] = "vibration_rectification"
@@ -149,19 +148,15 @@ class VibrationRectification(Effect):
     }
     kind: ClassVar[str] = "offset with the flight"
     alone: ClassVar[bool] = True
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        out: Array = np.array((self.x, self.y, self.z)) * scene.level**2
+        out: Array = self.sizes * scene.level**2
         return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ThrottleCoupling(Effect):
+class ThrottleCoupling(ByAxis):
     """``f += (x, y, z) throttle``, m/s^2 at full throttle."""
 
     name: ClassVar[str] = "throttle_coupling"
@@ -170,14 +165,10 @@ class ThrottleCoupling(Effect):
         "plane": {"x": 0.3, "y": 0.2, "z": 0.12},
     }
     kind: ClassVar[str] = "offset with the flight"
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.trajectory.throttle, (self.x, self.y, self.z))
+        return np.outer(scene.trajectory.throttle, self.sizes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,7 +201,7 @@ class LoadFlex(Effect):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Nameless(Effect):
+class Nameless(ByAxis):
     """Something that no catalogue has: ``f += (x, y, z) s(t)``, for seeing what is said of it.
 
     ``term`` is the signal ``s``: ``dynamic_pressure`` (airspeed / 10 m/s)^2, ``roll_rate``
@@ -219,10 +210,6 @@ class Nameless(Effect):
 
     name: ClassVar[str] = "nameless"
     term: str
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
@@ -232,4 +219,4 @@ class Nameless(Effect):
             "swing": np.sin(2.0 * np.pi * scene.elapsed / 40.0),
             "climb_rate": -scene.trajectory.v_n[:, 2],
         }
-        return np.outer(signals[self.term], (self.x, self.y, self.z))
+        return np.outer(signals[self.term], self.sizes)

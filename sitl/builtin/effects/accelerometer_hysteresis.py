@@ -9,11 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from sitl.builtin.effects.base import Array, Effect, Scene, Sizes
+from sitl.builtin.effects.accelerometer import ByAxis
+from sitl.builtin.effects.base import Array, Scene, Sizes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AccelerometerHysteresis(Effect):
+class AccelerometerHysteresis(ByAxis):
     """Each axis reads up to ``x, y, z`` (m/s^2) too little while its load rises, too much after.
 
     The loop of a gear with backlash: after a reversal the reading stays behind until the load has
@@ -25,20 +26,15 @@ class AccelerometerHysteresis(Effect):
         "copter": {"x": 0.05, "y": 0.05, "z": 0.05},
         "plane": {"x": 0.05, "y": 0.05, "z": 0.05},
     }
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
     width: float = 2.0
-    imu: int = 0
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        sizes = (self.x, self.y, self.z)
         branches = [
             self._branch(scene.f_b[:, j]) if size else np.zeros(len(scene.f_b))
-            for j, size in enumerate(sizes)
+            for j, size in enumerate(self.sizes)
         ]
-        out: Array = np.column_stack(branches) * np.array(sizes)
+        out: Array = np.column_stack(branches) * self.sizes
         return out
 
     def _branch(self, load: Array) -> Array:
