@@ -25,7 +25,9 @@ def settled(
 ) -> tuple[Examination, list[Effect]]:
     """The model that was chosen, until nothing in it is needless and nothing is left to find."""
     final = _final(full, choice, families).doubting_attitude()
-    if any(f.onset is not None for f in families) and any(f.in_proportion for f in families):
+    jumped = any(f.onset is not None for f in families)
+    # Sizes that were chosen about nothing are not yet those that a jump, or a shape, leaves.
+    if (jumped and any(f.in_proportion for f in families)) or any(f.shaped for f in families):
         found = final.found().theta
         families = _about_sizes([(f, found[final.indices(f)]) for f in families])
         final = _again(full, families, final).with_rows().doubting_attitude()

@@ -193,6 +193,11 @@ class Effect(Family):
         """Take shapes after the sizes, of one unit and with one sigma of the prior about zero."""
         self.unknowns += tuple(Unknown(f"{self.name}_{n}", unit, 0.0, sigma) for n in names)
 
+    @property
+    def shaped(self) -> bool:
+        """Whether it has unknowns of its shape."""
+        return len(self.unknowns) > len(self.keys)
+
     # -- how it is looked for -------------------------------------------------------------------
 
     def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
