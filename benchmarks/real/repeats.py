@@ -122,13 +122,13 @@ def scatter_of(some: Sequence[Fit], i: int) -> Scatter:
 def average(some: Sequence[Fit]) -> Array:
     """(6,) scale and offset of several flights together: their information, the prior once."""
     prior = np.diag(1.0 / some[0].prior_sigma ** 2)
-    A, b = prior.copy(), prior @ some[0].prior
+    A, b = prior, prior @ some[0].prior
     for f in some:
         own = np.diag(1.0 / f.prior_sigma**2)
         whole = np.linalg.inv(f.linear_covariance)
-        A += whole - own
-        b += whole @ f.linear - own @ f.prior
-    return parameters_of(np.linalg.solve(A, b))
+        A = A + whole - own
+        b = b + whole @ f.linear - own @ f.prior
+    return parameters_of(np.asarray(np.linalg.solve(A, b), dtype=np.float64))
 
 
 def _left_out(fit: Fit, others: Sequence[Fit]) -> list[LeftOut]:

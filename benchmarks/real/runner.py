@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.real import conceal, levels, pairs, repeats
+from benchmarks.real import conceal, levels, outcomes, pairs, repeats
 from benchmarks.real.flights import Fit, fits
 from benchmarks.real.split import (
     JUDGED,
@@ -43,7 +43,7 @@ class Results:
     pairs: tuple[pairs.Pair, ...] = ()
     scatter: tuple[repeats.Scatter, ...] = ()
     left_out: tuple[repeats.LeftOut, ...] = ()
-    concealed: tuple[conceal.Outcome, ...] = ()
+    concealed: tuple[outcomes.Outcome, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """As JSON: no NaN, arrays as lists."""
@@ -99,7 +99,7 @@ def run(
     if set(contents) & {"levels", "pairs", "repeats"}:
         made = tuple(fits(flights, jobs))
     scatter, left_out = repeats.run(made) if "repeats" in contents else ([], [])
-    concealed: list[conceal.Outcome] = []
+    concealed: list[outcomes.Outcome] = []
     if "conceal" in contents:
         some = conceal.chosen_kinds(kinds)
         concealed = conceal.run(flights, some, limit=limit, jobs=jobs)
@@ -130,8 +130,8 @@ def show(found: Results, contents: Sequence[str]) -> None:
         print("\n".join(repeats.summary(found.scatter, found.left_out)))
     if "conceal" in contents:
         print("\n### Concealed errors")
-        print(conceal.table(found.concealed))
-        print(conceal.LEGEND)
+        print(outcomes.table(found.concealed))
+        print(outcomes.LEGEND)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.real import concealed
-from benchmarks.real.concealed import About, Kind, about, from_angles
+from benchmarks.real import concealed, concealed_attitude, concealed_fixes, concealed_force
+from benchmarks.real.concealed_attitude import from_angles
+from benchmarks.real.concealed_kind import About, Kind, about
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 
 G = 9.80665
@@ -101,7 +102,7 @@ def test_kinds_have_names_of_their_own() -> None:
 
 
 def test_a_step_of_half_in_x_changes_what_comes_after_it_only() -> None:
-    difference = forces(laid(concealed.step(0, 0.5))) - forces(SAMPLES)
+    difference = forces(laid(concealed_force.step(0, 0.5))) - forces(SAMPLES)
     after = times(SAMPLES) >= GROUND.moment
     assert 0 < after.sum() < len(after)
     np.testing.assert_allclose(difference[after], [[0.5, 0.0, 0.0]] * int(after.sum()), atol=1e-12)
@@ -114,7 +115,11 @@ def test_a_sensor_with_the_true_six_reads_the_force_again() -> None:
     names = [f"{a} {what}" for what in ("scale", "offset") for a in "xyz"]
     before = dict(zip(names, old.tolist(), strict=True))
     in_force = GROUND.in_force
-    for kind in (concealed.offset(1, -0.3), concealed.scale(2, 1.05), concealed.scale(0, 0.97)):
+    for kind in (
+        concealed_force.offset(1, -0.3),
+        concealed_force.scale(2, 1.05),
+        concealed_force.scale(0, 0.97),
+    ):
         true = {**before, **kind.truth(before, GROUND)}
         new = np.array([true[n] for n in names])
         raw_old = forces(SAMPLES) / in_force[:3] + in_force[3:]
@@ -125,19 +130,19 @@ def test_a_sensor_with_the_true_six_reads_the_force_again() -> None:
 
 
 def test_a_temperature_law_follows_the_temperature() -> None:
-    difference = (forces(laid(concealed.warmed(0, 0.05))) - forces(SAMPLES))[:, 0]
+    difference = (forces(laid(concealed_force.warmed(0, 0.05))) - forces(SAMPLES))[:, 0]
     slope = np.polyfit(times(SAMPLES), difference, 1)[0]
     assert slope == pytest.approx(0.05 * 0.5)
     assert difference[0] == pytest.approx(0.05 * (20.0 - 35.0))
 
 
 def test_a_flight_that_stays_as_cold_shows_no_law() -> None:
-    assert concealed.warmed(0, 0.05).applies(GROUND)
-    assert not concealed.warmed(0, 0.05).applies(replace(GROUND, warms_by=1.0))
+    assert concealed_force.warmed(0, 0.05).applies(GROUND)
+    assert not concealed_force.warmed(0, 0.05).applies(replace(GROUND, warms_by=1.0))
 
 
 def test_a_turned_accelerometer_reads_the_same_length() -> None:
-    made = forces(laid(concealed.turned(0.05)))
+    made = forces(laid(concealed_force.turned(0.05)))
     np.testing.assert_allclose(
         np.linalg.norm(made, axis=1), np.linalg.norm(forces(SAMPLES), axis=1)
     )
@@ -146,7 +151,7 @@ def test_a_turned_accelerometer_reads_the_same_length() -> None:
 
 
 def test_latency_shifts_stamps_and_nothing_else() -> None:
-    made = fixes(laid(concealed.latency(0.06)))
+    made = fixes(laid(concealed_fixes.latency(0.06)))
     for old, new in zip(fixes(SAMPLES), made, strict=True):
         assert new.t - old.t == pytest.approx(0.06)
         assert (new.t_message or 0.0) - (old.t_message or 0.0) == pytest.approx(0.06)
@@ -154,7 +159,7 @@ def test_latency_shifts_stamps_and_nothing_else() -> None:
 
 
 def test_what_is_stamped_later_arrives_later() -> None:
-    for kind in (concealed.latency(0.1), concealed.skewed(5e-4)):
+    for kind in (concealed_fixes.latency(0.1), concealed_fixes.skewed(5e-4)):
         newest = -np.inf
         for s in laid(kind):
             if isinstance(s, ImuSample):
@@ -164,14 +169,14 @@ def test_what_is_stamped_later_arrives_later() -> None:
 
 
 def test_a_clock_that_runs_away_is_right_at_the_start() -> None:
-    old, new = fixes(SAMPLES), fixes(laid(concealed.skewed(5e-4)))
+    old, new = fixes(SAMPLES), fixes(laid(concealed_fixes.skewed(5e-4)))
     assert new[0].t == old[0].t
     assert new[-1].t - old[-1].t == pytest.approx(5e-4 * (old[-1].t - 100.0))
 
 
 def test_the_mean_of_two_fixes_is_late_by_half_and_as_smooth_as_its_span() -> None:
     """On a circle an average over a span w is shorter by 1 - (omega w)^2 / 24."""
-    kind = concealed.averaged()
+    kind = concealed_fixes.averaged()
     before = {"gps_delay": LATE_S, "window_squared": 0.0}
     true = kind.truth(before, GROUND)
     for fix in fixes(laid(kind))[1:]:
@@ -184,7 +189,7 @@ def test_the_mean_of_two_fixes_is_late_by_half_and_as_smooth_as_its_span() -> No
 def test_a_lever_arm_is_the_derivative_of_where_the_antenna_is() -> None:
     """Velocity against finite differences of ``R r``: no formula of rotation rates."""
     arm = np.array([0.5, 0.0, 0.0])
-    made = fixes(laid(concealed.antenna(0, 0.5)))
+    made = fixes(laid(concealed_fixes.antenna(0, 0.5)))
     for old, new in zip(fixes(SAMPLES)[2:-2], made[2:-2], strict=True):
         gained = np.array([new.v_n - old.v_n, new.v_e - old.v_e, (new.v_d or 0) - (old.v_d or 0)])
         t, h = old.t - LATE_S, 1e-3
@@ -197,7 +202,7 @@ def test_a_lever_arm_is_the_derivative_of_where_the_antenna_is() -> None:
 
 def test_a_receiver_that_averages_averages_the_arm_as_well() -> None:
     ground = replace(GROUND, window=0.3)
-    made = fixes(laid(concealed.antenna(2, -0.4), ground=ground))
+    made = fixes(laid(concealed_fixes.antenna(2, -0.4), ground=ground))
     arm = np.array([0.0, 0.0, -0.4])
     for old, new in zip(fixes(SAMPLES)[2:-2], made[2:-2], strict=True):
         ends = [from_angles(*angles(old.t - LATE_S + s)) @ arm for s in (-0.15, 0.15)]
@@ -207,25 +212,25 @@ def test_a_receiver_that_averages_averages_the_arm_as_well() -> None:
 def test_a_fault_lasts_ten_seconds() -> None:
     off = [
         (n.t, n.v_n - o.v_n)
-        for o, n in zip(fixes(SAMPLES), fixes(laid(concealed.fault(3.0))), strict=True)
+        for o, n in zip(fixes(SAMPLES), fixes(laid(concealed_fixes.fault(3.0))), strict=True)
         if n.v_n != o.v_n
     ]
     assert all(v == pytest.approx(3.0) for _, v in off)
     assert GROUND.moment <= off[0][0]
-    assert off[-1][0] < GROUND.moment + concealed.FAULT_S
+    assert off[-1][0] < GROUND.moment + concealed_fixes.FAULT_S
 
 
 def test_heading_and_tilt_turn_about_down_and_about_the_body() -> None:
     for old, new in zip(
         (s for s in SAMPLES if isinstance(s, AttitudeSample)),
-        (s for s in laid(concealed.heading(0.1)) if isinstance(s, AttitudeSample)),
+        (s for s in laid(concealed_attitude.heading(0.1)) if isinstance(s, AttitudeSample)),
         strict=True,
     ):
         R = from_angles(new.roll, new.pitch, new.yaw) @ from_angles(*angles(old.t)).T
         np.testing.assert_allclose(R, from_angles(0.0, 0.0, 0.1), atol=1e-12)
     for old, new in zip(
         (s for s in SAMPLES if isinstance(s, AttitudeSample)),
-        (s for s in laid(concealed.tilted(0.05)) if isinstance(s, AttitudeSample)),
+        (s for s in laid(concealed_attitude.tilted(0.05)) if isinstance(s, AttitudeSample)),
         strict=True,
     ):
         R = from_angles(*angles(old.t)).T @ from_angles(new.roll, new.pitch, new.yaw)
