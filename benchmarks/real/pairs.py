@@ -58,6 +58,19 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
+class Agreement:
+    """Chi-square of all accelerometers of one flight about their common mean force.
+
+    Three accelerometers make three pairs, of which two are independent: pairs do not add up, this
+    does.
+    """
+
+    flight: str
+    chi_square: float
+    freedom: int
+
+
+@dataclass(frozen=True, slots=True)
 class Mean:
     """Mean force of one accelerometer by one set of six, and its covariance."""
 
@@ -73,9 +86,13 @@ def mean_force(fit: Fit) -> Mean:
     return Mean(scale * (raw - offset), J @ fit.covariance @ J.T)
 
 
+def _usable(fit: Fit) -> bool:
+    return not fit.failed and bool(np.all(np.isfinite(fit.force)))
+
+
 def run(made: Sequence[Fit]) -> list[Pair]:
     """Every pair of accelerometers of every flight that was estimated and moved."""
-    good = [f for f in made if not f.failed and np.all(np.isfinite(f.force))]
+    good = [f for f in made if _usable(f)]
     out = []
     for one, other in combinations(good, 2):
         if one.flight != other.flight:
@@ -93,7 +110,25 @@ def run(made: Sequence[Fit]) -> list[Pair]:
     return out
 
 
-def table(pairs: Sequence[Pair]) -> str:
+def agreements(made: Sequence[Fit]) -> list[Agreement]:
+    """All accelerometers of each flight about their mean, weighted by what they claim."""
+    out = []
+    for flight in dict.fromkeys(f.flight for f in made):
+        means = [mean_force(f) for f in made if f.flight == flight and _usable(f)]
+        if len(means) < 2:
+            continue
+        weights = [np.linalg.inv(m.covariance) for m in means]
+        whole = sum(weights, np.zeros((3, 3)))
+        middle = np.linalg.solve(
+            whole, sum(w @ m.force for w, m in zip(weights, means, strict=True))
+        )
+        apart = [m.force - middle for m in means]
+        chi = sum(float(d @ w @ d) for d, w in zip(apart, weights, strict=True))
+        out.append(Agreement(flight, chi, 3 * (len(means) - 1)))
+    return out
+
+
+def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:
     """One line for each pair, and what they say together."""
     lines = [f"{'flight, IMUs':19}{'in force':^20}{'estimated':^20}{'its sigma':^18}{'chi2':>6}"]
     for p in pairs:
@@ -107,15 +142,15 @@ def table(pairs: Sequence[Pair]) -> str:
             + f"{p.chi_square:6.1f}"
         )
     if pairs:
-        lines += summary(pairs)
+        lines += summary(pairs, agreed)
     return "\n".join(lines)
 
 
-def summary(pairs: Sequence[Pair]) -> list[str]:
+def summary(pairs: Sequence[Pair], agreed: Sequence[Agreement]) -> list[str]:
     """RMS of the differences, chi-square over all pairs."""
     before = float(np.sqrt(np.mean([p.before**2 for p in pairs])))
     after = float(np.sqrt(np.mean([p.after**2 for p in pairs])))
-    chi, dof = sum(p.chi_square for p in pairs), 3 * len(pairs)
+    chi, dof = sum(a.chi_square for a in agreed), sum(a.freedom for a in agreed)
     closer = sum(np.linalg.norm(p.after) < np.linalg.norm(p.before) for p in pairs)
     rms = f"{before:.3f} in force, {after:.3f} estimated"
     return [
@@ -132,7 +167,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=1)
     chosen = parser.parse_args(arguments)
     flights = [f for f in available("building", chosen.flights) if len(f.imus) > 1]
-    print(table(run(fits(flights, chosen.jobs))) if flights else WHERE)
+    if not flights:
+        print(WHERE)
+        return
+    made = fits(flights, chosen.jobs)
+    print(table(run(made), agreements(made)))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.real import conceal, levels, outcomes, pairs, repeats
 from benchmarks.real.flights import Fit, fits
+from benchmarks.real.pairs import Agreement, Pair
 from benchmarks.real.split import (
     JUDGED,
     LOOKS,
@@ -40,7 +41,8 @@ class Results:
     part: Part
     made: tuple[Fit, ...] = ()
     shares: tuple[levels.Share, ...] = ()
-    pairs: tuple[pairs.Pair, ...] = ()
+    pairs: tuple[Pair, ...] = ()
+    agreements: tuple[Agreement, ...] = ()
     scatter: tuple[repeats.Scatter, ...] = ()
     left_out: tuple[repeats.LeftOut, ...] = ()
     concealed: tuple[outcomes.Outcome, ...] = ()
@@ -55,6 +57,7 @@ class Results:
             ],
             "criteria": _json(self.shares),
             "pairs": [_json(p) | {"chi_square": p.chi_square} for p in self.pairs],
+            "agreements": _json(self.agreements),
             "repeats": {"scatter": _json(self.scatter), "left_out": _json(self.left_out)},
             "concealed": [_json(o) | {"recovered": o.recovered} for o in self.concealed],
         }
@@ -108,6 +111,7 @@ def run(
         made,
         tuple(levels.run(made)) if "levels" in contents else (),
         tuple(pairs.run(made)) if "pairs" in contents else (),
+        tuple(pairs.agreements(made)) if "pairs" in contents else (),
         tuple(scatter),
         tuple(left_out),
         tuple(concealed),
@@ -121,7 +125,7 @@ def show(found: Results, contents: Sequence[str]) -> None:
         levels.show(found.made)
     if "pairs" in contents:
         print("\n### Pairs of accelerometers in moving flight, m/s^2")
-        print(pairs.table(found.pairs))
+        print(pairs.table(found.pairs, found.agreements))
     if "repeats" in contents:
         print("\n### Repeated flights")
         print(repeats.scatter_table(found.scatter))
