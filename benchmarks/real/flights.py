@@ -24,8 +24,8 @@ from onboard.recordings.opening import open_recording
 
 Array = NDArray[np.float64]
 
-MOVING_M_S = 2.0
-"""Faster than this a vehicle flies."""
+MOVING_M_S = 0.5
+"""Faster than this a vehicle is in the air: a receiver at rest wanders slower."""
 AT_LIMIT = 0.01
 """A level is at a limit within this share of it."""
 
@@ -48,7 +48,7 @@ class Fit:
         linear_covariance: (6, 6) of that.
         prior: (6,) centre of the prior, scale and beta.
         prior_sigma: (6,) of it.
-        force: (3,) mean of the force in moving flight with the parameters in force, sensor axes.
+        force: (3,) mean of the force in the air with the parameters in force, sensor axes.
         levels: noise levels by name.
         inflation: variance inflation.
         window: averaging span of the receiver, s; ``window_asked`` without its limit.
@@ -141,7 +141,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         linear_covariance=solution.covariance[:6, :6].copy(),
         prior=engine.model.prior[:6].copy(),
         prior_sigma=engine.model.prior_sigma[:6].copy(),
-        force=recorded.calibrator.parameters.R_bs.T @ moving_force(samples, imu),
+        force=recorded.calibrator.parameters.R_bs.T @ moving_force(samples, imu, flight.ends_s),
         levels={n: float(getattr(engine.noise, n)) for n in LIMITS if hasattr(engine.noise, n)},
         inflation=solution.variance_inflation,
         window=engine.point.window,
@@ -173,8 +173,8 @@ def judged(samples: Iterable[Sample], imu: int) -> Judge:
     return examine(heard(samples, imu).calibrator, imu)
 
 
-def moving_force(samples: Sequence[Sample], imu: int) -> Array:
-    """(3,) mean of the reported force while the vehicle is fast, body axes, m/s^2."""
+def moving_force(samples: Sequence[Sample], imu: int, until: float = np.inf) -> Array:
+    """(3,) mean of the reported force while the vehicle moves, body axes, m/s^2."""
     fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= 3]
     rows = [s for s in samples if isinstance(s, ImuSample) and s.imu == imu]
     if len(fixes) < 2 or not rows:
@@ -184,6 +184,7 @@ def moving_force(samples: Sequence[Sample], imu: int) -> Array:
     order = np.argsort(at, kind="stable")
     speed = np.hypot([s.v_n for s in fixes], [s.v_e for s in fixes])
     moving = np.interp(t, at[order], speed[order], left=0.0, right=0.0) > MOVING_M_S
+    moving &= t < until
     if not np.any(moving):
         return np.full(3, np.nan)
     mean: Array = np.array([s.f_b for s in rows])[moving].mean(axis=0)

@@ -1,6 +1,6 @@
 """Two accelerometers on one board: they feel the same force, so their difference needs no GPS.
 
-The mean over moving flight of ``f = scale (raw - offset)`` is compared between the accelerometers
+The mean over flight of ``f = scale (raw - offset)`` is compared between the accelerometers
 of each flight: with the parameters in force, and with each one's own estimate.  The predicted
 sigma of the difference takes the two solutions for independent.  They are not: they share GPS and
 attitude, whose errors cancel in the difference.  So chi-square should be *below* its degrees

@@ -124,7 +124,7 @@ def show(found: Results, contents: Sequence[str]) -> None:
         print("\n### Levels")
         levels.show(found.made)
     if "pairs" in contents:
-        print("\n### Pairs of accelerometers in moving flight, m/s^2")
+        print("\n### Pairs of accelerometers in flight, m/s^2")
         print(pairs.table(found.pairs, found.agreements))
     if "repeats" in contents:
         print("\n### Repeated flights")

@@ -21,6 +21,7 @@ building.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,6 +45,7 @@ class RealFlight:
         part: what it may be used for.
         imus: accelerometers that it has with a gyroscope each.
         why: what it is good for, or why it is where it is.
+        ends_s: boot clock from which on it is no flight any more: a crash.
     """
 
     file: str
@@ -51,6 +53,7 @@ class RealFlight:
     part: Part
     imus: tuple[int, ...]
     why: str
+    ends_s: float = math.inf
 
     @property
     def name(self) -> str:
@@ -73,7 +76,9 @@ FLIGHTS = (
     RealFlight("real/real-fixedwing-03.BIN", "small wing", "building", (1,), "looked at before"),
     RealFlight("real/real-quad-08.BIN", "Pixhawk quad", "building", (1, 2), "looked at before"),
     RealFlight("real/real-quad-10-hover.BIN", "Pixhawk quad", "building", (1, 2), "as quad-08"),
-    RealFlight("real/real-quad-14-crash.BIN", "crashed quad", "building", (1, 2), "looked at"),
+    RealFlight(
+        "real/real-quad-14-crash.BIN", "crashed quad", "building", (1, 2), "looked at", 370.0
+    ),
     RealFlight("real/real-quad-22-chibios.BIN", "ChibiOS quad", "building", (1, 2), "looked at"),
     RealFlight("quiver/quiver-00096.BIN", "quiver", "choosing", (1, 2, 3), "repeats"),
     RealFlight("quiver/quiver-00102.BIN", "quiver", "choosing", (1, 2, 3), "repeats"),

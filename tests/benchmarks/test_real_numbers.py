@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.real.flights import Fit
+from benchmarks.real.concealed import KINDS
+from benchmarks.real.flights import Fit, moving_force
+from benchmarks.real.outcomes import Said, compared
 from benchmarks.real.pairs import agreements, mean_force, run
 from benchmarks.real.repeats import average, scatter_of
 from benchmarks.real.whiteness import whiteness_of
+from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
 from onboard.core.maths.accelerometer import linear_of, parameters_jacobian
 
 RNG = np.random.default_rng(3)
@@ -129,3 +133,54 @@ def test_many_flights_outweigh_the_prior_that_each_of_them_leans_on() -> None:
     half = np.array([1.0, 1.0, 1.0, 0.1, 0.0, 0.0])
     some = [fit(half, np.diag(PRIOR_SIGMA**2) / 2)] * 9
     np.testing.assert_allclose(average(some)[3], 0.9 * true[3], rtol=1e-3)
+
+
+def said(numbers: dict[str, tuple[float, float]], *names: str) -> Said:
+    six = dict.fromkeys(SIX_NAMES, (0.0, 0.01))
+    return Said("explained", frozenset(names), six | numbers)
+
+
+def test_a_change_is_that_to_the_untouched_flight() -> None:
+    kind = next(k for k in KINDS if k.name == "GPS later 60 ms")
+    before = said({"gps_delay": (0.1, 0.003)})
+    after = said({"gps_delay": (0.161, 0.003)}, "gps_latency")
+    o = compared("a", kind, before, after, {"gps_delay": 0.16})
+    assert o.found
+    assert o.recovered
+    assert o.seen
+    assert o.wrong == ()
+    assert o.changes[0].truth == pytest.approx(0.06)
+    assert o.changes[0].change == pytest.approx(0.061)
+    assert o.moved == 0.0
+
+
+def test_an_effect_that_is_not_named_is_missed_and_another_name_is_wrong() -> None:
+    kind = next(k for k in KINDS if k.name.startswith("step x"))
+    before = said({}, "gps_latency")
+    after = said({"bias_ramp.x": (0.01, 0.001)}, "gps_latency", "bias_ramp", "empirical")
+    o = compared("a", kind, before, after, {"bias_step.x": 0.5})
+    assert o.found is False
+    assert not o.recovered
+    assert o.wrong == ("bias_ramp",)
+
+
+def test_what_a_flight_does_not_claim_to_know_is_recovered_but_not_seen() -> None:
+    kind = next(k for k in KINDS if k.name.startswith("offset x"))
+    after = said({"x offset": (0.0, 0.2)})
+    o = compared("a", kind, said({}), after, {"x offset": 0.3})
+    assert o.found is None
+    assert o.recovered
+    assert not o.seen
+
+
+def test_the_mean_force_is_of_the_flight_before_its_end() -> None:
+    """Standing it reads 1, flying 2, after the crash 9."""
+    samples: list[Sample] = []
+    for k in range(300):
+        t = 0.1 * k
+        x = 1.0 if t < 10.0 else 2.0 if t < 20.0 else 9.0
+        samples.append(ImuSample(t, 1, (x, 0.0, -9.8), (0.0, 0.0, 0.0)))
+        samples.append(GpsFix(t, 1, 3, 0.0, 0.0, 0.0, 0.0 if t < 10.0 else 5.0, 0.0))
+    assert moving_force(samples, 1, 20.0)[0] == pytest.approx(2.0, abs=0.02)
+    assert moving_force(samples, 1)[0] > 5.0
+    assert np.all(np.isnan(moving_force(samples, 2)))
