@@ -55,7 +55,8 @@ def said(judge: Judge) -> Said:
         for key, q in effect.unknowns.items():
             numbers.setdefault(f"{effect.name}.{key}", (q.value, q.sigma))
     names = frozenset(e.name for e in diagnosis.effects)
-    return Said(diagnosis.verdict.value, names, numbers)
+    blind = frozenset(n.name for n in diagnosis.not_testable)
+    return Said(diagnosis.verdict.value, names, numbers, blind)
 
 
 def flown(flight: RealFlight, kinds: Sequence[Kind], imu: int = 1) -> list[Outcome]:

@@ -87,19 +87,18 @@ def level_table(made: Sequence[Fit]) -> str:
 def gate_table(made: Sequence[Fit]) -> str:
     """Inflation, averaging span, and what the gates refused, in per cent."""
     lines = [
-        f"{'flight, IMU':16}{'inflat.':>7}{'span':>6}{'asked':>6}{'believed':>9}"
-        + "".join(f"{g[:6]:>7}" for g in GATES)
-        + "  verdict"
+        f"{'flight, IMU':16}{'infl.':>6}{'span':>6}{'asked':>6}{'believed':>9}"
+        + "".join(f"{g[:5]:>6}" for g in GATES)
+        + " verdict"
     ]
     for f in made:
         if f.failed:
             continue
-        cells = [_percent(f, gate) for gate in GATES]
+        cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
+        believed = f"{f.believed}/{f.epochs}"
         lines.append(
-            f"{_label(f)}{f.inflation:7.2f}{f.window:6.2f}{f.window_asked:6.2f}"
-            f"{f.believed:5}/{f.epochs:<4}"
-            + "".join(f"{c:6.1f}%" for c in cells)
-            + f"  {f.verdict}"
+            f"{_label(f)}{f.inflation:6.2f}{f.window:6.2f}{f.window_asked:6.2f}{believed:>9}"
+            f"{cells} {f.verdict.removesuffix('_explained')}"
         )
     return "\n".join(lines)
 

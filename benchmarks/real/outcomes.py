@@ -9,6 +9,7 @@ from benchmarks.real.concealed_kind import Kind
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import SIX_NAMES
 
+SILENT = Verdict.INSUFFICIENT.value
 NEAR = 0.1
 SIGMAS = 3.0
 
@@ -21,11 +22,13 @@ class Said:
         verdict: in a word.
         names: effects that were said.
         numbers: value and sigma by name, those of effects as ``effect.unknown``.
+        blind: effects that the flight is said not to show.
     """
 
     verdict: str
     names: frozenset[str]
     numbers: Mapping[str, tuple[float, float]]
+    blind: frozenset[str] = frozenset()
 
     def values(self) -> dict[str, float]:
         """Without sigmas."""
@@ -34,12 +37,23 @@ class Said:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One number: by how much it should have changed, and has."""
+    """One number: by how much it should have changed, and has.
+
+    Attributes:
+        name: of the number.
+        truth: by how much it should have changed.
+        change: by how much it has.
+        sigma: of the number as claimed; 0 if it was not said.
+        told: whether it was said.
+        hidden: it was not, and the flight was said not to show it.
+    """
 
     name: str
     truth: float
     change: float
     sigma: float
+    told: bool = True
+    hidden: bool = False
 
     @property
     def recovered(self) -> bool:
@@ -54,7 +68,7 @@ class Change:
     @property
     def seen(self) -> bool:
         """Whether the flight claims to know the number well enough to see it change."""
-        return SIGMAS * self.sigma < abs(self.truth)
+        return SIGMAS * self.sigma < abs(self.truth) if self.told else not self.hidden
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +126,10 @@ def compared(
     for name, value in truth.items():
         old = before.numbers.get(name, (0.0, 0.0))[0]
         new, sigma = after.numbers.get(name, (0.0, 0.0))
-        changes.append(Change(name, value - old, new - old, sigma))
+        hidden = name.split(".")[0] in after.blind or after.verdict == SILENT
+        changes.append(
+            Change(name, value - old, new - old, sigma, name in after.numbers, hidden=hidden)
+        )
     moved = max(
         abs(after.numbers[n][0] - before.numbers[n][0]) / after.numbers[n][1]
         for n in SIX_NAMES
@@ -134,36 +151,38 @@ def compared(
 def table(outcomes: Sequence[Outcome]) -> str:
     """Each outcome, then each kind."""
     lines = [
-        f"{'flight':15}{'concealed':25}{'number':>12}{'truth':>8}{'found':>8}{'sigma':>7}  said"
+        f"{'flight':15}{'concealed':23}{'number':>10}{'truth':>7}{'found':>7}{'sigma':>7} said"
     ]
     for o in outcomes:
-        label = f"{o.flight.removeprefix('real-')[:14]:15}{o.kind[:24]:25}"
-        if o.why:
-            lines.append(f"{label}{o.why[:38]}")
-            continue
-        for i, c in enumerate(o.changes):
-            mark = "ok" if c.recovered and c.seen else "wide" if c.recovered else "OFF"
-            name = c.name.rsplit(".", maxsplit=1)[-1][:11]
-            said_ = f"{mark} {_words(o)}" if i == 0 else mark
-            lines.append(
-                f"{label if i == 0 else '':40}{name:>12}{c.truth:8.3g}{c.change:8.3g}"
-                f"{c.sigma:7.2g}  {said_}"
-            )
+        lines += _lines(o)
     return "\n".join([*lines, "", kind_table(outcomes)])
 
 
-def _words(o: Outcome) -> str:
-    words = [] if o.found is None else ["found" if o.found else "missed"]
-    words += [f"WRONG {n}" for n in o.wrong]
-    if o.verdict == Verdict.INSUFFICIENT.value:
-        words.append("(silent)")
-    return " ".join(words)
+def _lines(o: Outcome) -> list[str]:
+    """One line for each number, one for names that were wrong."""
+    label = f"{o.flight.removeprefix('real-')[:14]:15}{o.kind[:22]:23}"
+    if o.why:
+        return [f"{label} {o.why[:40]}"]
+    out = []
+    for i, c in enumerate(o.changes):
+        mark = "OFF" if not c.recovered else "ok" if c.seen else "wide"
+        name = c.name.rsplit(".", maxsplit=1)[-1][:9]
+        words = "" if i or o.found is None else " found" if o.found else " missed"
+        out.append(
+            f"{'' if i else label:38}{name:>10}{c.truth:7.2g}{c.change:7.2g}{c.sigma:7.1g} "
+            f"{mark}{words}"
+        )
+    if o.wrong or o.verdict == SILENT:
+        said = [f"wrong: {', '.join(o.wrong)}"] if o.wrong else []
+        said += ["silent"] if o.verdict == SILENT else []
+        out.append(f"{'':38}  {'; '.join(said)}")
+    return out
 
 
 def kind_table(outcomes: Sequence[Outcome]) -> str:
     """One line for each kind of error, and the whole."""
     head = (
-        f"{'concealed':28}{'flights':>8}{'named':>9}{'wrong':>7}{'recovered':>11}"
+        f"{'concealed':27}{'flights':>8}{'named':>9}{'wrong':>7}{'recovered':>11}"
         f"{'of seen':>10}{'silent':>8}"
     )
     done = [o for o in outcomes if not o.why]
@@ -177,14 +196,14 @@ def _row(label: str, some: Sequence[Outcome]) -> str:
     seen = [o for o in some if o.seen]
     named_text = f"{sum(bool(o.found) for o in named)}/{len(named)}" if named else ""
     return (
-        f"{label:28}{len(some):8}{named_text:>9}{sum(bool(o.wrong) for o in some):7}"
+        f"{label:27}{len(some):8}{named_text:>9}{sum(bool(o.wrong) for o in some):7}"
         f"{f'{sum(o.recovered for o in some)}/{len(some)}':>11}"
         f"{f'{sum(o.recovered for o in seen)}/{len(seen)}':>10}"
-        f"{sum(o.verdict == Verdict.INSUFFICIENT.value for o in some):8}"
+        f"{sum(o.verdict == SILENT for o in some):8}"
     )
 
 
 LEGEND = """\
 ok: recovered; wide: within three sigma of a claim that is too wide to see it; OFF: neither.
-silent: the verdict is insufficient, and then no effect is named.  of seen: of those that the
-flight claims to know well enough."""
+silent: the verdict is insufficient, and then no effect is named.
+of seen: of those that the flight claims, or does not deny, to know well enough."""

@@ -7,7 +7,8 @@ import pytest
 
 from benchmarks.real.concealed import KINDS
 from benchmarks.real.flights import Fit, moving_force
-from benchmarks.real.outcomes import Said, compared
+from benchmarks.real.levels import gate_table
+from benchmarks.real.outcomes import Said, compared, table
 from benchmarks.real.pairs import agreements, mean_force, run
 from benchmarks.real.repeats import average, scatter_of
 from benchmarks.real.whiteness import whiteness_of
@@ -184,3 +185,21 @@ def test_the_mean_force_is_of_the_flight_before_its_end() -> None:
     assert moving_force(samples, 1, 20.0)[0] == pytest.approx(2.0, abs=0.02)
     assert moving_force(samples, 1)[0] > 5.0
     assert np.all(np.isnan(moving_force(samples, 2)))
+
+
+def test_an_effect_that_the_flight_is_said_not_to_show_was_not_to_be_seen() -> None:
+    kind = next(k for k in KINDS if k.name.startswith("step x"))
+    blind = replace(said({}), blind=frozenset({"bias_step"}))
+    assert not compared("a", kind, said({}), blind, {"bias_step.x": 0.5}).seen
+    assert compared("a", kind, said({}), said({}), {"bias_step.x": 0.5}).seen
+
+
+def test_tables_fit_eighty_columns() -> None:
+    kind = next(k for k in KINDS if k.name.startswith("GPS averaged"))
+    truth = {"gps_delay": 0.2, "window_squared": 0.123456}
+    before = said({"gps_delay": (0.1, 0.0031), "window_squared": (0.00123, 0.00456)})
+    after = replace(before, verdict="insufficient", names=frozenset({"gps_fault"}))
+    lines = table([compared("real-quad-22-chibios", kind, before, after, truth)]).splitlines()
+    a = replace(fit(PRIOR, np.eye(6)), flight="real-quad-22-chibios", verdict="partly_explained")
+    lines += gate_table([replace(a, believed=10000, epochs=9999)]).splitlines()
+    assert max(map(len, lines)) <= 80
