@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.real.concealed import KINDS
 from benchmarks.real.concealed_kind import Kind, about
-from benchmarks.real.flights import judged
+from benchmarks.real.flights import judged, told
 from benchmarks.real.outcomes import LEGEND, Outcome, Said, compared, table
 from benchmarks.real.split import WHERE, RealFlight, available
 from onboard.core.diagnosis.evidence import Judge
@@ -74,6 +74,7 @@ def flown(flight: RealFlight, kinds: Sequence[Kind], imu: int = 1) -> list[Outco
         if not kind.applies(ground):
             out.append(Outcome(flight.name, kind.name, kind.wanted, why="does not apply"))
             continue
+        told(f"{flight.name}: {kind.name}")
         try:
             after = said(judged(kind.lay(samples, ground), imu))
         except (ArithmeticError, LookupError, ValueError) as error:

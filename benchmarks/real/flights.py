@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -111,7 +112,13 @@ class Fit:
 
 def fit(flight: RealFlight, imu: int) -> Fit:
     """One accelerometer of one flight."""
+    told(f"{flight.name}, accelerometer {imu}")
     return fitted(flight, imu, list(open_recording(flight.path).samples()))
+
+
+def told(what: str) -> None:
+    """Progress, for whoever waits; results go to standard output."""
+    print(f"  {what}", file=sys.stderr, flush=True)
 
 
 def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:

@@ -87,7 +87,7 @@ def level_table(made: Sequence[Fit]) -> str:
 def gate_table(made: Sequence[Fit]) -> str:
     """Inflation, averaging span, and what the gates refused, in per cent."""
     lines = [
-        f"{'flight, IMU':16}{'infl.':>6}{'span':>6}{'asked':>6}{'believed':>9}"
+        f"{'flight, IMU':16}{'infl.':>6}{'span':>5}{'asked':>6}{'believed':>10}"
         + "".join(f"{g[:5]:>6}" for g in GATES)
         + " verdict"
     ]
@@ -97,7 +97,7 @@ def gate_table(made: Sequence[Fit]) -> str:
         cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
         believed = f"{f.believed}/{f.epochs}"
         lines.append(
-            f"{_label(f)}{f.inflation:6.2f}{f.window:6.2f}{f.window_asked:6.2f}{believed:>9}"
+            f"{_label(f)}{f.inflation:6.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>10}"
             f"{cells} {f.verdict.removesuffix('_explained')}"
         )
     return "\n".join(lines)

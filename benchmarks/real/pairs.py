@@ -130,17 +130,12 @@ def agreements(made: Sequence[Fit]) -> list[Agreement]:
 
 def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:
     """One line for each pair, and what they say together."""
-    lines = [f"{'flight, IMUs':19}{'in force':^20}{'estimated':^20}{'its sigma':^18}{'chi2':>6}"]
+    lines = [f"{'flight, IMUs':17}{'in force':^19}{'estimated':^19}{'its sigma':^18}{'chi2':>6}"]
     for p in pairs:
-        cells = [*p.before, *p.after]
-        label = f"{p.flight.removeprefix('real-')[:14]:14} {p.imus[0]}-{p.imus[1]}"
-        lines.append(
-            f"{label:18}"
-            + "".join(f"{x:7.2f}" if i % 3 == 0 else f"{x:6.2f}" for i, x in enumerate(cells))
-            + " "
-            + "".join(f"{x:6.3f}" for x in p.sigma)
-            + f"{p.chi_square:6.1f}"
-        )
+        label = f"{p.flight.removeprefix('real-')[:13]:13} {p.imus[0]}-{p.imus[1]}"
+        before, after = ("".join(f"{x:6.2f}" for x in d) for d in (p.before, p.after))
+        sigma = "".join(f"{x:6.3f}" for x in p.sigma)
+        lines.append(f"{label:17}{before} {after} {sigma}{p.chi_square:6.1f}")
     if pairs:
         lines += summary(pairs, agreed)
     return "\n".join(lines)

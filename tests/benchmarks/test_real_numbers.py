@@ -10,6 +10,7 @@ from benchmarks.real.flights import Fit, moving_force
 from benchmarks.real.levels import gate_table
 from benchmarks.real.outcomes import Said, compared, table
 from benchmarks.real.pairs import agreements, mean_force, run
+from benchmarks.real.pairs import table as pair_table
 from benchmarks.real.repeats import average, scatter_of
 from benchmarks.real.whiteness import whiteness_of
 from onboard.core.estimate.result import SIX_NAMES
@@ -201,5 +202,7 @@ def test_tables_fit_eighty_columns() -> None:
     after = replace(before, verdict="insufficient", names=frozenset({"gps_fault"}))
     lines = table([compared("real-quad-22-chibios", kind, before, after, truth)]).splitlines()
     a = replace(fit(PRIOR, np.eye(6)), flight="real-quad-22-chibios", verdict="partly_explained")
-    lines += gate_table([replace(a, believed=10000, epochs=9999)]).splitlines()
+    lines += gate_table([replace(a, believed=4235, epochs=4234)]).splitlines()
+    made = [drawn(1), drawn(2), drawn(3)]
+    lines += pair_table(run(made), agreements(made)).splitlines()
     assert max(map(len, lines)) <= 80
