@@ -185,8 +185,8 @@ def summary(scatter: Sequence[Scatter], left_out: Sequence[LeftOut]) -> list[str
                 for n in ("in_force", "others", "own")
             ]
             lines.append(
-                f"left out, {horizon:.0f} s: better in {better} of {len(some)}, median drift "
-                f"{medians[0]:.2f} in force, {medians[1]:.2f} others, {medians[2]:.2f} own (m/s)"
+                f"left out, {horizon:.0f} s: better in {better} of {len(some)}; drift "
+                f"{medians[0]:.2f} in force, {medians[1]:.2f} others, {medians[2]:.2f} own"
             )
     return lines
 
