@@ -150,9 +150,7 @@ def compared(
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Each outcome, then each kind."""
-    lines = [
-        f"{'flight':15}{'concealed':23}{'number':>10}{'truth':>7}{'found':>7}{'sigma':>7} said"
-    ]
+    lines = [f"{'flight':15}{'concealed':23}{'number':>9}{'truth':>8}{'found':>8}{'sigma':>7} said"]
     for o in outcomes:
         lines += _lines(o)
     return "\n".join([*lines, "", kind_table(outcomes)])
@@ -166,10 +164,10 @@ def _lines(o: Outcome) -> list[str]:
     out = []
     for i, c in enumerate(o.changes):
         mark = "OFF" if not c.recovered else "ok" if c.seen else "wide"
-        name = c.name.rsplit(".", maxsplit=1)[-1][:9]
+        name = c.name.rsplit(".", maxsplit=1)[-1][:8]
         words = "" if i or o.found is None else " found" if o.found else " missed"
         out.append(
-            f"{'' if i else label:38}{name:>10}{c.truth:7.2g}{c.change:7.2g}{c.sigma:7.1g} "
+            f"{'' if i else label:38}{name:>9}{c.truth:8.2g}{c.change:8.2g}{c.sigma:7.1g} "
             f"{mark}{words}"
         )
     if o.wrong or o.verdict == SILENT:
