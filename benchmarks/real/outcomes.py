@@ -150,7 +150,7 @@ def compared(
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Each outcome, then each kind."""
-    lines = [f"{'flight':15}{'concealed':23}{'number':>9}{'truth':>8}{'found':>8}{'sigma':>7} said"]
+    lines = [f"{'flight':14}{'concealed':22}{'number':>9}{'truth':>8}{'found':>8}{'sigma':>7} said"]
     for o in outcomes:
         lines += _lines(o)
     return "\n".join([*lines, "", kind_table(outcomes)])
@@ -158,7 +158,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 def _lines(o: Outcome) -> list[str]:
     """One line for each number, one for names that were wrong."""
-    label = f"{o.flight.removeprefix('real-')[:14]:15}{o.kind[:22]:23}"
+    label = f"{o.flight.removeprefix('real-')[:13]:14}{o.kind[:22]:22}"
     if o.why:
         return [f"{label} {o.why[:40]}"]
     out = []
@@ -167,13 +167,13 @@ def _lines(o: Outcome) -> list[str]:
         name = c.name.rsplit(".", maxsplit=1)[-1][:8]
         words = "" if i or o.found is None else " found" if o.found else " missed"
         out.append(
-            f"{'' if i else label:38}{name:>9}{c.truth:8.2g}{c.change:8.2g}{c.sigma:7.1g} "
+            f"{'' if i else label:36}{name:>9}{c.truth:8.2g}{c.change:8.2g}{c.sigma:7.1g} "
             f"{mark}{words}"
         )
     if o.wrong or o.verdict == SILENT:
         said = [f"wrong: {', '.join(o.wrong)}"] if o.wrong else []
         said += ["silent"] if o.verdict == SILENT else []
-        out.append(f"{'':38}  {'; '.join(said)}")
+        out.append(f"{'':36}  {'; '.join(said)}")
     return out
 
 
@@ -202,6 +202,6 @@ def _row(label: str, some: Sequence[Outcome]) -> str:
 
 
 LEGEND = """\
-ok: recovered; wide: within three sigma of a claim that is too wide to see it; OFF: neither.
-silent: the verdict is insufficient, and then no effect is named.
+ok: recovered.  wide: within three sigma of a claim that is too wide to see it.
+OFF: neither.  silent: the verdict is insufficient, and then nothing is named.
 of seen: of those that the flight claims, or does not deny, to know well enough."""
