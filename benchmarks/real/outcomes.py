@@ -170,9 +170,10 @@ def _lines(o: Outcome) -> list[str]:
             f"{'' if i else label:36}{name:>9}{c.truth:8.2g}{c.change:8.2g}{c.sigma:7.1g} "
             f"{mark}{words}"
         )
-    if o.wrong or o.verdict == SILENT:
-        said = [f"wrong: {', '.join(o.wrong)}"] if o.wrong else []
-        said += ["silent"] if o.verdict == SILENT else []
+    said = [f"wrong: {', '.join(o.wrong)}"] if o.wrong else []
+    said += [f"the six took it: {o.moved:.0f} sigma"] if o.moved > SIGMAS else []
+    said += ["silent"] if o.verdict == SILENT else []
+    if said:
         out.append(f"{'':36}  {'; '.join(said)}")
     return out
 
