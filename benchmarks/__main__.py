@@ -22,6 +22,7 @@ from benchmarks import (
     link,
     robustness,
 )
+from benchmarks.real import runner as real
 
 
 def _paths() -> None:
@@ -56,6 +57,7 @@ def main() -> None:
             lambda: explaining.main(["--count", str(chosen.recordings)]),
         ),
         "explain_time": ("Time of an explanation", lambda: explain_time.main([])),
+        "real": ("Real flights, which nobody knows the truth about", lambda: real.main([])),
         "cost": ("Cost of the estimator", lambda: cost.main([])),
         "paths": ("Cost of link and service", _paths),
     }

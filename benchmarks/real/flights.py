@@ -1,0 +1,236 @@
+"""One real flight through the diagnosis, once for each accelerometer: what every part asks."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.real.split import RealFlight
+from benchmarks.real.whiteness import Whiteness, whiteness
+from onboard.answers.recorded import Recorded
+from onboard.core.diagnosis.evidence import Judge
+from onboard.core.diagnosis.procedure import examine
+from onboard.core.estimate.dead_reckoning import Interval, intervals
+from onboard.core.estimate.limits import LONGEST_WINDOW_S
+from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.traces import EpochState
+from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.recordings.opening import open_recording
+
+Array = NDArray[np.float64]
+
+MOVING_M_S = 0.5
+"""Faster than this a vehicle is in the air: a receiver at rest wanders slower."""
+AT_LIMIT = 0.01
+"""A level is at a limit within this share of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """One accelerometer of one flight, estimated by itself.
+
+    Attributes:
+        flight: its name.
+        vehicle: whose.
+        imu: accelerometer.
+        status: of the calibration, ``failed`` if there is none; then all below is empty.
+        verdict: of the diagnosis.
+        effects: names that were said.
+        in_force: (6,) scale and offset with which it was recorded.
+        estimate: (6,) scale and offset.
+        covariance: (6, 6) of it.
+        linear: (6,) the same as scale and beta, with the prior in it.
+        linear_covariance: (6, 6) of that.
+        prior: (6,) centre of the prior, scale and beta.
+        prior_sigma: (6,) of it.
+        force: (3,) mean of the force in the air with the parameters in force, sensor axes.
+        levels: noise levels by name.
+        inflation: variance inflation.
+        window: averaging span of the receiver, s; ``window_asked`` without its limit.
+        epochs: how many, ``believed`` how many were to be used.
+        refused: epochs that each gate refused, by name.
+        white: of the whitened residuals, by kind.
+        chain: integrals between epochs.
+        states: filter states at epochs.
+    """
+
+    flight: str
+    vehicle: str
+    imu: int
+    status: str
+    verdict: str
+    effects: tuple[str, ...]
+    in_force: Array
+    estimate: Array
+    covariance: Array
+    linear: Array
+    linear_covariance: Array
+    prior: Array
+    prior_sigma: Array
+    force: Array
+    levels: dict[str, float]
+    inflation: float
+    window: float
+    window_asked: float
+    epochs: int
+    believed: int
+    refused: dict[str, int]
+    white: tuple[Whiteness, ...]
+    chain: tuple[Interval, ...] = ()
+    states: tuple[EpochState, ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no estimate."""
+        return self.status == "failed"
+
+    @property
+    def at_limit(self) -> tuple[str, ...]:
+        """Names of the levels at a limit, with ``-`` at the lower and ``+`` at the upper end."""
+        out = []
+        for name, (low, high) in LIMITS.items():
+            level = self.levels.get(name)
+            if level is None:
+                continue
+            if level <= low * (1.0 + AT_LIMIT):
+                out.append(f"{name}-")
+            elif level >= high * (1.0 - AT_LIMIT):
+                out.append(f"{name}+")
+        return tuple(out)
+
+    @property
+    def clipped(self) -> bool:
+        """Whether the averaging span is at its limit."""
+        return self.window >= LONGEST_WINDOW_S * (1.0 - AT_LIMIT)
+
+
+def fit(flight: RealFlight, imu: int) -> Fit:
+    """One accelerometer of one flight."""
+    told(f"{flight.name}, accelerometer {imu}")
+    return fitted(flight, imu, list(open_recording(flight.path).samples()))
+
+
+def told(what: str) -> None:
+    """Progress, for whoever waits; results go to standard output."""
+    print(f"  {what}", file=sys.stderr, flush=True)
+
+
+def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
+    """The same of samples that were read before."""
+    recorded = heard(samples, imu)
+    try:
+        judge = examine(recorded.calibrator, imu)
+        diagnosis = judge.diagnosis()
+    except (ArithmeticError, LookupError, ValueError) as error:
+        return _failed(flight, imu, str(error))
+    engine, c = judge.engine, judge.calibration
+    solution = engine.found()
+    square = engine.model.index["window_squared"]
+    asked = engine.point.window**2 + float(solution.theta[square])
+    six = SixParameters(c.in_force_scale, c.in_force_offset)
+    return Fit(
+        flight=flight.name,
+        vehicle=flight.vehicle,
+        imu=imu,
+        status=c.status.value,
+        verdict=diagnosis.verdict.value,
+        effects=tuple(e.name for e in diagnosis.effects),
+        in_force=six.as_vector(),
+        estimate=np.array(c.scale + c.offset),
+        covariance=np.array(c.covariance),
+        linear=solution.theta[:6].copy(),
+        linear_covariance=solution.covariance[:6, :6].copy(),
+        prior=engine.model.prior[:6].copy(),
+        prior_sigma=engine.model.prior_sigma[:6].copy(),
+        force=recorded.calibrator.parameters.R_bs.T @ moving_force(samples, imu, flight.ends_s),
+        levels={n: float(getattr(engine.noise, n)) for n in LIMITS if hasattr(engine.noise, n)},
+        inflation=solution.variance_inflation,
+        window=engine.point.window,
+        window_asked=float(np.sqrt(max(asked, 0.0))),
+        epochs=len(engine.traces),
+        believed=judge.evidence.believed,
+        refused=dict(engine.refused),
+        white=whiteness(engine.traces, solution.theta),
+        chain=tuple(intervals([(b.segment, b.fixes) for b in engine.batches], engine.point)),
+        states=tuple(engine.states),
+    )
+
+
+def heard(samples: Iterable[Sample], imu: int) -> Recorded:
+    """The samples as ``replay`` and ``explain`` read them, for one accelerometer."""
+    made = Recorded((imu,))
+    for sample in samples:
+        made.feed(sample)
+    made.finish()
+    return made
+
+
+def judged(samples: Iterable[Sample], imu: int) -> Judge:
+    """The diagnosis of samples.
+
+    Raises:
+        ArithmeticError, LookupError, ValueError: numbers that no model fits.
+    """
+    return examine(heard(samples, imu).calibrator, imu)
+
+
+def moving_force(samples: Sequence[Sample], imu: int, until: float = np.inf) -> Array:
+    """(3,) mean of the reported force while the vehicle moves, body axes, m/s^2."""
+    fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= 3]
+    rows = [s for s in samples if isinstance(s, ImuSample) and s.imu == imu]
+    if len(fixes) < 2 or not rows:
+        return np.full(3, np.nan)
+    t = np.array([s.t for s in rows])
+    at = np.array([s.t for s in fixes])
+    order = np.argsort(at, kind="stable")
+    speed = np.hypot([s.v_n for s in fixes], [s.v_e for s in fixes])
+    moving = np.interp(t, at[order], speed[order], left=0.0, right=0.0) > MOVING_M_S
+    moving &= t < until
+    if not np.any(moving):
+        return np.full(3, np.nan)
+    mean: Array = np.array([s.f_b for s in rows])[moving].mean(axis=0)
+    return mean
+
+
+def fits(flights: Sequence[RealFlight], jobs: int = 1) -> list[Fit]:
+    """Every accelerometer of every flight, in order; ``jobs`` processes."""
+    wanted = [(f, imu) for f in flights for imu in f.imus]
+    if jobs <= 1:
+        return [fit(f, imu) for f, imu in wanted]
+    with ProcessPoolExecutor(max_workers=jobs) as pool:
+        return list(pool.map(fit, *zip(*wanted, strict=True)))
+
+
+def _failed(flight: RealFlight, imu: int, why: str) -> Fit:
+    three, six, square = np.full(3, np.nan), np.full(6, np.nan), np.full((6, 6), np.nan)
+    nan = float("nan")
+    return Fit(
+        flight.name,
+        flight.vehicle,
+        imu,
+        "failed",
+        why,
+        (),
+        six,
+        six,
+        square,
+        six,
+        square,
+        six,
+        six,
+        three,
+        {},
+        nan,
+        nan,
+        nan,
+        0,
+        0,
+        {},
+        (),
+    )

@@ -1,0 +1,169 @@
+"""What the likelihood finds on real flights: noise levels, gates, averaging span, whiteness.
+
+A level at a limit, blocks that contradict each other and residuals that are not white all say the
+same: the filter's model of noise is not that of the flight.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.real.flights import Fit, fits
+from benchmarks.real.split import WHERE, available
+from benchmarks.real.whiteness import KINDS
+from onboard.core.estimate.limits import LONGEST_WINDOW_S
+
+SANE_GYROSCOPE = 1e-3
+"""rad/sqrt(s); ten times a poor MEMS gyroscope: more is something else."""
+SANE_INFLATION = 2.0
+SHORT = {
+    "velocity": "vel",
+    "velocity_colour": "col",
+    "height": "hgt",
+    "height_walk": "hwk",
+    "force_walk": "fwk",
+    "tilt_walk": "gyro",
+    "bias_walk": "bias",
+    "attitude": "att",
+    "heading": "head",
+}
+GATES = ("velocity", "recovery", "height", "attitude")
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """How many of how many accelerometers fulfil something."""
+
+    what: str
+    count: int
+    of: int
+
+    def __str__(self) -> str:
+        """As a line."""
+        return f"{self.what:54}{self.count:4} of {self.of}"
+
+
+def run(made: Sequence[Fit]) -> list[Share]:
+    """The criteria over all accelerometers that could be fitted."""
+    good = [f for f in made if not f.failed]
+
+    def share(what: str, holds: Callable[[Fit], bool]) -> Share:
+        return Share(what, sum(holds(f) for f in good), len(good))
+
+    return [
+        share(
+            f"gyroscope walk below {SANE_GYROSCOPE:g} rad/sqrt(s)",
+            lambda f: f.levels.get("tilt_walk", np.inf) < SANE_GYROSCOPE,
+        ),
+        share("a noise level at a limit", lambda f: bool(f.at_limit)),
+        share(
+            f"variance inflation below {SANE_INFLATION:g}", lambda f: f.inflation < SANE_INFLATION
+        ),
+        share(f"averaging span clipped at {LONGEST_WINDOW_S:g} s", lambda f: f.clipped),
+        share("calibrated", lambda f: f.status == "calibrated"),
+        share("verdict insufficient", lambda f: f.verdict == "insufficient"),
+    ]
+
+
+def _label(f: Fit) -> str:
+    return f"{f.flight.removeprefix('real-')[:13]:14}{f.imu} "
+
+
+def level_table(made: Sequence[Fit]) -> str:
+    """Noise levels; ``-`` and ``+`` mark those at their lower and upper limit."""
+    names = list(dict.fromkeys(n for f in made for n in f.levels))
+    lines = [f"{'flight, IMU':16}" + "".join(f"{SHORT.get(n, n[:5]):>7}" for n in names)]
+    for f in made:
+        marks = {m[:-1]: m[-1] for m in f.at_limit}
+        cells = [f"{f.levels[n]:6.1g}{marks.get(n, ' ')}" for n in names if n in f.levels]
+        lines.append(_label(f) + ("".join(cells) or f"  {f.verdict[:60]}"))
+    return "\n".join(lines)
+
+
+def gate_table(made: Sequence[Fit]) -> str:
+    """Inflation, averaging span, and what the gates refused, in per cent."""
+    lines = [
+        f"{'flight, IMU':16}{'infl.':>6}{'span':>5}{'asked':>6}{'believed':>10}"
+        + "".join(f"{g[:5]:>6}" for g in GATES)
+        + " verdict"
+    ]
+    for f in made:
+        if f.failed:
+            continue
+        cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
+        believed = f"{f.believed}/{f.epochs}"
+        lines.append(
+            f"{_label(f)}{f.inflation:6.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>10}"
+            f"{cells} {f.verdict.removesuffix('_explained')}"
+        )
+    return "\n".join(lines)
+
+
+def _percent(f: Fit, gate: str) -> float:
+    """Share of the epochs that could be refused."""
+    asked = f.epochs if gate == "attitude" else f.believed
+    return 100.0 * f.refused.get(gate, 0) / max(asked, 1)
+
+
+def whiteness_table(made: Sequence[Fit]) -> str:
+    """Median over accelerometers; then each kind of each flight."""
+    head = (
+        f"{'':16}{'kind':12}{'rows':>6}{'var.':>7}{'lag 1':>7}{'<0.1Hz':>8}{'..1Hz':>7}{'>1Hz':>7}"
+    )
+    lines = [head]
+    for kind in KINDS:
+        some = [w for f in made for w in f.white if w.kind == kind]
+        if some:
+            density = np.array([w.density for w in some])
+            cells = [_median(density[:, i]) for i in range(density.shape[1])]
+            lines.append(
+                f"{'median':16}{kind:12}{sum(w.rows for w in some):6}"
+                f"{_median([w.variance for w in some]):7.2f}{_median([w.lag1 for w in some]):7.2f}"
+                f"{cells[0]:8.2f}{cells[1]:7.2f}{cells[2]:7.2f}"
+            )
+    lines += [
+        f"{_label(f)}{w.kind:12}{w.rows:6}{w.variance:7.2f}{w.lag1:7.2f}"
+        f"{w.density[0]:8.2f}{w.density[1]:7.2f}{w.density[2]:7.2f}"
+        for f in made
+        for w in f.white
+    ]
+    return "\n".join(lines)
+
+
+def _median(values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    finite = np.array([v for v in values if np.isfinite(v)])
+    return float(np.median(finite)) if len(finite) else float("nan")
+
+
+def show(made: Sequence[Fit]) -> None:
+    """Print the tables and the criteria."""
+    print("Noise levels (SI; - at the lower limit, + at the upper)")
+    print(level_table(made))
+    print("\nInflation of variance, averaging span (s), refused of what could be")
+    print(gate_table(made))
+    print("\nWhitened residuals: variance, and density by band, 1 each if the model is right")
+    print(whiteness_table(made))
+    print()
+    for share in run(made):
+        print(share)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Fit and print."""
+    parser = argparse.ArgumentParser(description="Noise levels on real flights.")
+    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
+    parser.add_argument("--jobs", type=int, default=1)
+    chosen = parser.parse_args(arguments)
+    flights = available("building", chosen.flights)
+    if not flights:
+        print(WHERE)
+        return
+    show(fits(flights, chosen.jobs))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""Two accelerometers on one board: they feel the same force, so their difference needs no GPS.
+
+The mean over flight of ``f = scale (raw - offset)`` is compared between the accelerometers
+of each flight: with the parameters in force, and with each one's own estimate.  The predicted
+sigma of the difference takes the two solutions for independent.  They are not: they share GPS and
+attitude, whose errors cancel in the difference.  So chi-square should be *below* its degrees
+of freedom, and a pair that is far above them is contradicted.  Left out is what the places of the
+sensors do (``w x (w x r)``, some mm/s^2 for 10 cm).
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.real.flights import Fit, fits
+from benchmarks.real.split import WHERE, available
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.arrays import vector3
+from onboard.core.maths.chi_square import survival
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Difference of the mean forces of two accelerometers of one flight, sensor axes, m/s^2.
+
+    Attributes:
+        flight: its name.
+        imus: which two.
+        before: (3,) with the parameters in force.
+        after: (3,) with each accelerometer's own estimate.
+        covariance: (3, 3) of ``after`` as the estimates claim.
+    """
+
+    flight: str
+    imus: tuple[int, int]
+    before: Array
+    after: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Array:
+        """(3,) of ``after``."""
+        out: Array = np.sqrt(np.diag(self.covariance))
+        return out
+
+    @property
+    def chi_square(self) -> float:
+        """With three degrees of freedom."""
+        return float(self.after @ np.linalg.solve(self.covariance, self.after))
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Chi-square of all accelerometers of one flight about their common mean force.
+
+    Three accelerometers make three pairs, of which two are independent: pairs do not add up, this
+    does.
+    """
+
+    flight: str
+    chi_square: float
+    freedom: int
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """Mean force of one accelerometer by one set of six, and its covariance."""
+
+    force: Array
+    covariance: Array
+
+
+def mean_force(fit: Fit) -> Mean:
+    """(3,) mean force by a flight's own estimate, and its (3, 3) covariance."""
+    raw = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:])).undo(fit.force)
+    scale, offset = fit.estimate[:3], fit.estimate[3:]
+    J = np.hstack([np.diag(raw - offset), -np.diag(scale)])
+    return Mean(scale * (raw - offset), J @ fit.covariance @ J.T)
+
+
+def _usable(fit: Fit) -> bool:
+    return not fit.failed and bool(np.all(np.isfinite(fit.force)))
+
+
+def run(made: Sequence[Fit]) -> list[Pair]:
+    """Every pair of accelerometers of every flight that was estimated and moved."""
+    good = [f for f in made if _usable(f)]
+    out = []
+    for one, other in combinations(good, 2):
+        if one.flight != other.flight:
+            continue
+        a, b = mean_force(one), mean_force(other)
+        out.append(
+            Pair(
+                one.flight,
+                (one.imu, other.imu),
+                one.force - other.force,
+                a.force - b.force,
+                a.covariance + b.covariance,
+            )
+        )
+    return out
+
+
+def agreements(made: Sequence[Fit]) -> list[Agreement]:
+    """All accelerometers of each flight about their mean, weighted by what they claim."""
+    out = []
+    for flight in dict.fromkeys(f.flight for f in made):
+        means = [mean_force(f) for f in made if f.flight == flight and _usable(f)]
+        if len(means) < 2:
+            continue
+        weights = [np.linalg.inv(m.covariance) for m in means]
+        whole = sum(weights, np.zeros((3, 3)))
+        middle = np.linalg.solve(
+            whole, sum(w @ m.force for w, m in zip(weights, means, strict=True))
+        )
+        apart = [m.force - middle for m in means]
+        chi = sum(float(d @ w @ d) for d, w in zip(apart, weights, strict=True))
+        out.append(Agreement(flight, chi, 3 * (len(means) - 1)))
+    return out
+
+
+def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:
+    """One line for each pair, and what they say together."""
+    lines = [f"{'flight, IMUs':17}{'in force':^19}{'estimated':^19}{'its sigma':^18}{'chi2':>6}"]
+    for p in pairs:
+        label = f"{p.flight.removeprefix('real-')[:13]:13} {p.imus[0]}-{p.imus[1]}"
+        before, after = ("".join(f"{x:6.2f}" for x in d) for d in (p.before, p.after))
+        sigma = "".join(f"{x:6.3f}" for x in p.sigma)
+        lines.append(f"{label:17}{before} {after} {sigma}{p.chi_square:6.1f}")
+    if pairs:
+        lines += summary(pairs, agreed)
+    return "\n".join(lines)
+
+
+def summary(pairs: Sequence[Pair], agreed: Sequence[Agreement]) -> list[str]:
+    """RMS of the differences, chi-square over all pairs."""
+    before = float(np.sqrt(np.mean([p.before**2 for p in pairs])))
+    after = float(np.sqrt(np.mean([p.after**2 for p in pairs])))
+    chi, dof = sum(a.chi_square for a in agreed), sum(a.freedom for a in agreed)
+    closer = sum(np.linalg.norm(p.after) < np.linalg.norm(p.before) for p in pairs)
+    rms = f"{before:.3f} in force, {after:.3f} estimated"
+    return [
+        f"difference, RMS of {len(pairs)} pairs, m/s^2: {rms}",
+        f"closer than with the parameters in force: {closer} of {len(pairs)} pairs",
+        f"chi-square {chi:.1f} for {dof} degrees of freedom (p = {survival(chi, dof):.2g})",
+    ]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Fit and print."""
+    parser = argparse.ArgumentParser(description="Pairs of accelerometers on real flights.")
+    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
+    parser.add_argument("--jobs", type=int, default=1)
+    chosen = parser.parse_args(arguments)
+    flights = [f for f in available("building", chosen.flights) if len(f.imus) > 1]
+    if not flights:
+        print(WHERE)
+        return
+    made = fits(flights, chosen.jobs)
+    print(table(run(made), agreements(made)))
+
+
+if __name__ == "__main__":
+    main()
