@@ -17,8 +17,8 @@ ARMING_THRESHOLD: Final = 0.75
 
 SURE: Final = 0.99
 """Probability that the specific force becomes better over the loads flown: one push in a hundred
-may make it worse, by less than it is uncertain.  Flight that was not used in the fit has to show the
-same odds."""
+may make it worse, by less than it is uncertain.  Flight that was not used in the fit has to show
+the same odds."""
 LEAST_CHANGE: Final = 0.01
 """m/s^2, root mean square over the flight.  Tilts the horizon by 0.06 degrees, and a receiver of
 0.05 m/s shows it after five seconds: less changes nothing that anybody could notice."""

@@ -90,8 +90,8 @@ class CoverageView(Record, frozen=True, kw_only=True):
 class CalibrationView(Record, frozen=True, kw_only=True):
     """The six numbers; the same object that ``onboard replay`` and ``explain`` write.
 
-    ``known`` says how far each is: ``yes``, ``roughly``, ``together`` or ``no``
-    (:mod:`onboard.answers.knowledge`); ``worth`` what setting what is known is worth.
+    ``known`` says how far each is: ``yes``, ``roughly``, ``together`` (with the other number of its
+    axis, as loaded in flight) or ``no``; ``worth`` what setting what is known is worth.
     """
 
     scale: Three
