@@ -171,7 +171,8 @@ def _against(
     if beside and diagnosis.calibration.status is not Status.CALIBRATED:
         return "it is read off from the accelerometer, which this flight does not calibrate"
     before, after = effect.held_out_before, effect.held_out_after
-    if not after <= settings.improvement * before:
+    odds = -2.0 * math.log(1.0 - settings.sure)
+    if not (after < before and effect.delta_bic <= -odds):
         return f"the held-out residual falls from {before:.3g} to {after:.3g} only"
     unknown = [n for n in effect.parameters if n not in parameters and not _former(n, parameters)]
     if unknown:

@@ -27,12 +27,14 @@ import numpy as np
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.determined import determine
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.physics.catalogue import bearing_of, phrase_of
 from onboard.core.physics.effect import Bearing
 from onboard.core.physics.finding import Finding
 from onboard.push.diagnosed import Diagnosed
 
+FORCES = tuple(f"{axis} force at the mean load" for axis in "xyz")
 MOVED_SIGMAS = 2.0
 """Of what is claimed for a number: how far missing physics may move it (5 % move it by chance)."""
 
@@ -122,12 +124,19 @@ def moved_most(diagnosis: Diagnosis) -> tuple[str, float, float] | None:
     # The smaller claim: without what was found the blocks may contradict each other, which
     # widens that sigma; with it the columns share what the flight tells.
     claimed = np.minimum(plain.sigma, fuller.scale_sigma + fuller.offset_sigma)
-    sigmas = np.where(fuller.observable, np.abs(by) / claimed, 0.0)
+    found = determine(fuller, plain.value)
+    # An axis of which a combination is known is judged by its force at the mean of its loads.
+    six = np.array(plain.value)
+    at_load = np.hstack([np.diag(np.array(fuller.load_mean) - six[3:]), -np.diag(six[:3])])
+    force_sigma = np.sqrt(np.diag(at_load @ np.array(fuller.covariance) @ at_load.T))
+    moves = np.concatenate([by, at_load @ by])
+    counts = np.concatenate([found.known, found.free[:3]])
+    sigmas = np.where(counts, np.abs(moves) / np.concatenate([claimed, force_sigma]), 0.0)
     worst = int(np.argmax(sigmas))
     # What is no number is not within its claim.
     if sigmas[worst] <= MOVED_SIGMAS:
         return None
-    return SIX_NAMES[worst], float(by[worst]), float(sigmas[worst])
+    return (*SIX_NAMES, *FORCES)[worst], float(moves[worst]), float(sigmas[worst])
 
 
 def diagnosed(given: Answer, document: Mapping[str, Any], *, resumed: bool = False) -> Diagnosed:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from onboard.answers.advice import Advice
+from onboard.answers.knowledge import determined, seen
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.physics.finding import Finding
@@ -30,11 +31,29 @@ class Number(msgspec.Struct, frozen=True):
     sigma: float | None = None
 
 
+class WorthDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """The six as they may be set: estimated as far as the flight tells, else as in force in it.
+
+    ``directions`` of six are determined.  The specific force over the loads flown changes by
+    ``change_m_s2`` (root mean square); its expected error falls from ``before`` to ``after``; it is
+    better with the ``probability``.
+    """
+
+    scale: Numbers
+    offset: Numbers
+    directions: int
+    change_m_s2: float
+    error_before_m_s2: float
+    error_after_m_s2: float
+    probability: float
+
+
 class CalibrationDocument(msgspec.Struct, frozen=True, kw_only=True):
     """Scale and offset, x, y, z, absolute, ArduPilot's; offsets in m/s^2.
 
     ``status`` is how far they may be believed; ``parameters`` has them by name, for ArduPilot only;
-    ``observable`` is in the order scale x, y, z, offset x, y, z.
+    ``observable`` is in the order scale x, y, z, offset x, y, z; so is ``known``: ``yes``,
+    ``roughly``, ``together`` (with the other number of its axis, as loaded in flight) or ``no``.
     """
 
     status: str
@@ -44,6 +63,8 @@ class CalibrationDocument(msgspec.Struct, frozen=True, kw_only=True):
     offset_sigma: Numbers
     parameters: dict[str, float]
     observable: list[bool]
+    known: list[str]
+    worth: WorthDocument | None
     note: str
 
 
@@ -194,7 +215,25 @@ def calibration_document(calibration: Calibration, autopilot: str) -> Calibratio
         offset_sigma=_numbers(calibration.offset_sigma),
         parameters={name: float(value) for name, value in named if math.isfinite(value)},
         observable=[bool(flag) for flag in calibration.observable],
+        known=list(seen(calibration)),
+        worth=worth_document(calibration),
         note=calibration.note,
+    )
+
+
+def worth_document(calibration: Calibration) -> WorthDocument | None:
+    """What the flight determines, and what it is worth; None if nothing can be said."""
+    found = determined(calibration)
+    if found is None:
+        return None
+    return WorthDocument(
+        scale=_numbers(found.six.scale),
+        offset=_numbers(found.six.offset),
+        directions=found.directions,
+        change_m_s2=found.change,
+        error_before_m_s2=found.error_before,
+        error_after_m_s2=found.error_after,
+        probability=found.probability,
     )
 
 

@@ -14,6 +14,7 @@ from onboard.answers import verdict
 from onboard.answers.advice import Advice
 from onboard.answers.explain import Explanation
 from onboard.answers.explain import explain as explain_recordings
+from onboard.answers.knowledge import seen
 from onboard.answers.words import fixed, percent
 from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
@@ -160,12 +161,12 @@ def _six(d: Diagnosis) -> Table:
         c.in_force_scale + c.in_force_offset,
         c.scale + c.offset,
         c.scale_sigma + c.offset_sigma,
-        c.observable,
+        seen(c),
         strict=True,
     )
-    for name, *numbers, seen in rows:
+    for name, *numbers, how in rows:
         shown = [fixed(x, 4).replace("−", "-") for x in numbers]
-        table.add_row(name, *shown, "yes" if seen else "no")
+        table.add_row(name, *shown, how)
     return table
 
 

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from onboard.answers.fleet import FleetDocument, Flown, fly, found
+from onboard.answers.knowledge import determined
 from onboard.cli.progress import numbered
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.estimate.result import Calibration, Status
@@ -129,8 +130,10 @@ def _line(name: str, c: Calibration) -> Text:
 def _largest(
     c: Calibration, which: tuple[int, ...], values: tuple[float, ...], held: tuple[float, ...]
 ) -> float:
-    """The largest change of an observed number, with its sign; NaN if none is observed."""
-    changes = [values[i % 3] - held[i % 3] for i in which if c.observable[i]]
+    """The largest change of a known number, with its sign; NaN if none is known."""
+    found = determined(c)
+    flags = found.known if found is not None else (False,) * 6
+    changes = [values[i % 3] - held[i % 3] for i in which if flags[i]]
     return max(changes, key=abs, default=math.nan)
 
 

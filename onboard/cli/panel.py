@@ -16,6 +16,7 @@ from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.view.snapshot import ImuView, Snapshot, WrittenView
 
 JOURNAL_LINES = 5
+NOT_SEEN = {"no": "not seen yet", "together": "with its axis"}
 STYLES = {"good": "bold green", "info": "bold", "warning": "bold yellow", "error": "bold red"}
 """By severity of a state."""
 
@@ -127,7 +128,7 @@ def _imu(snapshot: Snapshot, imu: ImuView) -> RenderableType:
             decimal(values[i]),
             decimal(sigmas[i]),
             f"{imu.coverage.per_parameter.get(SIX_NAMES[i], 0.0):.0f} %",
-            "" if c.observable[i] else "not seen yet",
+            NOT_SEEN.get(c.known[i], ""),
         )
     share = f"coverage {imu.coverage.percent:.0f} %"
     parts: list[RenderableType] = [Text(), headline(imu, share), Text(f" {imu.state.sentence}")]

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from onboard.answers.advice import Advice
+from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
@@ -24,6 +25,7 @@ STATUS_WORDS = {
 }
 AUTOPILOT_WORDS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 UNKNOWN = "-"
+KNOWN_STYLE = {YES: "green", ROUGHLY: "cyan", TOGETHER: "cyan"}
 
 
 def replay_report(result: Replay) -> Iterator[RenderableType]:
@@ -68,7 +70,7 @@ def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Tab
         c.scale + c.offset,
         c.scale_sigma + c.offset_sigma,
         names,
-        c.observable,
+        seen(c),
         strict=True,
     )
     for name, before, value, sigma, parameter, observed in rows:
@@ -79,7 +81,7 @@ def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Tab
             _fixed(value, digits),
             _fixed(sigma, digits),
             parameter,
-            Text("yes", "green") if observed else Text("no", "yellow"),
+            Text(observed, KNOWN_STYLE.get(observed, "yellow")),
         )
     return table
 

@@ -1,8 +1,8 @@
 """What would be written: a calibration and the autopilot's current values make a plan.
 
 Estimates are absolute (raw units), so the wanted parameter simply *is* the estimate, as
-float32; numbers that the flight did not show stay at the value in force and the others are
-conditioned on that (:mod:`onboard.push.conditioning`).
+float32; what the flight did not show stays at the value in force, and the rest is what belongs to
+it (:mod:`onboard.core.estimate.determined`).
 
 **Order of the writes.**  PARAM_SET takes effect on the next sample and there is no atomic
 group, so between the writes the autopilot flies on a mixture.  Three choices make each
@@ -28,15 +28,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self, cast
 
-import numpy as np
-
+from onboard.core.estimate.determined import determine
 from onboard.core.estimate.result import Calibration, Six
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import PushError
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push import limits
-from onboard.push.conditioning import condition
 
 GRAVITY = 9.80665
 
@@ -61,9 +59,10 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One parameter: value in force, value wanted (both float32), bounds, conditional sigma.
+    """One parameter: value in force, value wanted (both float32), bounds, sigma.
 
-    ``kept``: the flight does not show this number, it stays as it is.
+    ``kept``: the flight does not show this number, it stays as it is.  ``sigma`` is by how much
+    another flight like this one would want it otherwise.
     """
 
     name: str
@@ -78,6 +77,25 @@ class Change:
     def differs(self) -> bool:
         """Whether there is anything to write."""
         return self.before != self.wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Worth:
+    """What a plan is worth over the loads that were flown.
+
+    Attributes:
+        change: of the specific force by the plan, root mean square, m/s^2.
+        error_before: expected error of the force with the values in force, likewise.
+        error_after: the same with the plan's.
+        probability: that the error becomes smaller.
+        directions: how many of six directions the flight determines.
+    """
+
+    change: float
+    error_before: float
+    error_after: float
+    probability: float
+    directions: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +136,7 @@ class PushPlan:
     imu: int
     changes: tuple[Change, ...]
     baseline: Baseline
+    worth: Worth | None = None
     contradiction: float = 0.0
     contradiction_limit: float = 0.0
 
@@ -207,21 +226,15 @@ def propose(
     if missing:
         raise PushError(f"the autopilot has not told {', '.join(missing)}")
     before = [to_float32(current[n]) for n in names.six]
-    held = [not seen for seen in calibration.observable]
     try:
-        result = condition(
-            calibration.scale + calibration.offset,
-            np.array(calibration.covariance, dtype=np.float64),
-            held,
-            before,
-        )
-        wanted = [to_float32(v) for v in result.values]
+        found = determine(calibration, before)
+        wanted = [to_float32(v) for v in found.six.scale + found.six.offset]
     except ValueError as error:
         raise PushError(f"IMU {calibration.imu}: {error}") from None
     changes = []
     for i, name in enumerate(names.six):
         low, high = scale_bounds if i < 3 else (-offset_bound, offset_bound)
-        stays = held[i] or abs(wanted[i] - before[i]) < limits.UNCHANGED
+        stays = not found.free[i] or abs(wanted[i] - before[i]) < limits.UNCHANGED
         changes.append(
             Change(
                 name=name,
@@ -229,8 +242,8 @@ def propose(
                 wanted=before[i] if stays else wanted[i],
                 low=low,
                 high=high,
-                sigma=result.sigmas[i],
-                kept=held[i],
+                sigma=found.sigma[i],
+                kept=not found.free[i],
             )
         )
     return PushPlan(
@@ -238,8 +251,15 @@ def propose(
         imu=calibration.imu,
         changes=tuple(changes),
         baseline=Baseline.of(calibration),
-        contradiction=result.contradiction,
-        contradiction_limit=result.limit,
+        worth=Worth(
+            found.change,
+            found.error_before,
+            found.error_after,
+            found.probability,
+            found.directions,
+        ),
+        contradiction=found.contradiction,
+        contradiction_limit=found.contradiction_limit,
     )
 
 

@@ -6,10 +6,11 @@ those of :func:`objections` to its values, which hold for whoever would set them
 a parameter file, and those of :func:`moment` to writing now, which is also what a roll-back, or
 the resumption of an interrupted transaction, has to pass.
 
-What the estimate must show, number by number: a sigma below its limit, given the numbers
-that stay as they are.  A number that the flight does not show is not changed; then the
-others are those that belong to the value left in force (:mod:`onboard.push.conditioning`),
-and if the flight contradicts leaving it (0.999 quantile) nothing is written at all.
+What the estimate must show: that the specific force over the loads that were flown comes out better
+with it, as probably as :attr:`PolicySettings.sure`, and that flight which the fit did not see is
+likelier with it by the same odds.  What a flight does not show is not changed; then the others are
+those that belong to the values left in force (:mod:`onboard.core.estimate.determined`), and if the
+flight contradicts leaving them (0.999 quantile) nothing is written at all.
 
 Temperature calibration (INS_TCALn_ENABLE = 1) corrects *before* offset and scale, towards
 INS_ACCn_CALTEMP.  The estimate is made behind that correction and so belongs to the existing
@@ -19,6 +20,7 @@ autopilot learns it (2), the correction moves, and nothing is written.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -65,7 +67,7 @@ class Objection(Enum):
     NOT_ALLOWED = "name_not_allowed"
     OUT_OF_BOUNDS = "out_of_bounds"
     ZERO_OFFSETS = "zero_offsets"
-    SIGMA_TOO_LARGE = "sigma_too_large"
+    NOT_SURE = "not_sure"
     CONTRADICTED = "kept_value_contradicted"
     NO_IMPROVEMENT = "no_improvement"
     NOTHING_TO_CHANGE = "nothing_to_change"
@@ -85,19 +87,21 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySettings:
-    """Limits; offsets in m/s^2.  ``improvement``: held-out RMS must fall to this share."""
+    """Limits; offsets in m/s^2.
+
+    ``sure``: probability of an improvement that a push needs; ``least_change``: of the force over
+    the flight, root mean square, m/s^2, that is worth a push.
+    """
 
     mode: Mode = Mode.LANDED
     disarmed_s: float = limits.DISARMED_S
     scale_min: float = limits.SCALE_BOUNDS[0]
     scale_max: float = limits.SCALE_BOUNDS[1]
     offset_max: float = limits.OFFSET_BOUND
-    scale_sigma_max: float = limits.SCALE_SIGMA_MAX
-    offset_sigma_max: float = limits.OFFSET_SIGMA_MAX
-    improvement: float = limits.IMPROVEMENT
+    sure: float = limits.SURE
+    least_change: float = limits.LEAST_CHANGE
     in_flight_scale_step: float = limits.IN_FLIGHT_SCALE_STEP
     in_flight_offset_step: float = limits.IN_FLIGHT_OFFSET_STEP
-    significance: float = limits.SIGNIFICANCE
     arming_threshold: float = limits.ARMING_THRESHOLD
 
 
@@ -235,24 +239,35 @@ def _estimate(plan: PushPlan, calibration: Calibration, settings: PolicySettings
             "the parameters in force during the flight are not known, so neither is the raw sensor"
         )
         found.append(_no(Objection.PARAMETERS_UNKNOWN, sentence))
-    free = [c for c in plan.changes if not c.kept]
-    if not free:
+    if all(c.kept for c in plan.changes):
         found.append(_no(Objection.NOTHING_OBSERVED, "the flight shows none of the six numbers"))
+    elif plan.worth is None or plan.worth.change < settings.least_change:
+        sentence = (
+            f"what would change is less than {settings.least_change:g} m/s^2 over this flight"
+        )
+        found.append(_no(Objection.NOTHING_TO_CHANGE, sentence))
+    elif not plan.worth.probability >= settings.sure:
+        sentence = (
+            f"the new values are better with a probability of {plan.worth.probability:.3f}; "
+            f"{settings.sure:g} is needed"
+        )
+        found.append(_no(Objection.NOT_SURE, sentence))
     if plan.contradiction > plan.contradiction_limit:
         kept = ", ".join(c.name for c in plan.changes if c.kept)
         sentence = f"the flight contradicts leaving {kept} as it is, without showing its value"
         found.append(_no(Objection.CONTRADICTED, sentence))
+    return found + _held_out(plan, calibration, settings)
+
+
+def _held_out(plan: PushPlan, calibration: Calibration, settings: PolicySettings) -> list[Refusal]:
+    """What flight that the fit has not seen says against it: odds, as sure as the rest."""
     before, after = plan.baseline.held_out_before, plan.baseline.held_out_after
-    if before is None or after is None:
-        found.append(_no(Objection.NO_IMPROVEMENT, "there is no held-out residual to judge by"))
-    elif after > settings.improvement * before:
-        sentence = f"the held-out residual would go from {before:.3g} to {after:.3g} only"
-        found.append(_no(Objection.NO_IMPROVEMENT, sentence))
-    steps = [abs(c.wanted - c.before) - settings.significance * c.sigma for c in free]
-    if free and max(steps) <= 0.0:
-        sentence = f"no value differs from the one in force by {settings.significance:g} sigma"
-        found.append(_no(Objection.NOTHING_TO_CHANGE, sentence))
-    return found
+    if before is None or after is None or not math.isfinite(calibration.predictive_gain):
+        return [_no(Objection.NO_IMPROVEMENT, "there is no held-out residual to judge by")]
+    if calibration.predictive_gain >= -math.log(1.0 - settings.sure):
+        return []
+    sentence = f"the held-out residual would go from {before:.3g} to {after:.3g} only"
+    return [_no(Objection.NO_IMPROVEMENT, sentence)]
 
 
 def _number(change: Change, settings: PolicySettings) -> list[Refusal]:
@@ -260,18 +275,14 @@ def _number(change: Change, settings: PolicySettings) -> list[Refusal]:
         return [_no(Objection.NOT_ALLOWED, f"{change.name} is not on the list of what is written")]
     if change.kept:
         return []
-    found = []
     if "SCAL" in change.name:
-        low, high, limit = settings.scale_min, settings.scale_max, settings.scale_sigma_max
+        low, high = settings.scale_min, settings.scale_max
     else:
-        low, high, limit = -settings.offset_max, settings.offset_max, settings.offset_sigma_max
-    if change.differs and not low <= change.wanted <= high:
-        sentence = f"{change.name} = {change.wanted:.5g} is outside {low:g} ... {high:g}"
-        found.append(_no(Objection.OUT_OF_BOUNDS, sentence))
-    if not change.sigma <= limit:
-        sentence = f"{change.name}: sigma {change.sigma:.2g} is above {limit:g}"
-        found.append(_no(Objection.SIGMA_TOO_LARGE, sentence))
-    return found
+        low, high = -settings.offset_max, settings.offset_max
+    if not change.differs or low <= change.wanted <= high:
+        return []
+    sentence = f"{change.name} = {change.wanted:.5g} is outside {low:g} ... {high:g}"
+    return [_no(Objection.OUT_OF_BOUNDS, sentence)]
 
 
 def _steps(plan: PushPlan, settings: PolicySettings) -> list[Refusal]:

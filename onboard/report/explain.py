@@ -8,6 +8,7 @@ from typing import Any
 
 from onboard.answers import verdict, words
 from onboard.answers.advice import Advice
+from onboard.answers.knowledge import seen
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
@@ -216,17 +217,17 @@ def _parameters(d: Diagnosis, advice: Advice) -> list[dict[str, str]]:
     ]
 
 
-def _six(d: Diagnosis) -> list[tuple[str, str, str, str, bool]]:
+def _six(d: Diagnosis) -> list[tuple[str, str, str, str, str]]:
     c = d.calibration
     rows = zip(
         SIX_NAMES,
         c.scale + c.offset,
         c.scale_sigma + c.offset_sigma,
         c.in_force_scale + c.in_force_offset,
-        c.observable,
+        seen(c),
         strict=True,
     )
     return [
-        (name, words.fixed(v, 4), words.fixed(s, 4), words.fixed(f, 4), seen)
-        for name, v, s, f, seen in rows
+        (name, words.fixed(v, 4), words.fixed(s, 4), words.fixed(f, 4), how)
+        for name, v, s, f, how in rows
     ]

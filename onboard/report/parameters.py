@@ -95,8 +95,8 @@ def _about(calibration: Calibration, advice: Advice) -> Iterator[str]:
         yield f"# not to be set: {reason}"
     if not calibration.parameters_known:
         yield "# parameters in force are not in the recording: scale 1 and offset 0 are assumed"
-    names = zip(SIX_NAMES, calibration.observable, strict=True)
-    if hidden := [name for name, seen in names if not seen]:
+    changes = () if advice.plan is None else advice.plan.changes
+    if hidden := [name for name, c in zip(SIX_NAMES, changes, strict=False) if c.kept]:
         yield f"# not observable in this flight, left as in force: {', '.join(hidden)}"
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from onboard.answers import words
 from onboard.answers.advice import Advice
 from onboard.answers.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
+from onboard.answers.knowledge import ALL_SIX, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
 from onboard.core.estimate.observability import Needs
@@ -108,10 +109,8 @@ def _imu(
 
 def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, str, str]:
     """What was found, how sure, what to do: three short paragraphs."""
-    seen = sum(c.observable)
     if c.status is Status.CALIBRATED:
-        count = "All six" if seen == len(SIX_NAMES) else f"{seen} of the six"
-        what = f"{count} numbers are known from this flight."
+        what = f"{words.capital(knowledge(c))}."
         if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
             what += (
                 f" Integrated for {FREE_S:.0f} s without GPS, velocity is off by "
@@ -120,7 +119,7 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
             )
     else:
         weak = f.seen.note if f.seen is not None else ""
-        what = c.note.replace(weak, "").strip() or f"{seen} of the six numbers are known."
+        what = c.note.replace(weak, "").strip() or f"{knowledge(c)}."
         what = what[0].upper() + what[1:]
     sure = "Not judged on data that the fit did not see: there is too little."
     if math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after):
@@ -134,16 +133,16 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
 
 def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
     """What to set, by the policy, and what to fly."""
-    seen = sum(c.observable)
+    whole = knowledge(c) == ALL_SIX
     calibrated = c.status is Status.CALIBRATED
     if advice is None:
         if calibrated:
-            yield "Use the numbers below." if seen == len(SIX_NAMES) else "Use the observed ones."
+            yield "Use the numbers below." if whole else "Use those that are known."
     elif advice.settable:
         yield (
             "Set the parameters below."
-            if seen == len(SIX_NAMES)
-            else ("Set the observed parameters below.")
+            if whole
+            else "Set the parameters below that are named: together, for they belong together."
         )
     else:
         yield about_six(advice)
@@ -152,7 +151,7 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
         if "onboard explain" in c.note:
             yield "Ask onboard explain what is missing."
         yield f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
-    elif seen < len(SIX_NAMES) and fly:
+    elif not whole and fly:
         yield f"For the others: {fly}."
 
 
@@ -165,7 +164,7 @@ def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:
         c.in_force_scale + c.in_force_offset,
         c.scale + c.offset,
         c.scale_sigma + c.offset_sigma,
-        c.observable,
+        seen(c),
         strict=True,
     )
     return [
@@ -176,9 +175,9 @@ def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:
             "after": words.fixed(value, 4),
             "change": words.signed(value - before, 4),
             "sigma": words.fixed(sigma, 4),
-            "seen": seen,
+            "seen": how,
         }
-        for label, name, before, value, sigma, seen in rows
+        for label, name, before, value, sigma, how in rows
     ]
 
 

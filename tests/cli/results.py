@@ -14,14 +14,25 @@ from onboard.core.estimate.result import (
     Status,
 )
 
+SIGMAS = (0.0011, 0.0012, 0.0280, 0.004, 0.005, 0.274)
+TOGETHER = -0.999
+"""Correlation of z scale and z offset, which only show up together."""
+COVARIANCE = tuple(
+    tuple(
+        a * b * (1.0 if i == j else TOGETHER if {i, j} == {2, 5} else 0.0)
+        for j, b in enumerate(SIGMAS)
+    )
+    for i, a in enumerate(SIGMAS)
+)
+
 CALIBRATED = Calibration(
     imu=1,
     status=Status.CALIBRATED,
     scale=(1.024, 0.987, 1.011),
     offset=(0.221, -0.154, 0.302),
-    scale_sigma=(0.0011, 0.0012, 0.0040),
-    offset_sigma=(0.004, 0.005, 0.030),
-    covariance=tuple(tuple(0.0 for _ in range(6)) for _ in range(6)),
+    scale_sigma=SIGMAS[:3],
+    offset_sigma=SIGMAS[3:],
+    covariance=COVARIANCE,
     observable=(True, True, False, True, True, False),
     note="z scale and z offset cannot be told apart",
     in_force_scale=(1.001, 1.001, 1.001),

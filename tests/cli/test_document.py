@@ -38,7 +38,9 @@ def test_the_contract_of_replay():
     assert (imu["imu"], imu["status"], imu["trusted_s"]) == (1, "calibrated", 251.0)
     calibration = imu["calibration"]
     assert calibration["scale"] == [1.024, 0.987, 1.011]
-    assert calibration["offset_sigma"] == [0.004, 0.005, 0.03]
+    assert calibration["offset_sigma"] == [0.004, 0.005, 0.274]
+    assert calibration["known"] == ["yes", "yes", "together", "yes", "yes", "together"]
+    assert calibration["worth"]["directions"] == 5
     assert calibration["observable"] == [True, True, False, True, True, False]
     assert calibration["parameters"]["INS_ACCSCAL_Y"] == 0.987
     assert calibration["parameters"]["INS_ACCOFFS_Z"] == 0.302

@@ -28,7 +28,7 @@ from tests.daemon.test_written import parameters
         (["refused", "nothing_to_change"], False),
         (["approval", "no_improvement"], False),
         (["physics_missing", "not_calibrated"], False),
-        (["sigma_too_large"], False),
+        (["not_sure"], False),
     ],
 )
 def test_a_reason_that_a_person_lifts_makes_it_approvable(held_back, expected):

@@ -96,7 +96,7 @@ def test_the_parameters_that_are_written_are_exactly_those_allowed():
 
 def test_limits_and_defaults_are_those_of_the_configuration():
     rows = re.findall(r"^\| .+ \| ([\d.]+) \| `\[push\] (\w+)` \|$", PARAMETERS, re.MULTILINE)
-    assert len(rows) == 9
+    assert len(rows) == 8
     for value, key in rows:
         assert getattr(configuration.PushSettings(), key) == float(value), key
 

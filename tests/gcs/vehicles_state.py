@@ -32,6 +32,8 @@ def accelerometer(number, *, status="calibrated", stands=None):
             offset_sigma=(0.01, 0.02, 0.03),
             parameters={},
             observable=(True,) * 6,
+            known=("yes",) * 6,
+            worth=None,
             note="",
         ),
         in_force_scale=(1.0, 1.0, 1.0),

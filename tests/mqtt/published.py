@@ -33,6 +33,8 @@ def imu_view(number=1, scale=1.02):
             offset_sigma=(0.01, 0.01, 0.01),
             parameters={"INS_ACCSCAL_X": scale},
             observable=(True, True, False, True, True, True),
+            known=("yes", "yes", "no", "yes", "yes", "yes"),
+            worth=None,
             note="z scale and z offset cannot be told apart",
         ),
         in_force_scale=(1.0, 1.0, 1.0),

@@ -44,6 +44,7 @@ def calibration(**changes):
         held_out_after=1.05,
         velocity_rms_before=0.5,
         velocity_rms_after=0.05,
+        predictive_gain=900.0,
         coverage=Coverage(100.0, (100.0,) * 6, "z scale", ""),
     )
     return replace(good, **changes)

@@ -10,7 +10,7 @@ from onboard.core.diagnosis.records import Diagnosis, Mismatch, Plain, Series, V
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.push.diagnosed import headline
-from tests.push.calibrations import SIGMAS, calibration
+from tests.push.calibrations import SIGMAS, calibration, covariance
 
 NAN = float("nan")
 
@@ -86,8 +86,19 @@ def test_an_effect_within_the_claim_forbids_nothing(sigmas, found):
 
 
 def test_a_number_that_the_flight_does_not_show_cannot_be_moved():
-    shown = (False, True, True, True, True, True)
-    assert judged(diagnosis(ARM, without=plain(50.0), observable=shown)).missing == ""
+    wide = (0.03, *SIGMAS[1:])
+    found = diagnosis(ARM, without=plain(3.0), covariance=covariance(wide), scale_sigma=wide[:3])
+    assert judged(found).missing == ""
+
+
+def test_a_combination_that_is_known_counts_where_its_numbers_do_not():
+    """z scale and z offset are not known, the force at the load that was flown is."""
+    wide = (*SIGMAS[:2], 0.03, *SIGMAS[3:5], 0.3)
+    at_load = {"covariance": covariance(wide, [(2, 5, -0.999)]), "load_mean": (0.0, 0.0, -9.8)}
+    before = list(FOUND.scale + FOUND.offset)
+    before[5] -= 0.25
+    without = Plain(tuple(before), wide)
+    assert "z force at the mean load" in judged(diagnosis(ARM, without=without, **at_load)).missing
 
 
 def test_what_every_model_has_forbids_nothing():

@@ -3,14 +3,12 @@ import math
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.errors import PushError
-from onboard.push.conditioning import condition
 from onboard.push.limits import UNCHANGED
 from onboard.push.plan import GRAVITY, Change, PushPlan, Vehicle, offset_is_zero, propose
 from tests.autopilot_parameters import float32
@@ -94,73 +92,6 @@ def test_difference_below_the_autopilots_own_epsilon_is_no_change():
     plan = propose(calibration(scale=scale), current(), system_id=1)
     assert not plan.changes[0].differs
     assert plan.wanted["INS_ACCSCAL_X"] == 1.0
-
-
-class TestConditioning:
-    def test_nothing_held_is_the_estimate(self):
-        x = np.array((*SCALE, *OFFSET))
-        P = np.array(covariance(correlations=[(2, 5, 0.99)]))
-        result = condition(x, P, [False] * 6, np.zeros(6))
-        assert result.values == pytest.approx(x, abs=0)
-        assert result.sigmas == pytest.approx(np.sqrt(np.diag(P)))
-        assert result.contradiction == 0.0
-
-    def test_is_the_minimum_of_the_parabola_on_the_plane_of_held_values(self):
-        """Independent route: minimise (v - x)^T N (v - x) over the free ones, N = P^-1."""
-        rng = np.random.default_rng(3)
-        A = rng.normal(size=(6, 9))
-        P = A @ A.T * np.outer([1e-3] * 3 + [1e-2] * 3, [1e-3] * 3 + [1e-2] * 3)
-        x = rng.normal(size=6)
-        held = np.array([False, True, False, False, False, True])
-        at = x + rng.normal(size=6) * 0.01
-        N = np.linalg.inv(P)
-        f, k = ~held, held
-        free = x[f] - np.linalg.solve(N[np.ix_(f, f)], N[np.ix_(f, k)] @ (at - x)[k])
-        result = condition(x, P, held, at)
-        assert np.array(result.values)[f] == pytest.approx(free, rel=1e-9)
-        assert np.array(result.values)[k] == pytest.approx(at[k], abs=0)
-        assert np.array(result.sigmas)[f] == pytest.approx(
-            np.sqrt(np.diag(np.linalg.inv(N[np.ix_(f, f)]))), rel=1e-9
-        )
-        v = np.array(result.values) - x
-        assert result.contradiction == pytest.approx(v @ N @ v, rel=1e-9)
-
-    def test_hovering_copter_keeps_its_reading_at_rest(self):
-        """z scale is not seen, held at 1; the z offset follows so that f(-g) stays right."""
-        s, o = 1.02, 0.10
-        raw = -GRAVITY / s + o  # what the sensor says when it hovers
-        # The flight knows raw(-g) to 2 mm/s^2 and the scale to 3 % only.
-        H = np.zeros((6, 6))
-        H[range(6), range(6)] = np.array([1e3, 1e3, 1 / 0.03, 1e2, 1e2, 1e-3]) ** 2
-        row = np.zeros(6)
-        row[2], row[5] = GRAVITY / s**2, 1.0  # d raw / d (scale, offset)
-        N = H + np.outer(row, row) / 0.002**2
-        P = np.linalg.inv(N)
-        cal = calibration(
-            scale=(1.0, 1.0, s),
-            offset=(0.02, -0.03, o),
-            covariance=tuple(map(tuple, P)),
-            observable=(True, True, False, True, True, True),
-        )
-        plan = propose(cal, current(), system_id=1)
-        change = {c.name: c for c in plan.changes}
-        assert change["INS_ACCSCAL_Z"].kept
-        assert change["INS_ACCSCAL_Z"].wanted == 1.0
-        seen = plan.six_wanted().apply(np.array([0.0, 0.0, raw]))[2]
-        # To first order in the 2 % of scale: 10 m/s^2 * 0.02^2.
-        assert seen == pytest.approx(-GRAVITY, abs=0.005)
-        assert plan.contradiction < plan.contradiction_limit
-        # Without conditioning the offset of the other scale would have been wrong by 0.2.
-        assert abs((raw - o) + GRAVITY) > 0.15
-
-    def test_contradiction_is_counted_in_sigmas(self):
-        x = np.array((*SCALE, *OFFSET))
-        P = np.array(covariance())
-        at = x.copy()
-        at[2] += 5 * 0.002
-        result = condition(x, P, [False, False, True, False, False, False], at)
-        assert result.contradiction == pytest.approx(25.0)
-        assert result.limit == 10.83
 
 
 class TestOrder:

@@ -103,47 +103,66 @@ class TestEstimate:
         assert objections(cal) == {Objection.PARAMETERS_UNKNOWN}
 
     @pytest.mark.parametrize(
-        ("before", "after"), [(1.0, 1.0), (1.0, 0.98), (1.0, 1.3), (float("nan"), 1.0)]
+        "changes",
+        [
+            {"predictive_gain": 4.6},
+            {"predictive_gain": -10.0},
+            {"predictive_gain": float("nan")},
+            {"held_out_before": float("nan")},
+        ],
     )
-    def test_must_improve_what_it_has_not_seen(self, before, after):
-        cal = calibration(held_out_before=before, held_out_after=after)
-        assert objections(cal) == {Objection.NO_IMPROVEMENT}
+    def test_must_improve_what_it_has_not_seen(self, changes):
+        assert objections(calibration(**changes)) == {Objection.NO_IMPROVEMENT}
 
-    @pytest.mark.parametrize("i", range(6))
-    def test_each_number_must_be_sharp(self, i):
-        sigmas = [0.001] * 3 + [0.008] * 3
-        sigmas[i] *= 7
-        assert objections(calibration(covariance=covariance(sigmas))) == {Objection.SIGMA_TOO_LARGE}
+    def test_must_be_better_for_sure(self):
+        """As wide as this, the values in force may be as good."""
+        sigmas = [0.014] * 3 + [0.12] * 3
+        cal = calibration(
+            covariance=covariance(sigmas),
+            offset=(0.07, 0.0, 0.1),
+            scale=(1.0, 1.0, 1.0),
+        )
+        assert objections(cal) == {Objection.NOT_SURE}
+        # A correction that is ten times as large is sure, however wide it is.
+        assert objections(replace(cal, offset=(1.2, -1.2, 1.2))) == set()
 
     def test_value_that_is_already_there_is_not_written_again(self):
         cal = calibration()
         assert objections(cal, scale=cal.scale, offset=cal.offset) == {Objection.NOTHING_TO_CHANGE}
 
-    def test_unseen_number_is_left_and_its_sigma_does_not_matter(self):
+    def test_unseen_number_is_left(self):
         sigmas = (0.001, 0.001, 0.03, 0.008, 0.008, 0.02)
-        cal = calibration(
-            observable=(True, True, False, True, True, True), covariance=covariance(sigmas)
-        )
+        cal = calibration(covariance=covariance(sigmas))
         plan = propose(cal, current(), system_id=1)
+        assert plan.changes[2].kept
         assert plan.wanted["INS_ACCSCAL_Z"] == 1.0
+        assert plan.worth.directions == 5
         assert objections(cal) == set()
 
-    def test_sigma_that_counts_is_the_one_given_what_stays(self):
-        """z offset is known to 0.3 only because the z scale is not; with that held, to 0.01."""
-        sigmas = (0.001, 0.001, 0.03, 0.008, 0.008, 0.3)
+    def test_a_combination_is_set_where_its_numbers_are_not_known(self):
+        """z scale and offset are only known together, at the load of level flight."""
+        sigmas = (0.001, 0.001, 0.029, 0.008, 0.008, 0.285)
+        cal = calibration(covariance=covariance(sigmas, [(2, 5, -0.999)]))
+        plan = propose(cal, current(), system_id=1)
+        assert not any(c.kept for c in plan.changes)
+        assert plan.worth.directions == 5
+        assert objections(cal) == set()
+
+    def test_numbers_that_the_flight_contradicts_together_stop_everything(self):
+        """Neither by itself, but both at once: a plan cannot leave them as they are."""
+        sigmas = (0.001, 0.029, 0.029, 0.008, 0.008, 0.008)
         cal = calibration(
-            observable=(True, True, False, True, True, True),
-            covariance=covariance(sigmas, [(2, 5, 0.9997)]),
+            scale=(1.013, 1.0 + 0.06, 1.0 - 0.06),
+            covariance=covariance(sigmas, [(1, 2, 0.9)]),
         )
-        assert objections(cal) == set()
-        assert Objection.SIGMA_TOO_LARGE in objections(replace(cal, observable=(True,) * 6))
-
-    def test_unseen_number_that_the_flight_contradicts_stops_everything(self):
-        cal = calibration(observable=(False, True, True, True, True, True))
-        assert objections(cal) == {Objection.CONTRADICTED}
+        assert Objection.CONTRADICTED in objections(cal)
 
     def test_nothing_seen(self):
-        cal = calibration(observable=(False,) * 6, covariance=covariance((0.1,) * 3 + (1.0,) * 3))
+        cal = calibration(
+            scale=(1.0, 1.0, 1.0),
+            offset=(0.02, -0.03, 0.04),
+            covariance=covariance((0.029,) * 3 + (0.45,) * 3),
+        )
         assert objections(cal) == {Objection.NOTHING_OBSERVED}
 
 
@@ -161,7 +180,9 @@ class TestBounds:
         assert objections(calibration(offset=offset)) == {Objection.OUT_OF_BOUNDS}
 
     def test_three_zero_offsets(self):
-        assert objections(calibration(offset=(0.0, 0.0, 0.0))) == {Objection.ZERO_OFFSETS}
+        assert objections(calibration(scale=(1.03, 0.97, 1.03), offset=(0.0, 0.0, 0.0))) == {
+            Objection.ZERO_OFFSETS
+        }
 
     def test_old_value_out_of_bounds_that_stays_is_not_ours_to_judge(self):
         cal = calibration(
@@ -251,7 +272,7 @@ class TestConsistency:
 
 
 def test_all_objections_are_given_at_once():
-    cal = calibration(status=Status.COLLECTING, scale=(1.3, 1.0, 1.0), held_out_after=5.0)
+    cal = calibration(status=Status.COLLECTING, scale=(1.3, 1.0, 1.0), predictive_gain=-9.0)
     assert objections(cal, condition=FLYING) == {
         Objection.ARMED,
         Objection.NOT_CALIBRATED,

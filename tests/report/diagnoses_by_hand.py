@@ -22,7 +22,9 @@ from onboard.core.estimate.result import Calibration, Coverage, Estimate, Status
 from onboard.core.physics.finding import Confounder, Finding, Quantity, Where
 
 NAN = float("nan")
-SIGMAS = (0.001, 0.001, 0.01, 0.01, 0.01, 0.2)
+SIGMAS = (0.001, 0.001, 0.028, 0.01, 0.01, 0.274)
+TOGETHER = {(2, 5): -0.999, (5, 2): -0.999}
+"""Correlation of z scale and z offset: they only show up together."""
 IN_FORCE = {
     "AHRS_TRIM_X": 0.0,
     "AHRS_TRIM_Y": 0.0,
@@ -43,7 +45,8 @@ def calibration(**changed: object) -> Calibration:
         "scale_sigma": SIGMAS[:3],
         "offset_sigma": SIGMAS[3:],
         "covariance": tuple(
-            tuple(s * s if i == j else 0.0 for j in range(6)) for i, s in enumerate(SIGMAS)
+            tuple(a * b * TOGETHER.get((i, j), float(i == j)) for j, b in enumerate(SIGMAS))
+            for i, a in enumerate(SIGMAS)
         ),
         "observable": (True, True, False, True, True, False),
         "note": "",
@@ -57,6 +60,7 @@ def calibration(**changed: object) -> Calibration:
         "whitened_rms_after": 1.0,
         "held_out_before": 2.0,
         "held_out_after": 1.0,
+        "predictive_gain": 700.0,
         "velocity_rms_before": 0.5,
         "velocity_rms_after": 0.1,
         "coverage": Coverage(80.0, (80.0,) * 6, "z scale", "climb"),

@@ -112,6 +112,8 @@ def _imu(number, second, *, done):
             offset_sigma=tuple(0.006 + 0.4 * shrink for _ in range(3)),
             parameters={},
             observable=tuple(c > 30.0 for c in covered),
+            known=tuple("yes" if c > 30.0 else "no" for c in covered),
+            worth=None,
             note="" if done else "z scale and z offset are seen only as their sum so far",
         ),
         in_force_scale=(1.0, 1.0, 1.0),

@@ -19,11 +19,12 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.limits import CHI_SQUARE_6_999, STRANGER
+from onboard.core.estimate.limits import STRANGER
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
+from onboard.core.maths.chi_square import CHI_SQUARE_999
 
 
 def agrees(engine: Engine, saved: SavedEngine) -> bool | None:
@@ -42,7 +43,7 @@ def agrees(engine: Engine, saved: SavedEngine) -> bool | None:
     then = solve([Block(p.start, p.end, p.sums.shifted(shift)) for p in saved.blocks], engine.model)
     apart = found.theta[:6] - then.theta[:6]
     both = found.covariance[:6, :6] + then.covariance[:6, :6]
-    if float(apart @ np.linalg.solve(both, apart)) > CHI_SQUARE_6_999:
+    if float(apart @ np.linalg.solve(both, apart)) > CHI_SQUARE_999[6]:
         return False
     prior = np.diag(engine.model.prior_sigma[:6] ** 2)
     return True if passes_for_it(both, prior) < STRANGER else None
@@ -59,5 +60,5 @@ def passes_for_it(both: Array, prior: Array) -> float:
     strange = np.linalg.solve(L, np.linalg.solve(L, 2.0 * prior - both).T)
     eigenvalues = np.maximum(np.linalg.eigvalsh((strange + strange.T) / 2), 0.0)
     s = np.geomspace(1e-4, 10.0, 200)[:, None]
-    logarithm = s[:, 0] * CHI_SQUARE_6_999 - 0.5 * np.log1p(2.0 * s * eigenvalues).sum(axis=1)
+    logarithm = s[:, 0] * CHI_SQUARE_999[6] - 0.5 * np.log1p(2.0 * s * eigenvalues).sum(axis=1)
     return float(np.exp(min(0.0, float(logarithm.min()))))

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
+from onboard.core.estimate.determined import determine, force_moments
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import (
     APART_S,
     CONTRADICTION,
-    FEWEST_OBSERVED,
     LONG_DRIFT_S,
     LONG_DRIFTS,
     OFFSET_FLOOR,
@@ -22,12 +23,13 @@ from onboard.core.estimate.limits import (
     SHORT_DRIFTS,
     TIMING_FLOOR_S,
 )
-from onboard.core.estimate.observability import Observability, assess
+from onboard.core.estimate.observability import Needs, assess
 from onboard.core.estimate.result import (
     Calibration,
     Certificate,
     DeadReckoning,
     Estimate,
+    Six,
     Status,
 )
 from onboard.core.estimate.solution import Solution, fitted_rms, held_out
@@ -65,21 +67,22 @@ def calibration_of(
     covariance = six_covariance(solution)
     sigma = np.sqrt(np.diag(covariance))
     seen = assess(six_information(solution), engine.settings.needs, kind)
-    status, note = _status(engine, solution, seen, parameters, finished=finished)
     held = {i: float(x) for i, x in enumerate(in_force.as_linear())}
     blocks, model = engine.all_blocks, engine.model
+    without, with_it = held_out(blocks, model, held), held_out(blocks, model)
+    needs, (load_mean, load_square) = engine.settings.needs, engine.loads
     long, short = _drifts(engine, in_force.as_linear(), solution.theta[:6])
     before, after = (float("nan"),) * 2 if short is None else (float(x) for x in short.rms[:2])
-    return Calibration(
+    made = Calibration(
         imu=imu,
-        status=status,
+        status=Status.INSUFFICIENT if finished else Status.COLLECTING,
         scale=vector3(value[:3]),
         offset=vector3(value[3:]),
         scale_sigma=vector3(sigma[:3]),
         offset_sigma=vector3(sigma[3:]),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
         observable=seen.observed,
-        note=note,
+        note=seen.note,
         in_force_scale=in_force.scale,
         in_force_offset=in_force.offset,
         parameters_known=parameters.known(imu),
@@ -88,15 +91,28 @@ def calibration_of(
         rejected=_refused(rejected, engine.refused),
         whitened_rms_before=fitted_rms(blocks, model, held),
         whitened_rms_after=fitted_rms(blocks, model),
-        held_out_before=held_out(blocks, model, held),
-        held_out_after=held_out(blocks, model),
+        held_out_before=without,
+        held_out_after=with_it,
         velocity_rms_before=before,
         velocity_rms_after=after,
         coverage=seen.coverage,
+        prior_sigma=_six(needs.prior),
+        load_mean=load_mean,
+        load_square=load_square,
+        predictive_gain=solution.rows
+        * (without**2 - with_it**2)
+        / 2.0
+        / solution.variance_inflation,
         certificate=_certificate(engine),
         dead_reckoning=_dead_reckoning(long),
         temperature=_temperature(engine),
     )
+    return _judged(made, engine, solution, parameters)
+
+
+def _six(values: Array) -> Six:
+    a, b, c, d, e, f = (float(v) for v in values)
+    return a, b, c, d, e, f
 
 
 def _solved(engine: Engine, imu: int) -> Solution:
@@ -159,33 +175,45 @@ def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:
     }
 
 
-def _status(
-    engine: Engine,
-    solution: Solution,
-    seen: Observability,
-    parameters: ParametersInForce,
-    *,
-    finished: bool,
-) -> tuple[Status, str]:
-    note = seen.note
+def _judged(
+    made: Calibration, engine: Engine, solution: Solution, parameters: ParametersInForce
+) -> Calibration:
+    """The record with the status that the flight deserves."""
     if not parameters.representable:
-        return Status.INVALID, (
+        note = (
             "AHRS_ORIENTATION is unknown or not a multiple of 90 degrees: scale and offset of the "
-            "sensor's axes cannot be separated from here. " + note
+            "sensor's axes cannot be separated from here. "
         )
+        return replace(made, status=Status.INVALID, note=note + made.note)
     if not engine.moving:
-        note = "hovering or standing: fly fast, brake hard, turn both ways. " + note
-        return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
-    doubt = solution.variance_inflation > CONTRADICTION
-    if doubt:
+        note = "hovering or standing: fly fast, brake hard, turn both ways. "
+        return replace(made, note=note + made.note)
+    if solution.variance_inflation > CONTRADICTION:
         note = (
             "the flight contradicts itself: something is missing from the model, "
-            "see onboard explain. " + note
+            "see onboard explain. "
         )
-    enough = engine.trusted_s >= engine.settings.minimum_s and not doubt
-    if enough and sum(seen.observed) >= FEWEST_OBSERVED:
-        return Status.CALIBRATED, note
-    return (Status.INSUFFICIENT if finished else Status.COLLECTING), note
+        return replace(made, note=note + made.note)
+    if engine.trusted_s < engine.settings.minimum_s or not _good_enough(
+        made, engine.settings.needs
+    ):
+        return made
+    return replace(made, status=Status.CALIBRATED)
+
+
+def _good_enough(made: Calibration, needs: Needs) -> bool:
+    """Whether the force over the loads flown is known as well as from numbers known well enough.
+
+    That takes no number by itself: a hover knows the z axis at one load, and flies at no other.
+    """
+    in_force = made.in_force_scale + made.in_force_offset
+    M = force_moments(made.load_mean, made.load_square, in_force)
+    needed = float(np.diag(M) @ needs.target**2)
+    try:
+        found = determine(made, in_force)
+    except ValueError:  # numbers that are none
+        return False
+    return found.directions > 0 and found.error_after**2 <= needed
 
 
 def _certificate(engine: Engine) -> Certificate | None:

@@ -53,8 +53,6 @@ MOST_SAVED: Final = 16
 """Blocks that are saved: enough for folds and clusters [cost]."""
 MOST_WAITING: Final = 4
 """Sums of earlier starts that wait for a flight that agrees with them, the latest [cost]."""
-CHI_SQUARE_6_999: Final = 22.46
-"""Exceeded once in a thousand times by a chi-square of six degrees of freedom [probability]."""
 STRANGER: Final = 0.01
 """Probability with which another sensor may pass for this one [probability]."""
 
@@ -81,8 +79,6 @@ OFFSET_FLOOR: Final = 1e-3
 know (filters, interpolation, clocks) [cost]."""
 TIMING_FLOOR_S: Final = 5e-4
 """The same of a delay, s: half of the milliseconds that streams are stamped with [physics]."""
-FEWEST_OBSERVED: Final = 3
-"""Parameters that a flight must have observed to be called a calibration [tuned]."""
 CONTRADICTION: Final = 6.0
 """Inflation of the variance past which blocks of one flight ask for different parameters
 [tuned]."""

@@ -73,7 +73,10 @@ class Calibration:
     support the number: its value then leans on the prior and its sigma says so.
     ``in_force`` are the parameters that the autopilot used last.  The held-out RMS are of
     whitened residuals on segments that the fit did not see: with the parameters in force and
-    with the estimate; their ratio decides whether a push is an improvement.
+    with the estimate; ``predictive_gain`` is the logarithm of how much likelier those segments are
+    with the estimate.  ``prior_sigma`` (scale, offset) is what was known before the flight;
+    ``load_mean`` and ``load_square`` are the means of the raw samples and of their squares, sensor
+    axes: the loads that were flown, of which the six should give the force.
     """
 
     imu: int
@@ -98,6 +101,10 @@ class Calibration:
     velocity_rms_before: float
     velocity_rms_after: float
     coverage: Coverage
+    prior_sigma: Six = (0.03, 0.03, 0.03, 0.5, 0.5, 0.5)
+    load_mean: Vector3 = (0.0, 0.0, -9.80665)
+    load_square: Vector3 = (1.0, 1.0, 97.0)
+    predictive_gain: float = float("nan")
     certificate: Certificate | None = None
     dead_reckoning: DeadReckoning | None = None
     temperature: Estimate | None = None

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+CHI_SQUARE_999 = (0.0, 10.83, 13.82, 16.27, 18.47, 20.52, 22.46)
+"""0.999 quantiles for 0 ... 6 degrees of freedom."""
 ENOUGH = 1e-15
 MOST_TERMS = 100_000
 TINY = 1e-300

@@ -26,10 +26,10 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.chi_square import CHI_SQUARE_999
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.meaning import all_in_force, in_force
-from onboard.push.conditioning import CHI_SQUARE_999
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
 from onboard.push.watch import preference

@@ -94,6 +94,7 @@ def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calib
         whitened_rms_before=nan if live is None else live.whitened_rms_before,
         held_out_before=nan if live is None else live.held_out_before,
         velocity_rms_before=nan if live is None else live.velocity_rms_before,
+        predictive_gain=nan if live is None else live.predictive_gain,
     )
 
 

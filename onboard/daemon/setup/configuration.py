@@ -59,7 +59,8 @@ class PushSettings(Section, frozen=True, kw_only=True):
     """When the estimates may be written into the autopilot, and how far they may go.
 
     The bounds only ever narrow what the autopilot documents (scale 0.8 ... 1.2, offset
-    3.5 m/s^2); the sigma limits are what an estimate must beat to be called good enough.
+    3.5 m/s^2); ``sure`` is the probability of an improvement that a push needs, ``least_change``
+    by how much the force has to change, m/s^2.
     """
 
     policy: Literal["never", "landed", "in_flight"] = "landed"
@@ -69,9 +70,8 @@ class PushSettings(Section, frozen=True, kw_only=True):
     scale_min: Annotated[float, Meta(ge=0.8, lt=1.0)] = 0.8
     scale_max: Annotated[float, Meta(gt=1.0, le=1.2)] = 1.2
     offset_max: Annotated[float, Meta(gt=0.0, le=3.5)] = 3.5
-    scale_sigma_max: Positive = 0.005
-    offset_sigma_max: Positive = 0.05
-    improvement: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.97
+    sure: Annotated[float, Meta(ge=0.5, lt=1.0)] = 0.99
+    least_change: Positive = 0.01
     in_flight_scale_step: Annotated[float, Meta(gt=0.0, le=0.05)] = 0.005
     in_flight_offset_step: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.05
 

@@ -25,9 +25,8 @@ def policy_settings(push: configuration.PushSettings) -> PolicySettings:
         scale_min=push.scale_min,
         scale_max=push.scale_max,
         offset_max=push.offset_max,
-        scale_sigma_max=push.scale_sigma_max,
-        offset_sigma_max=push.offset_sigma_max,
-        improvement=push.improvement,
+        sure=push.sure,
+        least_change=push.least_change,
         in_flight_scale_step=push.in_flight_scale_step,
         in_flight_offset_step=push.in_flight_offset_step,
     )

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import cast
 
+from onboard.answers.document import worth_document
+from onboard.answers.knowledge import seen
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Six
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.view.numbers import finite
@@ -71,6 +73,8 @@ def _calibration_view(c: Calibration) -> CalibrationView:
         offset_sigma=_three(c.offset_sigma),
         parameters={name: value for name, value in named if math.isfinite(value)},
         observable=c.observable,
+        known=seen(c),
+        worth=worth_document(c),
         note=c.note,
     )
 

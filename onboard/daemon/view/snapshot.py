@@ -11,6 +11,8 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from onboard.answers.document import WorthDocument
+
 Three: TypeAlias = tuple[float | None, float | None, float | None]
 SCHEMA = "onboard.state/1"
 
@@ -86,7 +88,11 @@ class CoverageView(Record, frozen=True, kw_only=True):
 
 
 class CalibrationView(Record, frozen=True, kw_only=True):
-    """The six numbers; the same object that ``onboard replay`` and ``explain`` write."""
+    """The six numbers; the same object that ``onboard replay`` and ``explain`` write.
+
+    ``known`` says how far each is: ``yes``, ``roughly``, ``together`` (with the other number of its
+    axis, as loaded in flight) or ``no``; ``worth`` what setting what is known is worth.
+    """
 
     scale: Three
     offset: Three
@@ -94,6 +100,8 @@ class CalibrationView(Record, frozen=True, kw_only=True):
     offset_sigma: Three
     parameters: dict[str, float]
     observable: tuple[bool, ...]
+    known: tuple[str, ...]
+    worth: WorthDocument | None
     note: str
 
 

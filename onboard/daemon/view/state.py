@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from onboard.answers.knowledge import knowledge
 from onboard.core.estimate.result import Calibration, Status
 from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView
 
@@ -161,10 +162,7 @@ def _judged(c: Calibration) -> bool:
 
 
 def _known(c: Calibration) -> str:
-    shown = sum(c.observable)
-    if shown == len(c.observable):
-        return "all six numbers are known"
-    return f"{shown} of 6 numbers are known, the others stay as they are"
+    return knowledge(c)
 
 
 def _so_far(c: Calibration) -> str:
@@ -173,8 +171,7 @@ def _so_far(c: Calibration) -> str:
         return f"not calibrated: {c.note.strip().rstrip('.')}"
     if not c.coverage.advice:
         return f"all six numbers are covered, {c.trusted_s:.0f} s of flight are not enough yet"
-    shown = sum(c.observable)
-    return f"{shown} of 6 numbers are known; least of all the {c.coverage.weakest}"
+    return f"{knowledge(c)}; least of all the {c.coverage.weakest}"
 
 
 def _to_fly(c: Calibration) -> str:

@@ -41,7 +41,7 @@ class Axis {
     const covered = view.coverage.per_parameter[NAMES[this.index]] ?? 0;
     say(this.parameter, parameterName(view.imu, this.index));
     say(this.number, measured(value, sigma));
-    const seen = c.observable[this.index] ? "" : ", not observed yet";
+    const seen = { yes: "", roughly: "", together: ", known together with its other number" }[c.known[this.index]] ?? ", not observed yet";
     say(this.sigma, value === null ? "no estimate yet" : `± ${brief(sigma, 2)}${unit}`);
     say(this.force, `in force ${view.parameters_known ? "" : "(assumed) "}${measured(inForce, sigma)}${seen}`);
     say(this.percent, `${Math.round(covered)} %`);

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from onboard.core.estimate.agreement import CHI_SQUARE_6_999, STRANGER, passes_for_it
+from onboard.core.estimate.agreement import STRANGER, passes_for_it
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue
 from onboard.core.maths.accelerometer import parameter_names
+from onboard.core.maths.chi_square import CHI_SQUARE_999
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, fly_messages
@@ -87,7 +88,7 @@ def test_the_bound_on_taking_a_stranger_for_the_sensor_is_a_bound():
         both = np.diag(np.square(sigmas))
         strange = np.sqrt(np.maximum(np.diag(2.0 * PRIOR - both), 0.0))
         apart = rng.standard_normal((200_000, 6)) * strange
-        missed = np.mean(np.sum(apart**2 / np.diag(both), axis=1) < CHI_SQUARE_6_999)
+        missed = np.mean(np.sum(apart**2 / np.diag(both), axis=1) < CHI_SQUARE_999[6])
         assert missed <= passes_for_it(both, PRIOR) + 3e-3
     assert passes_for_it(np.diag([1e-6] * 3 + [1e-4] * 3), PRIOR) < STRANGER
     assert passes_for_it(2.0 * PRIOR, PRIOR) == 1.0
