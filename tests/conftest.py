@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from sitl.virtual_time import VirtualTimeLoop
 
 # The same examples in every run: a change is judged by what it changes.  Others are looked for
 # by hand with --hypothesis-profile=search.
@@ -39,6 +42,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests come first: two processes then end at about the same time."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
+    """Tests marked ``virtual_time`` run on a loop whose clock jumps, all others on a common one."""
+    if item.get_closest_marker("virtual_time"):
+        return {"virtual": VirtualTimeLoop}
+    return {"real": asyncio.new_event_loop}
 
 
 @pytest.hookimpl(optionalhook=True)
