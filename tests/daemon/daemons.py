@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import os
 from contextlib import asynccontextmanager
 
 from onboard.core.estimate.result import Calibration, Coverage, Status
@@ -40,7 +41,8 @@ def employed(name):
 
 
 def hurried(monkeypatch):
-    """What real vehicles need seconds for takes none on loopback."""
+    """What real vehicles and real disks need seconds for takes none here."""
+    monkeypatch.setattr(os, "fsync", lambda _: None)  # no power is cut, but tasks are
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
     monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
     monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
