@@ -69,7 +69,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             self.threads -= 1
 
     def run_in_executor(  # type: ignore[override]  # typeshed has the loop's own type variables
-        self, executor: Executor | None, func: Callable[..., T], *args: Any  # noqa: ANN401
+        self,
+        executor: Executor | None,
+        func: Callable[..., T],
+        *args: Any,  # noqa: ANN401
     ) -> asyncio.Future[T]:
         """As every loop does it; until it is done a thread is at work."""
         future: asyncio.Future[T] = super().run_in_executor(executor, func, *args)

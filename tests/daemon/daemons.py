@@ -8,8 +8,8 @@ from contextlib import asynccontextmanager
 from onboard.core.estimate.result import Calibration, Coverage, Status
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.worker import Worker
-from onboard.daemon.pushing import pusher as pusher_module
 from onboard.daemon.process.service import Service
+from onboard.daemon.pushing import pusher as pusher_module
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.mavlink.parameters import ClientSettings
