@@ -45,8 +45,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
-    """Tests marked ``virtual_time`` run on a loop whose clock jumps, all others on a common one."""
-    if item.get_closest_marker("virtual_time"):
+    """Tests marked ``virtual_time`` run on a loop whose clock jumps, all others on a common one.
+
+    ArduPilot's own simulator is another process, with a time of its own.
+    """
+    if item.get_closest_marker("virtual_time") and item.config.getoption("sitl") == "builtin":
         return {"virtual": VirtualTimeLoop}
     return {"real": asyncio.new_event_loop}
 

@@ -40,13 +40,18 @@ def employed(name):
     return KnownWorker(name) if virtual else Worker(name)
 
 
+def known(monkeypatch):
+    """Have every learner in virtual time tell the loop when its thread is at work."""
+    monkeypatch.setattr("onboard.daemon.learning.handover.Worker", employed)
+
+
 def hurried(monkeypatch):
     """What real vehicles and real disks need seconds for takes none here."""
+    known(monkeypatch)
     monkeypatch.setattr(os, "fsync", lambda _: None)  # no power is cut, but tasks are
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
     monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
     monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
-    monkeypatch.setattr("onboard.daemon.learning.handover.Worker", employed)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 
