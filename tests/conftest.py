@@ -39,9 +39,12 @@ def recordings() -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with slow tests come first: two processes then end at about the same time."""
+    """What takes long comes first: two processes then end at about the same time.
+
+    That is files with slow tests, and then the browser's, the longest of the others.
+    """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    items.sort(key=lambda item: (item.path not in slow, "web" not in item.path.parts))
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
