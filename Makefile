@@ -17,9 +17,10 @@ demo: $(STAMP)
 	$(BIN)/onboard demo $(ARGS)
 
 # A process for each core, a file of tests in one of them; ARGS="-n 0" runs all in one.  The matrices
-# are small: threads of the linear algebra would only be in each other's way.
+# are small: threads of the linear algebra would only be in each other's way.  Without compiled tests
+# on disk, each process would spend seconds on compiling them anew.
 test: $(STAMP)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 simulate: $(STAMP)
 	$(BIN)/python -m benchmarks.landings $(ARGS)

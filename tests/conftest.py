@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from sitl.virtual_time import VirtualTimeLoop
 
 # The same examples in every run: a change is judged by what it changes.  Others are looked for
 # by hand with --hypothesis-profile=search.
@@ -36,9 +39,22 @@ def recordings() -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with slow tests come first: two processes then end at about the same time."""
+    """What takes long comes first: two processes then end at about the same time.
+
+    That is files with slow tests, and then the browser's, the longest of the others.
+    """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    items.sort(key=lambda item: (item.path not in slow, "web" not in item.path.parts))
+
+
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
+    """Tests marked ``virtual_time`` run on a loop whose clock jumps, all others on a common one.
+
+    ArduPilot's own simulator is another process, with a time of its own.
+    """
+    if item.get_closest_marker("virtual_time") and item.config.getoption("sitl") == "builtin":
+        return {"virtual": VirtualTimeLoop}
+    return {"real": asyncio.new_event_loop}
 
 
 @pytest.hookimpl(optionalhook=True)

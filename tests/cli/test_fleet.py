@@ -18,11 +18,16 @@ def fleet(tmp_path) -> Path:
     folder = tmp_path / "fleet"
     (folder / "one").mkdir(parents=True)
     (folder / "two with a rather long name of its own").mkdir()
-    (folder / "one" / "a.BIN").write_bytes(bytes(modern_log(20)))
+    (folder / "one" / "a.BIN").write_bytes(bytes(modern_log(4)))
     (folder / "one" / "b.tlog").write_bytes(bytes(telemetry(5)))
     (folder / "two with a rather long name of its own" / "c.ulg").write_bytes(px4_log(5))
     (folder / "notes.txt").write_text("no recording")
     return folder
+
+
+def lengthen(fleet: Path) -> None:
+    """Long enough for something to be learned of it, which takes a second."""
+    (fleet / "one" / "a.BIN").write_bytes(bytes(modern_log(20)))
 
 
 def spoil(fleet: Path) -> None:
@@ -30,6 +35,7 @@ def spoil(fleet: Path) -> None:
 
 
 def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
+    lengthen(fleet)
     assert run(["fleet", str(fleet)]) == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -67,6 +73,7 @@ def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
 
 
 def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
+    lengthen(fleet)
     assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0
     pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
     assert pages == ["a.BIN.html", "b.tlog.html"]

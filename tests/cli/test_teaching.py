@@ -127,7 +127,7 @@ def on_terminal(*arguments: str) -> tuple[str, str]:
 @pytest.mark.parametrize("verb", ["replay", "explain", "fleet"])
 def test_progress_is_for_terminals_and_never_in_the_output(tmp_path, verb):
     log = tmp_path / "short.BIN"
-    log.write_bytes(bytes(modern_log(20)))
+    log.write_bytes(bytes(modern_log(4)))
     out, shown = on_terminal(verb, str(log), "--json", "-")
     assert "reading" in shown
     assert "reading" not in out

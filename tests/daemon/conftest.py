@@ -4,10 +4,7 @@ import socket
 
 import pytest
 
-from onboard.daemon.pushing import pusher as pusher_module
-from onboard.mavlink.parameters import ClientSettings
-from onboard.push.course import TransactionSettings
-from tests.daemon.daemons import running
+from tests.daemon.daemons import hurried, running
 
 
 @pytest.fixture
@@ -30,11 +27,7 @@ def document(tmp_path, port):
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    """What real vehicles need seconds for takes none on loopback."""
-    client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
-    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
-    monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
+    hurried(monkeypatch)
 
 
 @pytest.fixture

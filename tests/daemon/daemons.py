@@ -2,21 +2,71 @@
 
 import asyncio
 import math
-import time
+import os
 from contextlib import asynccontextmanager
 
 from onboard.core.estimate.result import Calibration, Coverage, Status
 from onboard.daemon.learning.flight import Judged, JudgedFlight
+from onboard.daemon.learning.worker import Worker
 from onboard.daemon.process.service import Service
+from onboard.daemon.pushing import pusher as pusher_module
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.parameter_messages import to_float32
+from onboard.mavlink.parameters import ClientSettings
+from onboard.push.course import TransactionSettings
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
+from sitl.virtual_time import VirtualTimeLoop
+
+EPOCH = 1_800_000_000.0
+"""Unix time at which virtual time begins, s."""
+
+
+class KnownWorker(Worker):
+    """The learner's thread, of whose work a loop in virtual time is told."""
+
+    async def call(self, function, *args, **kwargs):
+        with self._loop.thread():
+            return await super().call(function, *args, **kwargs)
+
+    async def close(self):
+        with self._loop.thread():
+            await super().close()
+
+
+def employed(name):
+    """A worker that suits the loop."""
+    virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+    return KnownWorker(name) if virtual else Worker(name)
+
+
+def known(monkeypatch):
+    """Have every learner in virtual time tell the loop when its thread is at work."""
+    monkeypatch.setattr("onboard.daemon.learning.handover.Worker", employed)
+
+
+def hurried(monkeypatch):
+    """What real vehicles and real disks need seconds for takes none here."""
+    known(monkeypatch)
+    monkeypatch.setattr(os, "fsync", lambda _: None)  # no power is cut, but tasks are
+    client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
+    monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
+
+
+def made(document):
+    """A service with the clock of the loop it will run in."""
+    loop = asyncio.get_running_loop()
+    clocks = {}
+    if isinstance(loop, VirtualTimeLoop):
+        clocks = {"clock": loop.time, "wall_clock": lambda: EPOCH + loop.time()}
+    return Service(from_mapping(document, source="test"), **clocks)
 
 
 @asynccontextmanager
 async def running(document):
-    service = Service(from_mapping(document, source="test"))
+    service = made(document)
     task = asyncio.create_task(service.run(), name="service")
     try:
         await until(lambda: service.ready.is_set() or task.done())
@@ -93,7 +143,7 @@ def convinced(service, *calibrations, missing="", modelled=False, effects=()):
         )
         for c in calibrations
     }
-    support = Support("flight", time.time(), learner._examiner.board, 200.0)
+    support = Support("flight", service.handover._wall_clock(), learner._examiner.board, 200.0)
 
     def believe():
         learner._flight = JudgedFlight(support, judged)

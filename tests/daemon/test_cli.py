@@ -14,6 +14,7 @@ from onboard.cli.main import run as onboard
 from tests.daemon.daemons import calibration, convinced, until
 from tests.daemon.standing_vehicle import Vehicle
 
+pytestmark = pytest.mark.virtual_time
 EXECUTE = "from onboard.cli.main import main; main()"
 
 

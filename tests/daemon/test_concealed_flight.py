@@ -12,6 +12,7 @@ from sitl.builtin.effects import TemperatureDrift
 from tests.daemon.daemons import until
 from tests.daemon.flights import TRUE_SIX, GroundStation, flying, six
 
+pytestmark = pytest.mark.virtual_time
 ANTENNA = (0.3, 0.2, -0.2)
 FLIGHT_S = 160.0
 SPEEDUP = 15.0

@@ -8,6 +8,8 @@ from onboard.core.estimate.calibrator import Calibrator
 from tests.daemon.daemons import until
 from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 
+pytestmark = pytest.mark.virtual_time
+
 
 @pytest.fixture
 def in_a_hurry(document, tmp_path):

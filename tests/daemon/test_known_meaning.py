@@ -21,7 +21,7 @@ MEANING = {"INS_ACCEL_FILTER": 5.0, "AHRS_TRIM_X": 0.03, "AHRS_TRIM_Y": -0.04}
 def flight():
     """(seconds, message) of a flight whose autopilot filters slowly and is trimmed."""
     codec = Codec()
-    frames = fly(FlightSpec(vehicle="copter", duration=70.0, parameters=MEANING))
+    frames = fly(FlightSpec(vehicle="copter", duration=60.0, parameters=MEANING))
     return [
         (1e-6 * (unix_us - frames[0][0]), frame.message)
         for unix_us, raw in frames

@@ -14,13 +14,12 @@ import pytest
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import ImuSample
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.process.service import Service
-from onboard.daemon.setup.configuration import from_mapping
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import ConfigurationError, LinkError, OnboardError, RefusedError, StateError
-from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.daemons import calibration, convinced, made, until
 from tests.daemon.standing_vehicle import PX4, Vehicle
 
+pytestmark = pytest.mark.virtual_time
 SIX = parameter_names(1).six
 WANTED = calibration()
 
@@ -36,7 +35,7 @@ def pushed(vehicle):
 async def test_no_heartbeat_in_the_time_limit_is_a_link_error(document, port):
     document["link"]["heartbeat_limit_s"] = 0.2
     with pytest.raises(LinkError, match=f"no heartbeat.*{port}") as caught:
-        await Service(from_mapping(document, source="test")).run()
+        await made(document).run()
     assert caught.value.exit_status == 3
 
 
@@ -44,7 +43,7 @@ async def test_a_taken_udp_port_is_one_line_and_exit_2(document, port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with pytest.raises(OnboardError, match=f"{port}: port in use") as caught:
-            await Service(from_mapping(document, source="test")).run()
+            await made(document).run()
     assert caught.value.exit_status == 2
 
 
@@ -52,7 +51,7 @@ async def test_a_taken_http_port_is_one_line_and_leaves_nothing_behind(document,
     with socket.create_server(("127.0.0.1", 0)) as other:
         document["http"]["port"] = other.getsockname()[1]
         with pytest.raises(ConfigurationError, match=r"\[http\].*in use"):
-            await Service(from_mapping(document, source="test")).run()
+            await made(document).run()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", port))
 
@@ -60,7 +59,7 @@ async def test_a_taken_http_port_is_one_line_and_leaves_nothing_behind(document,
 async def test_two_daemons_do_not_share_a_state_directory(document, daemon):
     async with daemon(document):
         with pytest.raises(StateError, match="in use"):
-            Service(from_mapping(document, source="test"))
+            made(document)
 
 
 async def test_it_reads_the_parameters_and_shows_who_is_there(document, daemon, port):
@@ -308,7 +307,7 @@ async def test_a_crash_in_the_middle_of_a_push_is_put_right_after_the_restart(
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         vehicle.mute_after_sets = 3
-        service = Service(from_mapping(document, source="test"))
+        service = made(document)
         task = asyncio.create_task(service.run())
         convinced(service, WANTED)
         await until(lambda: len(vehicle.sets) == 3)
@@ -388,7 +387,7 @@ async def test_the_service_manager_hears_ready_ticks_and_stopping(
         manager.bind(str(tmp_path / "notify"))
         manager.setblocking(False)
         monkeypatch.setenv("NOTIFY_SOCKET", manager.getsockname())
-        service = Service(from_mapping(document, source="test"))
+        service = made(document)
         task = asyncio.create_task(service.run())
         heard = []
 
@@ -407,7 +406,7 @@ async def test_the_service_manager_hears_ready_ticks_and_stopping(
 
 
 async def test_a_tick_that_fails_feeds_no_watchdog_and_ends_the_service(document, port):
-    service = Service(from_mapping(document, source="test"))
+    service = made(document)
 
     def broken(_now):
         raise ArithmeticError("tick")
@@ -420,7 +419,7 @@ async def test_a_tick_that_fails_feeds_no_watchdog_and_ends_the_service(document
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 async def test_signals_end_it_in_good_order(document, port, number):
-    service = Service(from_mapping(document, source="test"))
+    service = made(document)
     task = asyncio.create_task(service.run(handle_signals=True))
     await until(lambda: service.phase == "searching")
     os.kill(os.getpid(), number)

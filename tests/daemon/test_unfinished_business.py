@@ -5,11 +5,10 @@ import asyncio
 import pytest
 
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.process.service import Service
-from onboard.daemon.setup.configuration import from_mapping
-from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.daemons import calibration, convinced, made, until
 from tests.daemon.standing_vehicle import Vehicle
 
+pytestmark = pytest.mark.virtual_time
 SIX = parameter_names(1).six
 WANTED = calibration()
 
@@ -45,7 +44,7 @@ async def ticks(service, number):
 async def crashed_in_the_middle(document, vehicle):
     """A push of which half is written, by a daemon that is no more."""
     vehicle.mute_after_sets = 3
-    service = Service(from_mapping(document, source="test"))
+    service = made(document)
     task = asyncio.create_task(service.run())
     convinced(service, WANTED)
     await until(lambda: len(vehicle.sets) == 3)

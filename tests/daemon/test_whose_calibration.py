@@ -10,6 +10,7 @@ from tests.daemon.daemons import calibration, convinced, until
 from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
 from tests.daemon.test_unfinished_business import held_back, in_force, ticks
 
+pytestmark = pytest.mark.virtual_time
 WANTED = calibration()
 ANOTHER = "0d0e0f"
 

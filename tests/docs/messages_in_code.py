@@ -6,8 +6,8 @@ A message is the fixed parts of a string in order; what is filled in between is 
 from __future__ import annotations
 
 import ast
+import functools
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import onboard
@@ -20,9 +20,14 @@ OWN = {"EndpointError", "UnreadError", "DemoError"}
 """Errors outside the tree's file; each is a subclass of one in it."""
 
 
-def trees() -> Iterator[tuple[Path, ast.Module]]:
-    for path in sorted(ROOT.rglob("*.py")):
-        yield path, ast.parse(path.read_text(encoding="utf-8"))
+@functools.cache
+def nodes() -> tuple[tuple[Path, tuple[ast.Raise | ast.Call, ...]], ...]:
+    """What may say something, by file; read once."""
+    return tuple(
+        (path, tuple(n for n in ast.walk(tree) if isinstance(n, ast.Raise | ast.Call)))
+        for path in sorted(ROOT.rglob("*.py"))
+        for tree in [ast.parse(path.read_text(encoding="utf-8"))]
+    )
 
 
 def fixed(node: ast.expr) -> Message:
@@ -41,8 +46,8 @@ def raised() -> dict[Message, str]:
     """One-line errors: first argument of whatever is raised from the tree of errors."""
     names = {n for n, v in vars(errors).items() if isinstance(v, type)} | OWN
     found: dict[Message, str] = {}
-    for path, tree in trees():
-        for node in ast.walk(tree):
+    for path, sayings in nodes():
+        for node in sayings:
             if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)):
                 continue
             function = node.exc.func
@@ -58,8 +63,8 @@ def raised() -> dict[Message, str]:
 def posted() -> dict[str, set[Message]]:
     """Notices by kind, where kind and text are written in one place."""
     found: dict[str, set[Message]] = {}
-    for _, tree in trees():
-        for node in ast.walk(tree):
+    for _, sayings in nodes():
+        for node in sayings:
             if not (isinstance(node, ast.Call) and len(node.args) >= 2):
                 continue
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))

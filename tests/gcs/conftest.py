@@ -4,20 +4,14 @@ import contextlib
 
 import pytest
 
-from onboard.daemon.pushing import pusher as pusher_module
-from onboard.mavlink.parameters import ClientSettings
-from onboard.push.course import TransactionSettings
-from tests.daemon.daemons import calibration, convinced, running, until
+from tests.daemon.daemons import calibration, convinced, hurried, running, until
 from tests.daemon.standing_vehicle import Vehicle
 from tests.gcs.router import Router
 
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
-    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
-    monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
+    hurried(monkeypatch)
 
 
 def waits(push):

@@ -113,7 +113,8 @@ async def test_an_absent_broker_is_told_of_once_and_tried_again(tmp_path, publis
         assert not publisher.connected
 
 
-async def test_a_broker_that_hangs_is_left_and_found_again(tmp_path, publishing):
+async def test_a_broker_that_hangs_is_left_and_found_again(tmp_path, publishing, monkeypatch):
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.ANSWER_S", 1.5)
     async with Broker(tmp_path) as broker, publishing(broker.port) as publisher:
         publisher.publish(snapshot())
         await kinds(publisher, "mqtt_connected")

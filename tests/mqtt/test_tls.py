@@ -65,7 +65,15 @@ async def test_a_broker_that_nobody_vouches_for_gets_nothing(tmp_path, authority
     gc.collect()
 
 
-async def test_plain_text_to_an_encrypted_port_is_refused_in_words(tmp_path, authority, publishing):
+@pytest.fixture
+def unanswered(monkeypatch):
+    """For who waits in vain for a broker's answer; a late one would be no other outcome."""
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.ANSWER_S", 0.5)
+
+
+async def test_plain_text_to_an_encrypted_port_is_refused_in_words(
+    tmp_path, authority, publishing, unanswered
+):
     async with encrypted(tmp_path, authority) as broker, publishing(broker.port) as publisher:
         publisher.publish(snapshot())
         assert await lost(publisher)
@@ -73,7 +81,9 @@ async def test_plain_text_to_an_encrypted_port_is_refused_in_words(tmp_path, aut
 
 
 @pytest.mark.parametrize("shown", [True, False])
-async def test_client_certificates(tmp_path, authority, publishing, shown):
+async def test_client_certificates(tmp_path, authority, publishing, shown, request):
+    if not shown:
+        request.getfixturevalue("unanswered")
     lines = (
         f"cafile {authority.certificate}",
         "require_certificate true",

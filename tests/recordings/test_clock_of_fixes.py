@@ -72,6 +72,7 @@ def test_a_layout_without_the_time_of_the_message_keeps_its_own_stamp(tmp_path):
     assert [f.t for f in without] == pytest.approx([f.t for f in with_time], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_log_that_is_written_later_and_later_is_as_clean_as_its_telemetry(tmp_path):
     # ArduPilot's wait for the log moved from 17 to 33 ms in a real one; as a clock that runs off
     # it was explained by physics that was not there.
@@ -83,6 +84,7 @@ def test_a_log_that_is_written_later_and_later_is_as_clean_as_its_telemetry(tmp_
     assert said.verdict is Verdict.CLEAN
 
 
+@pytest.mark.slow
 def test_log_and_telemetry_of_one_flight_advise_one_latency(tmp_path):
     path = tmp_path / "flight.BIN"
     flight = flown(150.0, 0.19)

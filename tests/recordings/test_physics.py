@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,19 +17,37 @@ pytestmark = pytest.mark.recordings
 EARTH_RADIUS = 6.371e6
 
 
+@dataclass(slots=True)
+class Read:
+    """What a recording has: rows of time, specific force and rate by stream, fixes, attitudes."""
+
+    inertial: dict[tuple[int, ImuSource], np.ndarray]
+    fixes: list[GpsFix]
+    attitudes: list[AttitudeSample]
+
+
+@functools.cache
+def read(path: Path) -> Read:
+    """Each recording is read once, for all tests."""
+    rows, fixes, attitudes = defaultdict(list), [], []
+    for s in open_recording(path).samples():
+        if isinstance(s, ImuSample):
+            rows[s.imu, s.source].append((s.t, *s.f_b, *(s.w_b or (0.0, 0.0, 0.0))))
+        elif isinstance(s, GpsFix) and s.fix_type >= 3:
+            fixes.append(s)
+        elif isinstance(s, AttitudeSample):
+            attitudes.append(s)
+    return Read({stream: np.array(table) for stream, table in rows.items()}, fixes, attitudes)
+
+
 def inertial(path: Path, imu: int, source: ImuSource) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,), specific force (n, 3), rate (n, 3)."""
-    rows = [
-        (s.t, *s.f_b, *(s.w_b or (0.0, 0.0, 0.0)))
-        for s in open_recording(path).samples()
-        if isinstance(s, ImuSample) and (s.imu, s.source) == (imu, source)
-    ]
-    table = np.array(rows)
+    table = read(path).inertial[imu, source]
     return table[:, 0], table[:, 1:4], table[:, 4:]
 
 
 def fixes(path: Path) -> list[GpsFix]:
-    return [s for s in open_recording(path).samples() if isinstance(s, GpsFix) and s.fix_type >= 3]
+    return read(path).fixes
 
 
 @pytest.mark.parametrize("imu", [1, 2])
@@ -74,7 +95,7 @@ def test_positions_move_with_the_velocities(recordings, name):
 def test_attitude_turns_with_the_gyroscopes(recordings, name):
     path = recordings / name
     t, _, w = inertial(path, 1, ImuSource.LOG)
-    attitude = [s for s in open_recording(path).samples() if isinstance(s, AttitudeSample)]
+    attitude = read(path).attitudes
     t_a = np.array([s.t for s in attitude])
     roll, yaw = (np.unwrap([getattr(s, angle) for s in attitude]) for angle in ("roll", "yaw"))
     pitch = np.array([s.pitch for s in attitude])

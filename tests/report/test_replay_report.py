@@ -77,6 +77,7 @@ def test_trust_is_told_without_gaps_and_agrees_with_the_window(told):
     assert chronicle.duration_s == pytest.approx(result.duration_s, abs=2.0)
 
 
+@pytest.mark.slow
 def test_a_second_recording_is_drawn_after_the_first(flight, told, tmp_path):
     once = told[1].duration_s
     again = tmp_path / "again.tlog"

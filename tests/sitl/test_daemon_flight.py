@@ -8,12 +8,18 @@ import pytest
 
 from onboard.core.maths.accelerometer import parameter_names
 from sitl import harness
-from tests.daemon.daemons import running, until
+from tests.daemon.daemons import known, running, until
 
+pytestmark = pytest.mark.virtual_time
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 TRUTH = np.array(SCALE + OFFSET)
 SIX = parameter_names(1).six
 FLIGHT_S = {"builtin": 140.0, "ardupilot": 200.0}
+
+
+@pytest.fixture(autouse=True)
+def known_thread(monkeypatch):
+    known(monkeypatch)
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from sitl.ardupilot import process
 from sitl.errors import NoBinaryError
 from tests.sitl.listener import Listener
 
+pytestmark = pytest.mark.virtual_time
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 
 

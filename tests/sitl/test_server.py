@@ -17,6 +17,8 @@ from sitl.builtin.server import Server
 from sitl.builtin.truth import Truth, random_imus
 from sitl.station import Station
 
+pytestmark = pytest.mark.virtual_time
+
 
 class Client(asyncio.DatagramProtocol):
     """A ground station: UDP, counts what comes."""

@@ -28,9 +28,12 @@ RIGHT = {f"INS_ACCSCAL_{a}": s for a, s in zip("XYZ", TRUE.scale, strict=True)} 
 }
 
 
+FLIGHT_S = 50.0
+
+
 @pytest.fixture(scope="module", params=["plane", "copter"])
 def flight(request):
-    return recording.run(FlightSpec(vehicle=request.param, duration=90.0, imus=(TRUE, CALM)))
+    return recording.run(FlightSpec(vehicle=request.param, duration=FLIGHT_S, imus=(TRUE, CALM)))
 
 
 def of(flight, name):
@@ -39,7 +42,7 @@ def of(flight, name):
 
 def test_declared_rates(flight):
     for name, rate in {"RAW_IMU": 50, "SCALED_IMU2": 50, "ATTITUDE": 50, "HEARTBEAT": 1}.items():
-        assert len(of(flight, name)) == pytest.approx(90 * rate, rel=0.02)
+        assert len(of(flight, name)) == pytest.approx(FLIGHT_S * rate, rel=0.02)
 
 
 def test_times_never_go_back(flight):
@@ -53,7 +56,7 @@ def test_every_parameter_is_listed(flight):
 
 
 def test_right_parameters_leave_no_error():
-    spec = FlightSpec(duration=60.0, imus=(CALM,), parameters=RIGHT, rates={"HIGHRES_IMU": 50})
+    spec = FlightSpec(duration=FLIGHT_S, imus=(CALM,), parameters=RIGHT, rates={"HIGHRES_IMU": 50})
     flight = recording.run(spec)
     piece = flight.pieces[-1]
     true = piece.imus[0].filtered  # raw, sensor axes
@@ -68,7 +71,7 @@ def test_right_parameters_leave_no_error():
 
 
 def test_uncalibrated_error_is_the_declared_one():
-    spec = FlightSpec(duration=60.0, imus=(CALM,))
+    spec = FlightSpec(duration=FLIGHT_S, imus=(CALM,))
     piece = recording.run(spec).pieces[-1]
     expected = piece.trajectory.f_b / np.array(CALM.scale) + np.array(CALM.offset)
     assert np.abs(piece.imus[0].raw - expected).max() < 4e-3
@@ -99,7 +102,7 @@ def delay_of_gps(flight):
 
 @pytest.mark.parametrize("delay", [0.06, 0.14, 0.26])
 def test_gps_is_as_late_as_declared(delay):
-    spec = FlightSpec(duration=90.0, gps=GpsTruth(delay=delay))
+    spec = FlightSpec(duration=FLIGHT_S, gps=GpsTruth(delay=delay))
     flight = recording.run(spec)
     record = recording.truth_record(spec)
     assert record["net_gps_delay_s"] == pytest.approx(total_latency(spec.truth) - 0.02)
@@ -135,7 +138,7 @@ def test_attitude_errs_as_a_filter_does(vehicle):
 
 
 def test_attitude_can_be_true():
-    spec = FlightSpec(duration=60.0, attitude_errors=False)
+    spec = FlightSpec(duration=FLIGHT_S, attitude_errors=False)
     error, _ = attitude_error(recording.run(spec))
     assert np.abs(error).max() < 6e-3  # a millisecond of turning
 
@@ -188,8 +191,9 @@ def test_frames_are_the_messages(tmp_path):
 
 def test_same_spec_same_recording():
     spec = FlightSpec(duration=30.0, seed=9)
-    assert recording.fly(spec) == recording.fly(spec)
-    assert recording.fly(spec) != recording.fly(dataclasses.replace(spec, seed=10))
+    once = recording.fly(spec)
+    assert recording.fly(spec) == once
+    assert once != recording.fly(dataclasses.replace(spec, seed=10))
 
 
 def test_every_concealed_effect_is_found_once_and_has_a_name():

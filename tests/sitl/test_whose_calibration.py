@@ -11,10 +11,16 @@ from onboard.push.entries import Planned
 from sitl import harness
 from tests.daemon import daemons
 
+pytestmark = pytest.mark.virtual_time
 SCALE, OFFSET = (1.02, 0.98, 1.015), (0.2, -0.15, 0.25)
 SIX = parameter_names(1).six
 FLIGHT_S = {"builtin": 110.0, "ardupilot": 150.0}
 LONG_S = 3600.0
+
+
+@pytest.fixture(autouse=True)
+def known_thread(monkeypatch):
+    daemons.known(monkeypatch)
 
 
 @pytest.fixture

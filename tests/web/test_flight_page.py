@@ -57,6 +57,7 @@ def six(autopilot):
     return np.array([autopilot.parameters[name] for name in parameter_names(1).six])
 
 
+@pytest.mark.slow
 async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
     browser, tmp_path, monkeypatch
 ):

@@ -20,7 +20,8 @@ from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages
 
 SHORT = CalibratorSettings(refine=False, buffer_s=100.0)
-STAND_S = 600.0
+STAND_S = 300.0
+"""Three times what is kept of a flight."""
 
 
 @pytest.fixture(scope="module")
@@ -48,17 +49,23 @@ def fed(samples, settings=SHORT):
     return calibrator
 
 
+@pytest.fixture(scope="module")
+def before(flight):
+    """Fed with the flight; only to be looked at."""
+    return fed(flight)
+
+
 def without_states(samples):
     return [s for s in samples if not isinstance(s, VehicleState)]
 
 
 @pytest.mark.parametrize("told", [True, False])
-def test_a_long_stand_after_the_landing_changes_nothing(flight, told):
+def test_a_long_stand_after_the_landing_changes_nothing(flight, before, told):
     samples = flight if told else without_states(flight)
     stand = standing_on(flight, STAND_S)
     after = fed([*samples, *(stand if told else without_states(stand))])
-    before = fed(samples)
-    one, two = before.calibration(1), after.calibration(1)
+    landed = before if told else fed(samples)
+    one, two = landed.calibration(1), after.calibration(1)
     assert two.status is one.status is Status.CALIBRATED
     assert (two.scale, two.offset) == (one.scale, one.offset)
     assert two.covariance == one.covariance
@@ -66,7 +73,7 @@ def test_a_long_stand_after_the_landing_changes_nothing(flight, told):
     assert "hovering" not in two.note
 
 
-def test_ten_seconds_of_being_armed_on_the_ground_are_no_flight(flight):
+def test_ten_seconds_of_being_armed_on_the_ground_are_no_flight(flight, before):
     stand = standing_on(flight, 60.0)
     begin = stand[0].t
     armed = [
@@ -75,27 +82,28 @@ def test_ten_seconds_of_being_armed_on_the_ground_are_no_flight(flight):
         else s
         for s in stand
     ]
-    before, after = fed(flight).calibration(1), fed([*flight, *armed]).calibration(1)
-    assert after.trusted_s == before.trusted_s
-    assert after.covariance == before.covariance
+    landed, after = before.calibration(1), fed([*flight, *armed]).calibration(1)
+    assert after.trusted_s == landed.trusted_s
+    assert after.covariance == landed.covariance
 
 
-def test_a_hover_after_the_brisk_part_does_not_undo_it(flight):
+def test_a_hover_after_the_brisk_part_does_not_undo_it(flight, before):
     """The buffer slides past the brisk part; that it was flown stays known."""
     engine = fed(flight, replace(SHORT, buffer_s=20.0)).engine(1)
     assert engine.left_brisk_s > 20.0
     assert engine.moving
-    assert engine.brisk_s == pytest.approx(fed(flight).engine(1).brisk_s)
+    assert engine.brisk_s == pytest.approx(before.engine(1).brisk_s)
 
 
 def test_that_it_moved_is_known_after_a_restart(flight):
     named = [ParameterValue("INS_ACC_ID", 5.0), *flight]
-    resumed = Calibrator.from_bytes(fed(named).to_bytes(), SHORT)
+    once = fed(named)
+    resumed = Calibrator.from_bytes(once.to_bytes(), SHORT)
     for sample in named:
         resumed.feed(sample)
     resumed.finish()
     assert resumed.calibration(1).rejected["restored"] == 1
-    assert resumed.engine(1).brisk_s == pytest.approx(2.0 * fed(named).engine(1).brisk_s)
+    assert resumed.engine(1).brisk_s == pytest.approx(2.0 * once.engine(1).brisk_s)
 
 
 def test_the_frozen_flight_stays_while_the_live_one_goes_on(flight):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.gyroscopes import rates_at
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ImuSample, ImuSource, ParameterValue
@@ -38,8 +39,8 @@ def twin(sample):
     return replace(sample, imu=2, w_b=tuple(CROOKED @ np.array(sample.w_b)))
 
 
-def calibrated(samples, *, second=False, ids=()):
-    made = Calibrator()
+def calibrated(samples, *, second=False, ids=(), settings=None):
+    made = Calibrator(settings)
     for name, value in ids:
         made.feed(ParameterValue(name, float(value)))
     for sample in samples:
@@ -59,8 +60,13 @@ def six(made, imu):
     return np.array(c.scale + c.offset)
 
 
-def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_notice(flight):
-    alone, both = calibrated(flight), calibrated(flight, second=True)
+@pytest.mark.parametrize("refine", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_notice(
+    flight, refine
+):
+    settings = CalibratorSettings(refine=refine)
+    alone = calibrated(flight, settings=settings)
+    both = calibrated(flight, second=True, settings=settings)
     assert both.imus == (1, 2)
     np.testing.assert_array_equal(six(both, 1), six(alone, 1))
     # Its own gyroscope would put TILT of gravity into y.  Only interpolation is left.
@@ -69,7 +75,7 @@ def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_
 
 def test_a_gyroscope_of_the_same_chip_is_the_accelerometers_own(flight):
     ids = [("INS_ACC2_ID", ONE_CHIP | 22 << 16), ("INS_GYR2_ID", ONE_CHIP | 36 << 16)]
-    made = calibrated(flight, second=True, ids=ids)
+    made = calibrated(flight, second=True, ids=ids, settings=CalibratorSettings(refine=False))
     w = [made.engine(imu).batches[2].segment.w_b for imu in (1, 2)]
     # Both streams are cut to whole mrad/s, in axes of their own.
     np.testing.assert_allclose(w[1], w[0] @ CROOKED.T, rtol=0.0, atol=1.1e-3)

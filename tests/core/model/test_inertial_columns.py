@@ -29,10 +29,11 @@ def raw(t):
 
 
 def exponential(phi):
-    """Series of the matrix exponential of one rotation vector."""
-    x, y, z = phi
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    out, term = np.eye(3), np.eye(3)
+    """Series of the matrix exponential, (n, 3, 3), of rotation vectors, (n, 3)."""
+    x, y, z = phi.T
+    zero = np.zeros_like(x)
+    K = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    out = term = np.broadcast_to(np.eye(3), K.shape)
     for n in range(1, 12):
         term = term @ K / n
         out = out + term
@@ -43,8 +44,8 @@ def attitudes(w):
     """Attitude at T from rates at the middles of its steps, the identity first."""
     R = np.empty((len(T), 3, 3))
     R[0] = np.eye(3)
-    for i in range(len(T) - 1):
-        R[i + 1] = R[i] @ exponential(w[i] * H)
+    for i, step in enumerate(exponential(w * H)):
+        R[i + 1] = R[i] @ step
     return R
 
 
