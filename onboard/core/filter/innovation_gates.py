@@ -79,11 +79,12 @@ class InnovationGates:
             None if all may be used.
         """
         at = 0
+        innovations = y - h @ theta
         for kind, name, limit in GATES:
             n = kinds.count(kind)
             if n == 0:
                 continue
-            r, D = y[at : at + n] - h[at : at + n] @ theta, h[at : at + n]
+            r, D = innovations[at : at + n], h[at : at + n]
             at += n
             nis = float(r @ r)
             if nis > limit:

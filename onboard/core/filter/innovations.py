@@ -1,10 +1,19 @@
-"""What goes through the whitening filter: steps and epochs in, whitened innovations out."""
+"""What goes through the whitening filter: steps and epochs in, whitened innovations out.
+
+What a regressor adds is kept as the filter takes it: beside what is known (column 0, the value at
+``theta = 0``), so that the whole at ``theta`` is the product with ``(1, -theta)``.  A *stack* is
+three vectors in body axes, one above the other: (9, m + 1); turned to NED, they belong to
+velocity, height (of which only the component down counts) and attitude: (7, m + 1).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import skew
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,22 +23,54 @@ class Step:
     Attributes:
         duration: T, s.
         turn: (3, 3) ``P`` at the end.
-        force: (3,) ``integral P f dtau``, m/s.
-        force_to_end: (3,) ``integral (T - tau) P f dtau``, m.
-        mean_turn: (3, 3) ``integral P dtau``, s.
-        columns: (3, m) as ``force``, per unit of each of the m unknowns.
-        columns_to_end: (3, m) as ``force_to_end``.
-        columns_turn: (3, m) the turn that they add, rad per unit.
+        moved: (3, 8) side by side ``integral P f dtau``, m/s; ``integral (T - tau) P f dtau``, m;
+            ``integral P dtau`` (3, 3), s; and what a bias of the gyroscope changes the velocity
+            by, (3, 3), m/s per rad/s.
+        columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
+            nothing is known, column 0 is zero.
     """
 
     duration: float
     turn: Array
-    force: Array
-    force_to_end: Array
-    mean_turn: Array
+    moved: Array
     columns: Array
-    columns_to_end: Array
-    columns_turn: Array
+
+
+def steps(
+    duration: Array,
+    turn: Array,
+    force: Array,
+    force_to_end: Array,
+    mean_turn: Array,
+    columns: Array,
+    columns_to_end: Array,
+    columns_turn: Array,
+) -> list[Step]:
+    """K steps of prediction from their integrals.
+
+    Args:
+        duration: (K,) T, s.
+        turn: (K, 3, 3) ``P`` at the end.
+        force: (K, 3) ``integral P f dtau``, m/s.
+        force_to_end: (K, 3) ``integral (T - tau) P f dtau``, m.
+        mean_turn: (K, 3, 3) ``integral P dtau``, s.
+        columns: (K, 3, m) as ``force``, per unit of each of the m unknowns.
+        columns_to_end: (K, 3, m) as ``force_to_end``.
+        columns_turn: (K, 3, m) the turn that they add, rad per unit.
+    """
+    K, _, m = columns.shape
+    # What turns at a steady rate meets the force on the mean in proportion to its time left.
+    arm = skew(force - force_to_end / duration[:, None])
+    moved = np.concatenate(
+        [force[:, :, None], force_to_end[:, :, None], mean_turn, arm @ mean_turn], axis=2
+    )
+    stack = np.zeros((K, 9, m + 1))
+    stack[:, 0:3, 1:] = arm @ columns_turn - columns
+    stack[:, 3:6, 1:] = columns_to_end
+    stack[:, 6:9, 1:] = -columns_turn
+    return [
+        Step(T, turn[k], moved[k], stack[k]) for k, T in enumerate(np.asarray(duration).tolist())
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,16 +83,10 @@ class Epoch:
         height: above the ellipsoid or mean sea level, m.
         latitude: rad.
         R_attitude: (3, 3) recorded attitude, body to NED; None where no sample is near.
-        known_body: (3,) what the reported velocity is known to differ by (the receiver's averaging,
-            the lever arm), body axes, m/s.
-        known_height: the same of the height, m.
-        velocity_body: (3, m) regressors of the velocity, body axes, m/s per unit.
-        velocity_ned: (3, m) the same in NED.
-        position_body: (3, m) regressors of the position, body axes, m per unit.
-        position_ned: (3, m) the same in NED.
+        body: (9, m + 1) stack of what a measurement has in body axes: in column 0 less what the
+            reported one is known to differ by (the receiver's averaging, the lever arm).
+        ned: (7, m + 1) what it has in NED: in column 0 velocity and height.
         along_velocity: (m,) regressors of the position as multiples of the velocity, s per unit.
-        attitude_body: (3, m) regressors of the recorded attitude, body axes, rad per unit.
-        attitude_ned: (3, m) the same in NED.
         trusted: whether the receiver is to be believed.
     """
 
@@ -60,15 +95,9 @@ class Epoch:
     height: float
     latitude: float
     R_attitude: Array | None
-    known_body: Array
-    known_height: float
-    velocity_body: Array
-    velocity_ned: Array
-    position_body: Array
-    position_ned: Array
+    body: Array
+    ned: Array
     along_velocity: Array
-    attitude_body: Array
-    attitude_ned: Array
     trusted: bool
 
 

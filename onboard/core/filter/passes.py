@@ -119,16 +119,14 @@ class Pass:
         )
         if not self._running:
             self._start(segment, ready)
-        noise = self.filter.regressor_noise
-        if noise is not None:
-            noise.begin_block()
+        self.filter.begin_block()
         result = PassResult(Block(ready.start, ready.end, NormalSums.zeros(0)))
         sums = self._go_through(segment, ready, result)
         self._take_bias_out()
         self.sums += sums
         result.block.sums = block = sums.member(0)
-        if noise is not None:
-            self._noise_in_regressors(block, segment, noise.gram)
+        if self.filter.noise_gram is not None:
+            self._noise_in_regressors(block, segment, self.filter.noise_gram)
         return result
 
     def _start(self, segment: Segment, ready: Prepared) -> None:
@@ -208,8 +206,7 @@ class Pass:
         """Subtract the estimated gyroscope bias from the next segment's rates."""
         if self.uses.recorded_attitude:
             return
-        constant, regressors = self.filter.bias_estimate
-        shift = constant + regressors @ self.theta
+        shift = self.filter.bias(self.theta)
         self.bias_b = self.bias_b + shift
         self.filter.shift_bias(shift)
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.innovations import Epoch, Step
+from onboard.core.filter.innovations import Epoch, Step, steps
 from onboard.core.filter.limits import LONGEST_STEP_S
+from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -101,20 +102,16 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
 
 def _steps(intervals: Intervals, regressors: SegmentRegressors) -> list[Step]:
     force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
-    mean_turn = np.einsum("ki,kiab->kab", intervals.weight, intervals.P)
-    return [
-        Step(
-            float(intervals.duration[k]),
-            intervals.P[k, -1],
-            force[k, :, 0],
-            force_to_end[k, :, 0],
-            mean_turn[k],
-            regressors.force1[k],
-            regressors.force2[k],
-            regressors.turn[k],
-        )
-        for k in range(len(intervals.duration))
-    ]
+    return steps(
+        intervals.duration,
+        intervals.P[:, -1],
+        force[:, :, 0],
+        force_to_end[:, :, 0],
+        np.einsum("ki,kiab->kab", intervals.weight, intervals.P),
+        regressors.force1,
+        regressors.force2,
+        regressors.turn,
+    )
 
 
 def _epochs(
@@ -131,6 +128,17 @@ def _epochs(
     known += around.swing @ segment.lever_arm_b
     a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
     known_height = -a_down * point.window**2 / 24.0 - R_att[:, 2] @ segment.lever_arm_b
+    n, _, m = c.velocity_body.shape
+    body, ned = np.zeros((n, 9, m + 1)), np.zeros((n, MEASURED, m + 1))
+    body[:, 0:3, 0] = -known
+    body[:, 0:3, 1:] = c.velocity_body
+    body[:, 3:6, 1:] = -c.position_body  # height is up
+    body[:, 6:9, 1:] = c.attitude_body
+    ned[:, V, 0] = fixes.v_n
+    ned[:, H, 0] = fixes.height - known_height
+    ned[:, V, 1:] = c.velocity_ned
+    ned[:, H, 1:] = -c.position_ned[:, 2]
+    ned[:, PSI, 1:] = c.attitude_ned
     return [
         Epoch(
             float(around.now.t[e]),
@@ -138,15 +146,9 @@ def _epochs(
             float(fixes.height[e]),
             float(fixes.latitude[e]),
             R_att[e] if near[e] else None,
-            known[e],
-            float(known_height[e]),
-            c.velocity_body[e],
-            c.velocity_ned[e],
-            c.position_body[e],
-            c.position_ned[e],
+            body[e],
+            ned[e],
             c.along_velocity[e],
-            c.attitude_body[e],
-            c.attitude_ned[e],
             bool(trusted[e]),
         )
         for e in range(len(fixes))

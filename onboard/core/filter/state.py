@@ -9,10 +9,15 @@ V        velocity, NED, m/s                       random walk (accelerometer)
 H        height, m                                integral of -v_down
 PSI      attitude error, NED rotation vector      random walk (gyroscope)
 BIAS     gyroscope bias, body, rad/s              random walk
-ATT      slow error of the recorded attitude      Gauss-Markov
-CH       wander of GPS height, m                  random walk
 CV       correlated GPS velocity error, m/s       Gauss-Markov
+CH       wander of GPS height, m                  random walk
+ATT      slow error of the recorded attitude      Gauss-Markov
 =======  =======================================  =============================
+
+The order says what is measured: number ``i`` of the :data:`MEASURED` (velocity north, east, down;
+height; attitude about north, east, down) reads the sum of state ``i`` and of its own slow error,
+state ``i + ERRORS``.  In one step the :data:`MEASURED` first states take from the ``ERRORS``
+first ones only; the biases stay, and the errors decay, each for itself.
 """
 
 from __future__ import annotations
@@ -23,7 +28,9 @@ V: Final = slice(0, 3)
 H: Final = 3
 PSI: Final = slice(4, 7)
 BIAS: Final = slice(7, 10)
-ATT: Final = slice(10, 13)
+CV: Final = slice(10, 13)
 CH: Final = 13
-CV: Final = slice(14, 17)
+ATT: Final = slice(14, 17)
 STATES: Final = 17
+MEASURED: Final = 7
+ERRORS: Final = 10

@@ -24,6 +24,8 @@ import numpy as np
 
 from onboard.core.filter.innovation_gates import InnovationGates
 from onboard.core.filter.innovations import Epoch, Step, WhitenedInnovations
+from onboard.core.filter.kernel import Process, Whitening, chosen, covariances, diagonal
+from onboard.core.filter.kernel import innovations, measured
 from onboard.core.filter.limits import (
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
@@ -32,24 +34,17 @@ from onboard.core.filter.limits import (
     SYMMETRY_UPDATES,
 )
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.readings import innovations, kinds_of, reading
-from onboard.core.filter.regressor_noise import RegressorNoise
-from onboard.core.filter.state import ATT, BIAS, CH, CV, PSI, STATES, H, V
+from onboard.core.filter.readings import kinds_of, reading
+from onboard.core.filter.state import ATT, BIAS, CH, MEASURED, PSI, STATES, H, V
 from onboard.core.filter.variances import Variances
-from onboard.core.filter.whitened import Whitened, nothing, whiten
+from onboard.core.filter.whitened import nothing, whitened
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
-from onboard.core.maths.small_turns import skew_of, turn_by
+from onboard.core.maths.small_turns import angle_of, turn_by
 
-_EYE = np.eye(STATES)
 _DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
+_NOT_TURNED = np.zeros(3)
 _LETTER = {"velocity": "v", "recovery": "v", "height": "h", "attitude": "a"}
-
-
-def _diagonal(matrices: Array) -> Array:
-    """The diagonals of matrices (..., n, n), to be written to: (..., n)."""
-    view: Array = np.einsum("...ii->...i", matrices)
-    return view
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +74,9 @@ class WhiteningFilter:
         bank: noise levels of the B members.
         R_nb: (3, 3) attitude, body axes to NED.
         t: time on the boot clock, s.
-        regressor_noise: noise in the regressors; None while several levels are tried, for only
-            the sums that count need it.
+        noise_gram: (3,) sum since :meth:`begin_block` of the whitened noise of each body axis
+            squared, per unit density (:mod:`onboard.core.filter.regressor_noise`); None while
+            several levels are tried, for only the sums that count need it.
     """
 
     def __init__(
@@ -91,14 +87,21 @@ class WhiteningFilter:
         self.bank = tuple(bank)
         self.uses = uses or Uses()
         B = len(self.bank)
-        self._X = np.zeros((B, STATES, unknowns + 1))
-        self._P = np.zeros((B, STATES, STATES))
+        self.noise_gram = np.zeros(3) if B == 1 else None
+        self._m1 = unknowns + 1
+        matrices = 1 if self.noise_gram is None else 4
+        self._carried = np.zeros((B, STATES, self._m1 + matrices * STATES))
         self.R_nb = np.eye(3)
         self.t = float("nan")
-        self._variances = Variances(self.bank)
+        self._kernel = chosen()
+        self._variances = Variances(self.bank, attitude=not self.uses.recorded_attitude)
         self._gates = InnovationGates(self.bank[0]) if self.uses.gates else None
-        self.regressor_noise = RegressorNoise() if B == 1 else None
         self._updates = 0
+
+    def begin_block(self) -> None:
+        """Count :attr:`noise_gram` from here on; the noise that was integrated goes on."""
+        if self.noise_gram is not None:
+            self.noise_gram = np.zeros(3)
 
     def start(self, epoch: Epoch, R_nb: Array, tilt_sigma: float, heading_sigma: float) -> None:
         """Begin at an epoch: its velocity and height are the state, as uncertain as they are.
@@ -114,42 +117,40 @@ class WhiteningFilter:
         """
         self.R_nb = R_nb
         self.t = epoch.t
-        X = np.zeros_like(self._X)
-        velocity = np.where(np.isnan(epoch.velocity), 0.0, epoch.velocity)
-        X[:, V, 0] = velocity - R_nb @ epoch.known_body
-        X[:, V, 1:] = -(R_nb @ epoch.velocity_body + epoch.velocity_ned)
-        X[:, H, 0] = epoch.height - epoch.known_height
-        X[:, H, 1:] = (
-            R_nb[2] @ epoch.position_body
-            + epoch.position_ned[2]
-            + velocity[2] * epoch.along_velocity
-        )
-        self._X = X
-        self._P = self._variances.at_start(
+        down = float(epoch.velocity[2])
+        known = not math.isnan(down)
+        z = measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
+        if not known:
+            z[2, 0] = R_nb[2] @ epoch.body[:3, 0]
+        m1 = self._m1
+        self._carried[:] = 0.0
+        self._carried[:, V, :m1] = z[V]
+        self._carried[:, H, :m1] = z[H]
+        covariances(self._carried, m1)[:, 0] = self._variances.at_start(
             tilt_sigma,
             heading_sigma,
-            down=not np.isnan(epoch.velocity[2]),
+            down=known,
             height=self.uses.height,
-            attitude=not self.uses.recorded_attitude,
         )
         if self._gates is not None:
             self._gates.forget()
-        if self.regressor_noise is not None:
-            self.regressor_noise.forget()
 
-    @property
-    def bias_estimate(self) -> tuple[Array, Array]:
-        """Gyroscope bias of member 0, rad/s: (3,) at ``theta = 0``, and its regressors (3, m)."""
-        return self._X[0, BIAS, 0], self._X[0, BIAS, 1:]
+    def bias(self, theta: Array) -> Array:
+        """(3,) gyroscope bias of member 0 at ``theta`` (m,), body axes, rad/s."""
+        return self._mean(BIAS, theta)
 
     def velocity(self, theta: Array) -> Array:
         """(3,) velocity of member 0 at ``theta`` (m,), NED, m/s."""
-        v: Array = self._X[0, V, 0] + self._X[0, V, 1:] @ theta
-        return v
+        return self._mean(V, theta)
+
+    def _mean(self, states: slice, theta: Array) -> Array:
+        X = self._carried[0, states, : self._m1]
+        mean: Array = X[:, 0] - X[:, 1:] @ theta
+        return mean
 
     def shift_bias(self, by: Array) -> None:
         """The caller subtracts ``by`` (3,), rad/s, more from the gyroscope from now on."""
-        self._X[:, BIAS, 0] -= by
+        self._carried[:, BIAS, 0] -= by
 
     def predict(self, step: Step, theta: Array, latitude: float) -> None:
         """Carry mean, regressors and covariance through one step.
@@ -160,43 +161,17 @@ class WhiteningFilter:
             latitude: rad.
         """
         T, R = step.duration, self.R_nb
-        S, S2 = R @ step.force, R @ step.force_to_end
-        A = R @ step.mean_turn
-        arm = skew_of(S - S2 / T)
-        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
-        F = _EYE.copy()
-        F[V, PSI] = -skew_of(S)
-        F[PSI, BIAS] = -A
-        F[V, BIAS] = arm @ A
-        F[H, 2] = -T
-        F[H, PSI] = skew_of(S2)[2]
-        keep = _diagonal(F)
-        keep[ATT], keep[CV] = keep_att, keep_cv
-
         down, turn_n = _DOWN, None
         if self.uses.earth:
-            carried, turn_n = carried_and_turning(latitude, self.velocity(theta))
-            down = down + carried
-
-        X = F @ self._X
-        turned = R @ step.columns_turn
-        X[:, V, 1:] += R @ step.columns - arm @ turned
-        X[:, V, 0] += down * T
-        X[:, H, 1:] -= R[2] @ step.columns_to_end
-        X[:, H, 0] -= down[2] * T * T / 2.0
-        X[:, PSI, 1:] += turned
-        self._X = X
-
-        before, after = self._variances.over(
-            T, keep_att, keep_cv, attitude=not self.uses.recorded_attitude
-        )
-        P = self._P
-        _diagonal(P)[:] += before
-        P = F @ P @ F.T
-        _diagonal(P)[:] += after
-        self._P = P
-        if self.regressor_noise is not None:
-            self.regressor_noise.predict(F, R, T)
+            extra, turn_n = carried_and_turning(latitude, self.velocity(theta))
+            down = down + extra
+        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
+        fall = np.zeros(MEASURED)
+        fall[V] = down * T
+        fall[H] = -0.5 * T * T * down[2]
+        decay = np.array([keep_cv, keep_cv, keep_cv, 1.0, keep_att, keep_att, keep_att])
+        process = Process(fall, decay, *self._variances.over(T, decay))
+        self._kernel.predict(self._carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
         self.t += T
@@ -220,23 +195,23 @@ class WhiteningFilter:
             height=self.uses.height and epoch.trusted,
             attitude=self.uses.attitude,
         )
+        z = self._measured(epoch, theta) if kinds else _NOT_TURNED
         while kinds:
-            made = self._whitened(epoch, theta, kinds)
+            made = self._kernel.whiten(self._carried, z, reading(kinds), self._variances.reading)
             refusal = None
             if self._gates is not None:
-                refusal = self._gates.judge(
-                    epoch.t, kinds, made.E[0], made.y[0], made.h[0], theta, covariance
-                )
+                y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
+                refusal = self._gates.judge(epoch.t, kinds, made.E, y, h, theta, covariance)
             if refusal is None:
-                self._take(made, theta)
-                return made.innovations(epoch.t, theta, refused, off)
+                self._take(made, kinds, theta)
+                return whitened(made, kinds, epoch.t, theta, refused, off)
             refused.append(refusal.name)
             if refusal.renewed:
                 self._renew(refusal.name)
             letter = _LETTER[refusal.name]
             if letter == "v":
                 n = kinds.count("v")
-                off = made.E[0, :n, 0] - made.E[0, :n, 1:] @ theta
+                off = made.E[:n, 0] - made.E[:n, 1:] @ theta
             kinds = kinds.replace(letter, "")
         return nothing(len(self.bank), self.m, epoch.t, refused, off) if refused else None
 
@@ -257,39 +232,37 @@ class WhiteningFilter:
         kinds = kinds_of(epoch, velocity=True, height=False, attitude=False)
         if not kinds:
             return None
-        first, second, noise = reading(kinds)
-        both = innovations(self._X, self._P, self.R_nb, epoch, theta, kinds)
-        E, HP = both[0, :, : self.m + 1], both[0, :, self.m + 1 :]
-        S = HP[:, first] + HP[:, second] + np.diag(self._variances.reading[0, noise])
+        read = reading(kinds)
+        both = innovations(self._carried[:1], self._measured(epoch, theta), read)[0]
+        E, PH = both[:, : self._m1], both[:, self._m1 :]
+        noise = np.diag(self._variances.reading[0, read.first])
+        S = noise - PH[:, read.first] - PH[:, read.second]
         D = E[:, 1:]
         return E[:, 0] - D @ theta, S + D @ covariance @ D.T
 
-    def _whitened(self, epoch: Epoch, theta: Array, kinds: str) -> Whitened:
-        both = innovations(self._X, self._P, self.R_nb, epoch, theta, kinds)
-        return whiten(both, self._variances.reading, kinds)
+    def _measured(self, epoch: Epoch, theta: Array) -> Array:
+        turned = _NOT_TURNED
+        if self.uses.attitude and epoch.R_attitude is not None:
+            turned = angle_of(epoch.R_attitude @ self.R_nb.T)
+        return measured(self.R_nb, epoch, float(self.velocity(theta)[2]), turned)
 
-    def _take(self, made: Whitened, theta: Array) -> None:
-        """Update mean, regressors and covariance; turn the attitude by what was found."""
-        back = np.swapaxes(made.gain, -1, -2)
-        self._X[:, :, :1] += back @ made.y[:, :, None]
-        self._X[:, :, 1:] -= back @ made.h
-        P = self._P - back @ made.gain
+    def _take(self, made: Whitening, kinds: str, theta: Array) -> None:
+        """Update all that is carried; turn the attitude by what was found."""
+        self._kernel.take(self._carried, made, reading(kinds), self.noise_gram)
         self._updates += 1
         if self._updates % SYMMETRY_UPDATES == 0:
-            P = (P + np.swapaxes(P, -1, -2)) / 2
-        self._P = P
-        if self.regressor_noise is not None:
-            self.regressor_noise.update(made.whitener[0], back[0], made.read)
+            P = covariances(self._carried, self._m1)[:, 0]
+            P[:] = (P + np.swapaxes(P, -1, -2)) / 2
         if self.uses.recorded_attitude:
             return
         # Turned by the filter's own estimate, so that errors stay small angles.
-        psi = self._X[0, PSI, 0] + self._X[0, PSI, 1:] @ theta
+        psi = self._mean(PSI, theta)
         self.R_nb = turn_by(psi) @ self.R_nb
-        self._X[:, PSI, 0] -= psi
+        self._carried[:, PSI, 0] -= psi
 
     def _renew(self, reference: str) -> None:
         """What a reference (``height`` or ``attitude``) differs by is unknown from here on."""
         if reference == "height":
-            self._P[:, CH, CH] += RENEWED_HEIGHT_VAR
+            diagonal(self._carried, self._m1)[:, CH] += RENEWED_HEIGHT_VAR
         else:
-            _diagonal(self._P)[:, ATT] += RENEWED_ATTITUDE_VAR
+            diagonal(self._carried, self._m1)[:, ATT] += RENEWED_ATTITUDE_VAR

@@ -8,6 +8,7 @@ rad, heights in m above the ellipsoid (heights above mean sea level do: radii ch
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -97,8 +98,8 @@ def carried_and_turning(latitude: float, v_n: Array) -> tuple[Array, Array]:
     Returns:
         (3,) m/s^2 and (3,) rad/s, both in NED.
     """
-    north, east, down = (float(x) for x in v_n)
-    c, s = np.cos(latitude), np.sin(latitude)
+    north, east, down = v_n.tolist()
+    c, s = math.cos(latitude), math.sin(latitude)
     # A sphere's radius does: half a per cent of 1e-6 rad/s.
     w = (east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS, -east * s / c / SEMI_MAJOR_AXIS)
     x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]

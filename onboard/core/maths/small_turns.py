@@ -12,12 +12,6 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 
 
-def skew_of(a: Array) -> Array:
-    """(3, 3) matrix of ``a x`` for one vector (3,)."""
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def turn_by(phi: Array) -> Array:
     """(3, 3) rotation by one rotation vector (3,), rad (Rodrigues)."""
     x, y, z = phi.tolist()
@@ -39,10 +33,10 @@ def turn_by(phi: Array) -> Array:
 
 def angle_of(R: Array) -> Array:
     """(3,) rotation vector of one rotation (3, 3), |angle| well below pi, rad."""
-    v = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    s = float(np.sqrt(v @ v))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
+    x, y, z = 0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)
+    s = math.sqrt(x * x + y * y + z * z)
     if s < 1e-9:
-        return v
-    c = 0.5 * (float(np.trace(R)) - 1.0)
-    out: Array = v * (np.arctan2(s, c) / s)
-    return out
+        return np.array([x, y, z])
+    k = math.atan2(s, 0.5 * (xx + yy + zz - 1.0)) / s
+    return np.array([x * k, y * k, z * k])

@@ -23,6 +23,8 @@ from onboard.errors import StateError
 
 _MAGIC = b"OBS1"
 _HEAD = struct.Struct("<4sII")
+_TOGETHER = 128
+"""Whitened innovations that are multiplied at once."""
 
 
 @dataclass(slots=True)
@@ -160,23 +162,39 @@ class NormalSums:
 class BankSums:
     """Sums of every member of a filter bank, side by side.
 
+    What is added is collected first, and multiplied when the sums are asked for or enough is
+    there: one large product costs a fraction of many small ones.
+
     Attributes:
-        N: (B, m, m) information matrices of the B members.
-        b: (B, m).
-        s: (B,).
         log_det: (B,).
         rows: number of whitened innovations, the same for every member.
     """
 
-    __slots__ = ("N", "b", "log_det", "rows", "s")
+    __slots__ = ("_gram", "_pending", "_waiting", "log_det", "rows")
 
     def __init__(self, members: int, m: int) -> None:
         """Empty sums of ``members`` filters with ``m`` unknowns."""
-        self.N = np.zeros((members, m, m))
-        self.b = np.zeros((members, m))
-        self.s = np.zeros(members)
+        self._gram = np.zeros((members, m + 1, m + 1))
+        """Products of ``y`` (first) and ``h`` with themselves and each other."""
+        self._pending = np.empty((members, _TOGETHER, m + 1))
+        self._waiting = 0
         self.log_det = np.zeros(members)
         self.rows = 0
+
+    @property
+    def N(self) -> Array:
+        """(B, m, m) information matrices of the B members."""
+        return self._added()[:, 1:, 1:]
+
+    @property
+    def b(self) -> Array:
+        """(B, m)."""
+        return self._added()[:, 1:, 0]
+
+    @property
+    def s(self) -> Array:
+        """(B,)."""
+        return self._added()[:, 0, 0]
 
     def add(self, y: Array, h: Array, log_det: Array) -> None:
         """Add whitened innovations.
@@ -186,17 +204,33 @@ class BankSums:
             h: (B, r, m) regressors.
             log_det: (B,) log determinant of the innovations' covariance before whitening.
         """
-        ht = np.swapaxes(h, -1, -2)
-        self.N += ht @ h
-        self.b += (ht @ y[:, :, None])[:, :, 0]
-        self.s += np.einsum("br,br->b", y, y)
+        r = y.shape[1]
+        for first in range(0, r, _TOGETHER):
+            part = slice(first, first + _TOGETHER)
+            self._collect(y[:, part], h[:, part])
         self.log_det += log_det
-        self.rows += y.shape[1]
+        self.rows += r
+
+    def _collect(self, y: Array, h: Array) -> None:
+        """At most :data:`_TOGETHER` rows."""
+        start, end = self._waiting, self._waiting + y.shape[1]
+        if end > _TOGETHER:
+            self._added()
+            start, end = 0, y.shape[1]
+        self._pending[:, start:end, 0] = y
+        self._pending[:, start:end, 1:] = h
+        self._waiting = end
+
+    def _added(self) -> Array:
+        """(B, m + 1, m + 1) products of all that was added."""
+        if self._waiting:
+            rows = self._pending[:, : self._waiting]
+            self._gram += rows.transpose(0, 2, 1) @ rows
+            self._waiting = 0
+        return self._gram
 
     def __iadd__(self, other: BankSums) -> Self:
-        self.N += other.N
-        self.b += other.b
-        self.s += other.s
+        self._gram += other._added()  # noqa: SLF001 - of its own kind
         self.log_det += other.log_det
         self.rows += other.rows
         return self
@@ -226,10 +260,11 @@ class BankSums:
         prior_b = information @ prior
         constant = float(prior @ prior_b)
         out = []
-        for i in range(len(self.s)):
-            A = self.N[i] + information
-            c = self.b[i] + prior_b
+        N, b, s = self.N, self.b, self.s
+        for i in range(len(s)):
+            A = N[i] + information
+            c = b[i] + prior_b
             theta = np.linalg.solve(A, c)
-            nis = float(self.s[i] + constant - c @ theta)
+            nis = float(s[i] + constant - c @ theta)
             out.append(-0.5 * (self.log_det[i] + nis + float(np.linalg.slogdet(A)[1])))
         return out

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from onboard.core.filter.innovations import Epoch, Step
+from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
@@ -155,25 +155,22 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     error, colour, wander = slow * normal(size=3), levels.velocity_colour * normal(size=3), 0.0
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
-    nothing, none, theta = np.zeros((3, 1)), np.zeros(1), np.ones(1)
+    theta = np.ones(1)
 
     def epoch(t):
         read = rotation_from_vector(error + levels.attitude * normal(size=3)) @ R
+        ned = np.zeros((7, 2))
+        ned[:3, 0] = v + colour + levels.velocity * normal(size=3)
+        ned[3, 0] = h + wander + levels.height * normal()
         return Epoch(
             t,
-            v + colour + levels.velocity * normal(size=3),
-            h + wander + levels.height * normal(),
-            0.0,
-            read,
-            np.zeros(3),
-            0.0,
-            nothing,
-            nothing,
-            nothing,
-            nothing,
-            none,
-            nothing,
-            nothing,
+            velocity=ned[:3, 0],
+            height=ned[3, 0],
+            latitude=0.0,
+            R_attitude=read,
+            body=np.zeros((9, 2)),
+            ned=ned,
+            along_velocity=np.zeros(1),
             trusted=True,
         )
 
@@ -204,8 +201,9 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         keep = np.exp(-T / COLOUR_TIME_S)
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
         wander += levels.height_walk * np.sqrt(T) * normal()
-        columns = force[:, None], to_end[:, None], nothing
-        filter_.predict(Step(T, P, force, to_end, mean, *columns), theta, 0.0)
+        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], np.zeros((3, 1)))
+        step = steps(np.array([T]), *(x[None] for x in integrals))[0]
+        filter_.predict(step, theta, 0.0)
         made = filter_.update(epoch((k + 1) * T), theta, np.zeros((1, 1)))
         out.append(made.y[0] - made.h[0] @ theta)
     return np.array(out)
