@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from onboard.core.filter.kernel import prefer_compiled
 from sitl.virtual_time import VirtualTimeLoop
+
+prefer_compiled()
 
 # The same examples in every run: a change is judged by what it changes.  Others are looked for
 # by hand with --hypothesis-profile=search.

@@ -20,6 +20,7 @@ from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Ser
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.filter.kernel import prefer_compiled
 from onboard.core.inputs.samples import Sample
 
 PAUSE_S = 10.0
@@ -38,6 +39,7 @@ class Recorded:
             wanted: accelerometers to ask about (none named: all); each costs as much as another.
             watched: keep what a report draws.
         """
+        prefer_compiled()  # hundreds of passes pay for the import
         self.calibrator = Calibrator(KEEPING_ALL, only=wanted)
         self.chronicle = Chronicle(self.calibrator) if watched else None
         self._reader = self.chronicle or self.calibrator

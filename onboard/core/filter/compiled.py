@@ -1,13 +1,12 @@
 """The arithmetic of :mod:`onboard.core.filter.kernel` as loops that numba compiles.
 
-The same in the same order of magnitude of rounding (no fast-math), without what numpy's calls cost
-and with what is known of the matrices used: most of a transition is zero or one, and a covariance
-is symmetric.
+Equal to rounding (no fast-math), without what numpy's calls cost, and with what is known of the
+matrices: most of a transition is zero or one, and a covariance is symmetric.
 
 Compiled code is kept on disk, beside this file or where numba keeps it for a user, so that only
-the first run waits for the compiler.  numba notices changes of this file only: after a change of
-:mod:`onboard.core.filter.state`, touch it.  Each function has one signature, so that processes that
-compile it at the same time write the same.
+the first run waits for the compiler.  numba notices changes of this file alone: whoever changes
+:mod:`onboard.core.filter.state` has to touch it.  Each function has one signature, so that
+processes that compile it at the same time write the same.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import TypeVar
 import numba
 import numpy as np
 
-from onboard.core.filter.innovations import Step
+from onboard.core.filter.innovations import Epoch, Step
 from onboard.core.filter.kernel import Kernel, Process, Whitening
 from onboard.core.filter.readings import Index, Reading
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
@@ -31,15 +30,11 @@ def _compiled(signature: str) -> Callable[[_F], _F]:
     """Compile a function for one signature; kept on disk where there is a place to write to."""
 
     def compile_(function: _F) -> _F:
-        for cache in (True, False):
-            try:
-                made: _F = numba.njit(signature, cache=cache, error_model="numpy")(function)
-            except (RuntimeError, OSError):  # no place to keep it, or none left there
-                if not cache:
-                    raise
-            else:
-                return made
-        raise AssertionError
+        try:
+            made: _F = numba.njit(signature, cache=True, error_model="numpy")(function)
+        except (RuntimeError, OSError):  # numba finds no place to keep it, or the disk is full
+            made = numba.njit(signature, error_model="numpy")(function)
+        return made
 
     return compile_
 
@@ -74,6 +69,18 @@ def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
                 row[c] += f * from_[c]
 
 
+@_compiled("void(f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1])")
+def _measured(
+    R_nb: Array, stack: Array, along: Array, v_down: float, turned: Array, z: Array
+) -> None:
+    _drive(R_nb, stack, z)
+    row = z[3]
+    for c in range(len(along)):
+        row[c + 1] -= v_down * along[c]
+    for i in range(3):
+        z[4 + i, 0] += turned[i]
+
+
 @_compiled("void(f8[:,::1], f8[:,::1])")
 def _from_the_left(F: Array, C: Array) -> None:
     """``F C`` in place: rows of the states that are driven by others."""
@@ -106,8 +113,7 @@ def _from_the_right(F: Array, decay: Array, P: Array) -> None:
 
 
 @_compiled(
-    "void(f8[:,:,::1], f8[:,::1], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], "
-    "f8[:,::1])"
+    "void(f8[:,:,::1], f8[:,::1], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
 )
 def _predict(
     carried: Array,
@@ -221,9 +227,7 @@ def _take(carried: Array, W: Array, m1: int) -> None:
 
 
 @_compiled("void(f8[:,::1], f8[:,::1], f8[:,::1], i8[::1], i8, f8[::1])")
-def _take_noise(
-    C: Array, W: Array, whitener: Array, number: Index, m1: int, gram: Array
-) -> None:
+def _take_noise(C: Array, W: Array, whitener: Array, number: Index, m1: int, gram: Array) -> None:
     r = len(number)
     K = np.zeros((r, STATES))
     for k in range(r):
@@ -244,6 +248,13 @@ def _take_noise(
             for a in range(r):
                 for c in range(STATES):
                     row[c] -= read[a] * K[a, c]
+
+
+def measured(R_nb: Array, epoch: Epoch, v_down: float, turned: Array) -> Array:
+    """See :func:`onboard.core.filter.kernel.measured`."""
+    z = epoch.ned.copy()
+    _measured(R_nb, epoch.body, epoch.along_velocity, v_down, turned, z)
+    return z
 
 
 def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
@@ -274,4 +285,4 @@ def take(carried: Array, made: Whitening, reading: Reading, gram: Array | None) 
         _take_noise(carried[0], made.W[0], made.whitener, reading.number, m1, gram)
 
 
-COMPILED = Kernel(predict, whiten, take)
+COMPILED = Kernel(measured, predict, whiten, take)

@@ -80,14 +80,16 @@ class InnovationGates:
         """
         at = 0
         innovations = y - h @ theta
+        squares = (innovations * innovations).tolist()
         for kind, name, limit in GATES:
             n = kinds.count(kind)
             if n == 0:
                 continue
-            r, D = innovations[at : at + n], h[at : at + n]
+            here = slice(at, at + n)
             at += n
-            nis = float(r @ r)
+            nis = sum(squares[here])
             if nis > limit:
+                r, D = innovations[here], h[here]
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
                 nis = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
             if nis > limit:

@@ -5,8 +5,8 @@ Everything linear is carried in one array, the *carried* (B, STATES, C) of B mem
 * ``X`` (m + 1 columns): the state's mean at ``theta = 0``, then its regressors, so that the mean
   at ``theta`` is ``X @ (1, -theta)``;
 * ``P`` (STATES columns): its covariance;
-* none or three more matrices of STATES columns: the covariance of the state's error that unit white
-  noise on each body axis of the accelerometer has made (:mod:`onboard.core.filter.regressor_noise`).
+* none or three more matrices of STATES columns: the covariance that unit white noise on each body
+  axis of the accelerometer has given the state (:mod:`onboard.core.filter.regressor_noise`).
 
 A transition multiplies all of them from the left by the same matrix, and an update adds to all of
 them the same gain times their own innovation; only the covariances are then multiplied from the
@@ -14,8 +14,8 @@ right, too.
 
 numpy's functions are here and are what the others are held to.  Compiled ones
 (:mod:`onboard.core.filter.compiled`) do the same several times faster where numba is installed and
-:func:`prefer_compiled` was called; importing them takes time and memory, and the filter of one
-flight in real time has no need of them.
+:func:`prefer_compiled` was called.  Importing numba takes a second and 110 MB, which a filter that
+follows one flight in real time has no need of.
 """
 
 from __future__ import annotations
@@ -67,8 +67,9 @@ class Whitening(NamedTuple):
 
 
 class Kernel(NamedTuple):
-    """Who does the filter's arithmetic: :func:`predict`, :func:`whiten`, :func:`take`, or others."""
+    """Who does the filter's arithmetic: the functions of these names here, or others."""
 
+    measured: Callable[[Array, Epoch, float, Array], Array]
     predict: Callable[[Array, Array, Step, Process], None]
     whiten: Callable[[Array, Array, Reading, Array], Whitening]
     take: Callable[[Array, Whitening, Reading, Array | None], None]
@@ -212,7 +213,7 @@ def take(carried: Array, made: Whitening, reading: Reading, gram: Array | None) 
     Xi -= (Xi[:, :, reading.first] + Xi[:, :, reading.second]) @ K.T
 
 
-NUMPY = Kernel(predict, whiten, take)
+NUMPY = Kernel(measured, predict, whiten, take)
 
 
 class _Choice:

@@ -1,7 +1,7 @@
-"""Which numbers of an epoch the filter reads: ``v`` a component of velocity, ``h`` height, ``a``
-a component of the recorded attitude.
+"""Which numbers of an epoch the filter reads, by kinds.
 
-A measured number is the sum of two states plus white noise (:mod:`onboard.core.filter.state`).
+``v`` is a component of velocity, ``h`` height, ``a`` a component of the recorded attitude.  Each is
+the sum of two states plus white noise (:mod:`onboard.core.filter.state`).
 """
 
 from __future__ import annotations

@@ -24,8 +24,14 @@ import numpy as np
 
 from onboard.core.filter.innovation_gates import InnovationGates
 from onboard.core.filter.innovations import Epoch, Step, WhitenedInnovations
-from onboard.core.filter.kernel import Process, Whitening, chosen, covariances, diagonal
-from onboard.core.filter.kernel import innovations, measured
+from onboard.core.filter.kernel import (
+    Process,
+    Whitening,
+    chosen,
+    covariances,
+    diagonal,
+    innovations,
+)
 from onboard.core.filter.limits import (
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
@@ -35,14 +41,13 @@ from onboard.core.filter.limits import (
 )
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
-from onboard.core.filter.state import ATT, BIAS, CH, MEASURED, PSI, STATES, H, V
+from onboard.core.filter.state import ATT, BIAS, CH, PSI, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
 from onboard.core.maths.small_turns import angle_of, turn_by
 
-_DOWN = np.array([0.0, 0.0, STANDARD_GRAVITY])
 _NOT_TURNED = np.zeros(3)
 _LETTER = {"velocity": "v", "recovery": "v", "height": "h", "attitude": "a"}
 
@@ -119,7 +124,7 @@ class WhiteningFilter:
         self.t = epoch.t
         down = float(epoch.velocity[2])
         known = not math.isnan(down)
-        z = measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
+        z = self._kernel.measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
         if not known:
             z[2, 0] = R_nb[2] @ epoch.body[:3, 0]
         m1 = self._m1
@@ -161,15 +166,14 @@ class WhiteningFilter:
             latitude: rad.
         """
         T, R = step.duration, self.R_nb
-        down, turn_n = _DOWN, None
+        north, east, down, turn_n = 0.0, 0.0, STANDARD_GRAVITY, None
         if self.uses.earth:
-            extra, turn_n = carried_and_turning(latitude, self.velocity(theta))
-            down = down + extra
-        keep_att, keep_cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
-        fall = np.zeros(MEASURED)
-        fall[V] = down * T
-        fall[H] = -0.5 * T * T * down[2]
-        decay = np.array([keep_cv, keep_cv, keep_cv, 1.0, keep_att, keep_att, keep_att])
+            carried, turn_n = carried_and_turning(latitude, self.velocity(theta))
+            north, east, more = carried.tolist()
+            down += more
+        fall = np.array([north * T, east * T, down * T, -0.5 * T * T * down, 0.0, 0.0, 0.0])
+        att, cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
+        decay = np.array([cv, cv, cv, 1.0, att, att, att])
         process = Process(fall, decay, *self._variances.over(T, decay))
         self._kernel.predict(self._carried, R, step, process)
         R = R @ step.turn
@@ -187,15 +191,17 @@ class WhiteningFilter:
         Returns:
             None if there was nothing to take and nothing to refuse.
         """
-        refused: list[str] = []
-        off = np.zeros(0)
         kinds = kinds_of(
             epoch,
             velocity=epoch.trusted,
             height=self.uses.height and epoch.trusted,
             attitude=self.uses.attitude,
         )
-        z = self._measured(epoch, theta) if kinds else _NOT_TURNED
+        if not kinds:
+            return None
+        refused: list[str] = []
+        off = np.zeros(0)
+        z = self._measured(epoch, theta)
         while kinds:
             made = self._kernel.whiten(self._carried, z, reading(kinds), self._variances.reading)
             refusal = None
@@ -213,7 +219,7 @@ class WhiteningFilter:
                 n = kinds.count("v")
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
             kinds = kinds.replace(letter, "")
-        return nothing(len(self.bank), self.m, epoch.t, refused, off) if refused else None
+        return nothing(len(self.bank), self.m, epoch.t, refused, off)
 
     def expected_velocity(
         self, epoch: Epoch, theta: Array, covariance: Array
@@ -244,7 +250,9 @@ class WhiteningFilter:
         turned = _NOT_TURNED
         if self.uses.attitude and epoch.R_attitude is not None:
             turned = angle_of(epoch.R_attitude @ self.R_nb.T)
-        return measured(self.R_nb, epoch, float(self.velocity(theta)[2]), turned)
+        down = self._carried[0, 2, : self._m1]
+        v_down = float(down[0] - down[1:] @ theta)
+        return self._kernel.measured(self.R_nb, epoch, v_down, turned)
 
     def _take(self, made: Whitening, kinds: str, theta: Array) -> None:
         """Update all that is carried; turn the attitude by what was found."""

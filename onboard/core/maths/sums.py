@@ -230,7 +230,7 @@ class BankSums:
         return self._gram
 
     def __iadd__(self, other: BankSums) -> Self:
-        self._gram += other._added()  # noqa: SLF001 - of its own kind
+        self._gram += other._added()
         self.log_det += other.log_det
         self.rows += other.rows
         return self
