@@ -189,11 +189,11 @@ def _whiten(
                     x -= L[a, k] * L[d, k]
                 if d < a:
                     L[a, d] = x / L[d, d]
-                elif x > 0.0:
+                elif x <= 0.0:
+                    return a + 1
+                else:
                     L[a, a] = np.sqrt(x)
                     log_det[b] += np.log(x)
-                else:
-                    return a + 1
         for a in range(r):
             row = W[b, a]
             for k in range(a):

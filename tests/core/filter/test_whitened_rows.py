@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from onboard.core.filter.innovations import Epoch, steps
+from onboard.core.filter.kernel import prefer_compiled
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
@@ -15,6 +16,18 @@ from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import Six
 from onboard.core.model.regressors import Model
 from tests.core.criterion import InitialVelocity, IntegralCriterion, Weighting
+
+
+@pytest.fixture(scope="module", params=["numpy", "compiled"], autouse=True)
+def arithmetic(request):
+    """Every statement holds whoever does the arithmetic."""
+    compiled = request.param == "compiled"
+    if compiled:
+        pytest.importorskip("numba")
+    prefer_compiled(yes=compiled)
+    yield
+    prefer_compiled()
+
 
 PAPER = Uses(height=False, attitude=False, recorded_attitude=True, earth=False, gates=False)
 SCALE = np.array([1.02, 0.97, 1.01])
@@ -210,7 +223,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
 
 
 @pytest.fixture(scope="module")
-def white():
+def white(arithmetic):
     return [rows_of_its_own_model(seed, 500) for seed in range(4)]
 
 
