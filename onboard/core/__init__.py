@@ -1,5 +1,8 @@
 """The pure core: numpy only, no clock, no asyncio, no sockets, no MAVLink.
 
+Where numba is installed and wanted it compiles the filter's innermost loops: that is a compiler, no
+input or output, and nothing depends on it (:mod:`onboard.core.filter.kernel`).
+
 Samples enter through :class:`onboard.core.estimate.calibrator.Calibrator`, whether they come
 from a live link or from a recording; results leave it as frozen records.
 
@@ -36,12 +39,13 @@ regressor       change of a measurement per unit of an        measured unit  -  
                 unknown (called column in arrays)             / unknown's
 P(tau)          body axes at tau to those of the step's       -              b      model.quadrature
                 start (elsewhere P is a covariance)
-X               state's mean at theta = 0, and regressors     of the state   n      filter.state
+X               state's mean at theta = 0, and regressors;    of the state   n      filter.kernel
+                the mean at theta is X (1, -theta)
 P               covariance of the state                       squared        n      filter.whitening
 psi             attitude error, rotation vector               rad            n      filter.state
-E               innovation at theta = 0, and regressors       m/s, m, rad    n      filter.readings
-S, L            covariance of an innovation, L L^T = S        squared        n      filter.whitened
-y, h            whitened innovation y - h theta: L^-1 E       1, 1/unknown   -      filter.whitened
+E               innovation at theta = 0, and regressors       m/s, m, rad    n      filter.kernel
+S, L            covariance of an innovation, L L^T = S        squared        n      filter.kernel
+y, h            whitened innovation y - h theta: L^-1 E       1, 1/unknown   -      filter.kernel
 NIS             normalised innovation squared, r^T S^-1 r     1              -      filter.innova-
                                                                                     tion_gates
 N, b, s         sums of h^T h, h^T y, y^2 over a block        of theta       -      maths.sums

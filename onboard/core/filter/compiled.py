@@ -4,7 +4,8 @@ Equal to rounding (no fast-math), without what numpy's calls cost, and with what
 matrices: most of a transition is zero or one, and a covariance is symmetric.
 
 Compiled code is kept on disk, beside this file or where numba keeps it for a user, so that only
-the first run waits for the compiler.  numba notices changes of this file alone: whoever changes
+the first run waits for the compiler; where neither can be written to, this module cannot be
+imported.  numba notices changes of this file alone: whoever changes
 :mod:`onboard.core.filter.state` has to touch it.  Each function has one signature, so that
 processes that compile it at the same time write the same.
 """
@@ -27,19 +28,23 @@ _F = TypeVar("_F", bound=Callable[..., object])
 
 
 def _compiled(signature: str) -> Callable[[_F], _F]:
-    """Compile a function for one signature; kept on disk where there is a place to write to."""
+    """Compile a function for one signature, or take it from where it was kept.
+
+    Raises:
+        ImportError: it cannot be kept, and compiling it in every run costs more than it saves.
+    """
 
     def compile_(function: _F) -> _F:
         try:
             made: _F = numba.njit(signature, cache=True, error_model="numpy")(function)
-        except (RuntimeError, OSError):  # numba finds no place to keep it, or the disk is full
-            made = numba.njit(signature, error_model="numpy")(function)
+        except (RuntimeError, OSError) as error:  # numba finds no place, or the disk is full
+            raise ImportError("there is no place to keep compiled code") from error
         return made
 
     return compile_
 
 
-@_compiled("void(f8, f8[:,::1], f8[:,::1], f8[:,::1])")
+@_compiled("void(f8, f8[:,:], f8[:,::1], f8[:,::1])")
 def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
     n = np.zeros((3, 8))
     for i in range(3):
@@ -57,7 +62,7 @@ def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
             F[4 + i, MEASURED + j] = -n[i, 2 + j]
 
 
-@_compiled("void(f8[:,::1], f8[:,::1], f8[:,::1])")
+@_compiled("void(f8[:,:], f8[:,::1], f8[:,::1])")
 def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
     """Add a stack in body axes to the first states."""
     for i in range(MEASURED):
@@ -69,7 +74,7 @@ def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
                 row[c] += f * from_[c]
 
 
-@_compiled("void(f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1])")
+@_compiled("void(f8[:,:], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1])")
 def _measured(
     R_nb: Array, stack: Array, along: Array, v_down: float, turned: Array, z: Array
 ) -> None:
@@ -113,7 +118,7 @@ def _from_the_right(F: Array, decay: Array, P: Array) -> None:
 
 
 @_compiled(
-    "void(f8[:,:,::1], f8[:,::1], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
 )
 def _predict(
     carried: Array,

@@ -221,16 +221,20 @@ class _Choice:
 
 
 def prefer_compiled(*, yes: bool = True) -> None:
-    """From now on filters use compiled loops, if numba is installed; ``yes=False``: numpy."""
+    """From now on filters use compiled loops, if they can; with ``yes=False`` numpy."""
     _Choice.compiled = yes
 
 
 def chosen() -> Kernel:
-    """Who does the arithmetic of a filter that begins now."""
+    """Who does the arithmetic of a filter that begins now.
+
+    Compiled loops if they are preferred, numba is installed and there is a place to keep them.
+    """
     if not _Choice.compiled:
         return NUMPY
     try:
         from onboard.core.filter import compiled  # noqa: PLC0415 - a second, and only if wanted
     except ImportError:
+        _Choice.compiled = False
         return NUMPY
     return compiled.COMPILED

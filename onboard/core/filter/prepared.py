@@ -88,16 +88,15 @@ def prepare(
 
 def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
     """Starts (K,), ends (K,) and measured epoch (K,), or -1, of steps between epochs (n,), s."""
-    start: list[float] = []
-    end: list[float] = []
-    measured: list[int] = []
-    for k in range(len(epoch_t) - 1):
-        parts = max(1, int(np.ceil((epoch_t[k + 1] - epoch_t[k]) / LONGEST_STEP_S)))
-        edges = np.linspace(epoch_t[k], epoch_t[k + 1], parts + 1)
-        start.extend(edges[:-1])
-        end.extend(edges[1:])
-        measured.extend([-1] * (parts - 1) + [k + 1])
-    return np.array(start), np.array(end), np.array(measured)
+    gap = np.diff(epoch_t)
+    parts = np.maximum(np.ceil(gap / LONGEST_STEP_S), 1.0).astype(int)
+    k = np.repeat(np.arange(len(gap)), parts)
+    part = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
+    last = part + 1 == parts[k]
+    width = (gap / parts)[k]
+    start = epoch_t[k] + part * width
+    end = np.where(last, epoch_t[k + 1], epoch_t[k] + (part + 1) * width)
+    return start, end, np.where(last, k + 1, -1)
 
 
 def _steps(intervals: Intervals, regressors: SegmentRegressors) -> list[Step]:

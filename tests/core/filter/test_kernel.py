@@ -170,17 +170,17 @@ def test_a_covariance_that_is_none_is_an_error(who):
 
 
 @pytest.fixture
-def both_ways():
-    """Run something with numpy's arithmetic, then with the compiled."""
-
-    def run(what):
-        kernel.prefer_compiled(yes=False)
-        one = what()
-        kernel.prefer_compiled()
-        return one, what()
-
-    yield run
+def _preference_kept():
+    yield
     kernel.prefer_compiled()
+
+
+def both_ways(what):
+    """Something with numpy's arithmetic, then with the compiled."""
+    kernel.prefer_compiled(yes=False)
+    one = what()
+    kernel.prefer_compiled()
+    return one, what()
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +197,8 @@ def relative(N):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bank", [(NoiseLevels(),), stencil(NoiseLevels())], ids=["one", "bank"])
-def test_a_flight_gives_the_same_sums_either_way(both_ways, engine, bank):
+@pytest.mark.usefixtures("_preference_kept")
+def test_a_flight_gives_the_same_sums_either_way(engine, bank):
     def sums():
         made = Pass(engine.model, engine.point, bank)
         return made, [through(made, batch, 10.0) for batch in engine.batches]
@@ -217,6 +218,7 @@ def test_a_flight_gives_the_same_sums_either_way(both_ways, engine, bank):
     assert results[-1].block.sums.G.any() == (len(bank) == 1)
 
 
+@pytest.mark.usefixtures("_preference_kept")
 def test_without_numba_numpy_does_it(monkeypatch):
     monkeypatch.delattr(onboard.core.filter, "compiled")
     monkeypatch.setitem(sys.modules, "onboard.core.filter.compiled", None)
@@ -243,16 +245,17 @@ def test_what_runs_no_filter_does_not_import_the_compiler():
     assert python(f"import sys, {commands}; {asked}; print('numba' in sys.modules)") == "False\n"
 
 
-def test_without_a_place_to_keep_it_code_is_compiled_each_time(monkeypatch):
+@pytest.mark.usefixtures("_preference_kept")
+def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
     """As in an installation that nobody but its owner can write to."""
 
-    def njit(signature, *, cache=False, **more):
-        if cache:
-            raise RuntimeError("cannot locate cache")
-        return lambda function: function
+    def nowhere(*_):
+        raise RuntimeError("cannot cache function: no locator available")
 
-    monkeypatch.setattr(compiled.numba, "njit", njit)
-    assert compiled._compiled("void()")(max) is max
+    monkeypatch.delattr(onboard.core.filter, "compiled")
+    monkeypatch.delitem(sys.modules, "onboard.core.filter.compiled")
+    monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", nowhere)
+    assert kernel.chosen() is NUMPY
 
 
 def test_two_processes_may_fill_the_same_cache(tmp_path):
