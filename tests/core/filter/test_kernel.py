@@ -252,16 +252,17 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
     def nowhere(*_):
         raise RuntimeError("cannot cache function: no locator available")
 
-    monkeypatch.delattr(onboard.core.filter, "compiled")
-    monkeypatch.delitem(sys.modules, "onboard.core.filter.compiled")
+    for name in ("compiled", "loops"):
+        monkeypatch.delattr(onboard.core.filter, name)
+        monkeypatch.delitem(sys.modules, f"onboard.core.filter.{name}")
     monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", nowhere)
     assert kernel.chosen() is NUMPY
 
 
 def test_two_processes_may_fill_the_same_cache(tmp_path):
     code = """
-        from onboard.core.filter.compiled import _compiled
-        @_compiled("f8(f8)")
+        from onboard.core.filter.loops import compiled
+        @compiled("f8(f8)")
         def doubled(x):
             return 2.0 * x
         assert doubled(3.0) == 6.0

@@ -1,0 +1,264 @@
+"""The filter's arithmetic as loops that numba compiles.
+
+Equal to that of :mod:`onboard.core.filter.kernel` to rounding (no fast-math), without what numpy's
+calls cost, and with what is known of the matrices: most of a transition is zero or one, and a
+covariance is symmetric.  Rows of a state are 0 to 2 velocity, 3 height, 4 to 6 attitude, 7 to 9
+bias, then the slow errors (:mod:`onboard.core.filter.state`).
+
+Compiled code is kept on disk, beside this file or where numba keeps it for a user, so that only
+the first run waits for the compiler.  numba notices changes of this file alone: whoever changes the
+order of the states has to touch it.  Each function has one signature, so that processes that
+compile it at the same time write the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numba
+import numpy as np
+
+from onboard.core.filter.readings import Index
+from onboard.core.filter.state import ERRORS, MEASURED, STATES
+from onboard.core.maths.arrays import Array
+
+_F = TypeVar("_F", bound=Callable[..., object])
+
+
+def compiled(signature: str) -> Callable[[_F], _F]:
+    """Compile a function for one signature, or take it from where it was kept.
+
+    Raises:
+        ImportError: it cannot be kept, and compiling it in every run costs more than it saves.
+    """
+
+    def compile_(function: _F) -> _F:
+        try:
+            made: _F = numba.njit(signature, cache=True, error_model="numpy")(function)
+        except (RuntimeError, OSError) as error:  # numba finds no place, or the disk is full
+            raise ImportError("there is no place to keep compiled code") from error
+        return made
+
+    return compile_
+
+
+@compiled("void(f8, f8[:,:], f8[:,::1], f8[:,::1])")
+def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
+    """Into ``F`` (MEASURED, ERRORS), which is zero."""
+    n = np.zeros((3, 8))
+    for i in range(3):
+        for k in range(3):
+            for j in range(8):
+                n[i, j] += R_nb[i, k] * moved[k, j]
+    for i in range(MEASURED):
+        F[i, i] = 1.0
+    F[0, 5], F[0, 6], F[1, 4] = n[2, 0], -n[1, 0], -n[2, 0]
+    F[1, 6], F[2, 4], F[2, 5] = n[0, 0], n[1, 0], -n[0, 0]
+    F[3, 2], F[3, 4], F[3, 5] = -duration, -n[1, 1], n[0, 1]
+    for i in range(3):
+        for j in range(3):
+            F[i, MEASURED + j] = n[i, 5 + j]
+            F[4 + i, MEASURED + j] = -n[i, 2 + j]
+
+
+@compiled("void(f8[:,:], f8[:,::1], f8[:,::1])")
+def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
+    """Add a stack in body axes to the first states."""
+    for i in range(MEASURED):
+        row = carried[i]
+        axis, first = (i, 0) if i < 3 else (2, 3) if i == 3 else (i - 4, 6)
+        for k in range(3):
+            f, from_ = R_nb[axis, k], stack[first + k]
+            for c in range(len(from_)):
+                row[c] += f * from_[c]
+
+
+@compiled("void(f8[:,:], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1])")
+def measured(
+    R_nb: Array, stack: Array, along: Array, v_down: float, turned: Array, z: Array
+) -> None:
+    """What an epoch measures, into ``z`` (MEASURED, m + 1), which holds its part in NED."""
+    _drive(R_nb, stack, z)
+    row = z[3]
+    for c in range(len(along)):
+        row[c + 1] -= v_down * along[c]
+    for i in range(3):
+        z[4 + i, 0] += turned[i]
+
+
+@compiled("void(f8[:,::1], f8[:,::1])")
+def _from_the_left(F: Array, C: Array) -> None:
+    """``F C`` in place: rows of the states that are driven by others."""
+    for i in (3, 0, 1, 2, 4, 5, 6):  # height needs the velocity of before, both attitude's
+        row = C[i]
+        for k in range(ERRORS):
+            f = F[i, k]
+            if f != 0.0 and k != i:
+                from_ = C[k]
+                for c in range(len(row)):
+                    row[c] += f * from_[c]
+
+
+@compiled("void(f8[:,::1], f8[::1], f8[:,:])")
+def _from_the_right(F: Array, decay: Array, P: Array) -> None:
+    """``P F^T`` in place; rows below are those beside, for the matrix will be symmetric."""
+    for i in range(STATES):
+        for j in range(MEASURED):
+            P[i, ERRORS + j] *= decay[j]
+    for i in range(MEASURED):
+        row = P[i]
+        for j in (3, 0, 1, 2, 4, 5, 6):
+            x = row[j]
+            for k in range(ERRORS):
+                if k != j:
+                    x += F[j, k] * row[k]
+            row[j] = x
+        for j in range(MEASURED, STATES):
+            P[j, i] = row[j]
+
+
+@compiled(
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
+)
+def predict(
+    carried: Array,
+    R_nb: Array,
+    duration: float,
+    moved: Array,
+    stack: Array,
+    fall: Array,
+    decay: Array,
+    before: Array,
+    after: Array,
+) -> None:
+    """Carry (B, STATES, C) through one step, in place: F, then process noise and what drives it."""
+    members, _, columns = carried.shape
+    m1 = stack.shape[1]
+    F = np.zeros((MEASURED, ERRORS))
+    _transition(duration, R_nb, moved, F)
+    for b in range(members):
+        C = carried[b]
+        for i in range(STATES):
+            C[i, m1 + i] += before[b, i]
+        _from_the_left(F, C)
+        for i in range(MEASURED):
+            C[ERRORS + i] *= decay[i]
+        for at in range(m1, columns, STATES):
+            _from_the_right(F, decay, C[:, at : at + STATES])
+        for i in range(STATES):
+            C[i, m1 + i] += after[b, i]
+        _drive(R_nb, stack, C)
+        for i in range(MEASURED):
+            C[i, 0] += fall[i]
+    # Unit white noise of each body axis, where it is carried.
+    for axis in range((columns - m1) // STATES - 1):
+        at = m1 + (axis + 1) * STATES
+        for i in range(3):
+            for j in range(3):
+                carried[0, i, at + j] += duration * R_nb[i, axis] * R_nb[j, axis]
+
+
+@compiled(
+    "i8(f8[:,:,::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[::1])"
+)
+def whiten(
+    carried: Array,
+    z: Array,
+    number: Index,
+    noise: Array,
+    E: Array,
+    W: Array,
+    whitener: Array,
+    log_det: Array,
+) -> int:
+    """Innovations of the numbers ``number`` into E, W, whitener and log_det.
+
+    Returns:
+        0, or the first (from 1) whose covariance is not positive.
+    """
+    members, _, columns = carried.shape
+    m1, r = z.shape[1], len(number)
+    L = np.empty((r, r))
+    for b in range(members):
+        log_det[b] = 0.0
+        for a in range(r):
+            i = number[a]
+            row, one, two = W[b, a], carried[b, i], carried[b, i + ERRORS]
+            for c in range(columns):
+                row[c] = -(one[c] + two[c])
+            for c in range(m1):
+                row[c] += z[i, c]
+            if b == 0:
+                E[a] = row[:m1]
+        for a in range(r):
+            for d in range(a + 1):
+                j = m1 + number[d]
+                x = -(W[b, a, j] + W[b, a, j + ERRORS])
+                if d == a:
+                    x += noise[b, number[a]]
+                for k in range(d):
+                    x -= L[a, k] * L[d, k]
+                if d < a:
+                    L[a, d] = x / L[d, d]
+                elif x <= 0.0:
+                    return a + 1
+                else:
+                    L[a, a] = np.sqrt(x)
+                    log_det[b] += np.log(x)
+        for a in range(r):
+            row = W[b, a]
+            for k in range(a):
+                f, from_ = L[a, k], W[b, k]
+                for c in range(columns):
+                    row[c] -= f * from_[c]
+            f = 1.0 / L[a, a]
+            for c in range(columns):
+                row[c] *= f
+        if b == 0:
+            for d in range(r):
+                for a in range(d, r):
+                    x = 1.0 if a == d else 0.0
+                    for k in range(d, a):
+                        x -= L[a, k] * whitener[k, d]
+                    whitener[a, d] = x / L[a, a]
+    return 0
+
+
+@compiled("void(f8[:,:,::1], f8[:,:,::1], i8)")
+def take(carried: Array, W: Array, m1: int) -> None:
+    """Add gain times innovation to all that is carried, in place."""
+    members, _, columns = carried.shape
+    r = W.shape[1]
+    for b in range(members):
+        for i in range(STATES):
+            row = carried[b, i]
+            for a in range(r):
+                f, from_ = W[b, a, m1 + i], W[b, a]
+                for c in range(columns):
+                    row[c] -= f * from_[c]
+
+
+@compiled("void(f8[:,::1], f8[:,::1], f8[:,::1], i8[::1], i8, f8[::1])")
+def take_noise(C: Array, W: Array, whitener: Array, number: Index, m1: int, gram: Array) -> None:
+    """The update from the right of the noise that is carried, in place; its squares to ``gram``."""
+    r = len(number)
+    K = np.zeros((r, STATES))
+    for k in range(r):
+        for a in range(k, r):
+            for i in range(STATES):
+                K[k, i] -= whitener[a, k] * W[a, m1 + i]
+    for axis in range(3):
+        at = m1 + (axis + 1) * STATES
+        for a in range(r):
+            for d in range(a + 1):
+                j = at + number[d]
+                gram[axis] -= (W[a, j] + W[a, j + ERRORS]) * whitener[a, d]
+        for i in range(STATES):
+            row = C[i, at : at + STATES]
+            read = np.empty(r)
+            for a in range(r):
+                read[a] = row[number[a]] + row[number[a] + ERRORS]
+            for a in range(r):
+                for c in range(STATES):
+                    row[c] -= read[a] * K[a, c]
