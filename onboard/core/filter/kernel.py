@@ -13,9 +13,9 @@ them the same gain times their own innovation; only the covariances are then mul
 right, too.
 
 numpy's functions are here and are what the others are held to.  Compiled ones
-(:mod:`onboard.core.filter.compiled`) do the same two to five times as fast where numba is installed and
-:func:`prefer_compiled` was called.  Importing numba takes a second and 110 MB, which a filter that
-follows one flight in real time has no need of.
+(:mod:`onboard.core.filter.compiled`) do the same two to five times as fast where numba is installed
+and :func:`prefer_compiled` was called.  Importing numba takes a second and 110 MB, which a filter
+that follows one flight in real time has no need of.
 """
 
 from __future__ import annotations
