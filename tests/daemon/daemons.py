@@ -109,6 +109,7 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
         "whitened_rms_after": 1.0,
         "held_out_before": 4.0,
         "held_out_after": 1.0,
+        "predictive_gain": 3000.0,
         "velocity_rms_before": 1.0,
         "velocity_rms_after": math.nan,
         "coverage": Coverage(90.0, (90.0,) * 6, "x scale", ""),

@@ -23,7 +23,6 @@ WARMING = TemperatureDrift(x=0.01, y=-0.008, z=0.01)
 @pytest.fixture
 def only_physics(document):
     """A policy so wide that nothing but the diagnosis stands against a push."""
-    document["push"] |= {"scale_sigma_max": 0.05, "offset_sigma_max": 0.5}
     return document
 
 

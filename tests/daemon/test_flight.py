@@ -14,7 +14,6 @@ pytestmark = pytest.mark.virtual_time
 @pytest.fixture
 def in_a_hurry(document, tmp_path):
     """A short flight cannot show everything as well as the default policy wants to know it."""
-    document["push"] |= {"scale_sigma_max": 0.02, "offset_sigma_max": 0.2}
     document["recording"] = {"enabled": True, "directory": str(tmp_path / "recordings")}
     return document
 

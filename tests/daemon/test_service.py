@@ -98,7 +98,7 @@ def held_back(service):
         ({"status": Status.COLLECTING}, "not_calibrated"),
         ({"parameters_known": False}, "parameters_unknown"),
         ({"scale": (1.3, 1.0, 1.0)}, "out_of_bounds"),
-        ({"held_out_after": 3.99}, "no_improvement"),
+        ({"predictive_gain": 1.0}, "no_improvement"),
     ],
 )
 async def test_what_is_not_good_enough_is_shown_but_never_written(

@@ -35,7 +35,6 @@ def kind(request):
 def document(tmp_path):
     """A flight of minutes need not show everything as well as the default policy asks for."""
     return {
-        "push": {"scale_sigma_max": 0.02, "offset_sigma_max": 0.15},
         "state": {"directory": str(tmp_path / "state")},
         "http": {"enabled": False},
     }

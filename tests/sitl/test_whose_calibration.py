@@ -35,7 +35,7 @@ def kind(request):
 def document(sitl, tmp_path, *, disarmed_s):
     return {
         "link": {"endpoints": [sitl.endpoint]},
-        "push": {"scale_sigma_max": 0.02, "offset_sigma_max": 0.15, "disarmed_s": disarmed_s},
+        "push": {"disarmed_s": disarmed_s},
         "state": {"directory": str(tmp_path / "state")},
         "http": {"enabled": False},
     }

@@ -30,8 +30,6 @@ async def serving(tmp_path):
             "approval": True,
             "disarmed_s": 0.0,
             # A short flight cannot show everything as well as the default policy wants it.
-            "scale_sigma_max": 0.02,
-            "offset_sigma_max": 0.2,
         },
         "state": {"directory": str(tmp_path / "state")},
         "http": {"port": 0},
