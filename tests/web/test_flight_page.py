@@ -14,6 +14,7 @@ from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server
 from sitl.builtin.truth import ImuTruth, Truth
+from tests.daemon.daemons import until
 
 TRUTH = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.2, -0.15, 0.3))
 
@@ -36,14 +37,15 @@ async def serving(tmp_path):
     }
     service = Service(from_mapping(document, source="test"))
     autopilot = Autopilot("copter", Truth(imus=(TRUTH,), seed=5))
-    server = Server(autopilot, speedup=20.0, driver=Mission(flights=1, duration=120.0, ground=20.0))
+    mission = Mission(flights=1, duration=120.0, ground=20.0)
+    server = Server(autopilot, speedup=20.0, driver=mission)
     serving = asyncio.create_task(service.run())
     async with asyncio.timeout(60.0):
         await service.ready.wait()
     await server.connect_udp("127.0.0.1", port)
     flying = asyncio.create_task(server.run())
     try:
-        yield service, autopilot
+        yield service, autopilot, mission
     finally:
         service.stop()
         await serving
@@ -64,10 +66,13 @@ async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
     def see(condition):
         return asyncio.to_thread(browser.until, condition)
 
-    async with serving(tmp_path) as (service, autopilot):
+    async with serving(tmp_path) as (service, autopilot, mission):
         await asyncio.to_thread(browser.open, service.server.url)
         await see(lambda: browser.text("#glance-trust .headline") == "Trusted")
         await see(lambda: browser.elements("#axes canvas"))
+        await until(lambda: mission.flown == 1 and not autopilot.flying)
+        # On the ground there is nothing to hurry for, and much to learn from what was flown.
+        autopilot.parameters.load({"SIM_SPEEDUP": 1.0})
         await see(lambda: browser.text("#glance-imu-1 .headline") == "Waits for your approval")
         before = six(autopilot)
         assert list(before[:3]) == [1.0, 1.0, 1.0]
