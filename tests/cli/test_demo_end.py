@@ -12,6 +12,7 @@ import pytest
 LIMIT_S = 300.0  # only ends a hopeless test
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_what_ends_it_ends_its_autopilot(number):
     with subprocess.Popen(

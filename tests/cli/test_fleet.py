@@ -34,6 +34,7 @@ def spoil(fleet: Path) -> None:
     (fleet / "one" / "bad.bin").write_bytes(b"\x00\x07" * 4000)
 
 
+@pytest.mark.slow
 def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
     lengthen(fleet)
     assert run(["fleet", str(fleet)]) == 0
@@ -72,6 +73,7 @@ def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
             assert entry["replay"]["recording"]["files"] == [entry["file"]]
 
 
+@pytest.mark.slow
 def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
     lengthen(fleet)
     assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0

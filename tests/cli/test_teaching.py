@@ -124,6 +124,7 @@ def on_terminal(*arguments: str) -> tuple[str, str]:
     return out.decode(), shown.decode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["replay", "explain", "fleet"])
 def test_progress_is_for_terminals_and_never_in_the_output(tmp_path, verb):
     log = tmp_path / "short.BIN"

@@ -32,6 +32,7 @@ def whole(flown):
     return bound(flown)
 
 
+@pytest.mark.slow
 def test_claims_are_what_physics_allows(flown, whole):
     flight = draw(flown, 3)
     scale = flight.truth[1][:3]
@@ -44,6 +45,7 @@ def test_claims_are_what_physics_allows(flown, whole):
     assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
 
 
+@pytest.mark.slow
 def test_more_noise_or_less_flight_never_sharpens_the_bound(planned, flown, whole):
     vehicle, duration = planned
     assert np.all(bound(flown, LEVELS.scaled("velocity", 2.0)) > whole)

@@ -83,6 +83,7 @@ def test_it_goes_on_after_a_restart(tmp_path, clock):
     assert times(flown(tmp_path, clock, range(5, 6), system_id=2)) == [5.0]
 
 
+@pytest.mark.slow
 def test_hours_on_the_ground_do_not_push_the_flight_out(tmp_path, clock):
     history = flown(tmp_path, clock, range(1, 200))
     flight = times(history)
@@ -168,6 +169,7 @@ def test_a_disk_that_takes_nothing_stops_nothing(tmp_path, clock):
     assert times(history) == [1.0, 2.0]
 
 
+@pytest.mark.slow
 def test_the_document_of_five_accelerometers_is_small(tmp_path, clock):
     history = flown(tmp_path, clock, range(1, 2 * ROWS_MAX))
     assert 5 * len(msgspec.json.encode(history.document())) < 300_000

@@ -74,6 +74,7 @@ async def test_what_came_before_the_parameters_is_learned_as_they_say(flight, tm
     assert later.trusted_s == pytest.approx(at_once.trusted_s)
 
 
+@pytest.mark.slow
 async def test_parameters_that_never_come_are_not_waited_for_for_ever(
     flight, tmp_path, monkeypatch
 ):

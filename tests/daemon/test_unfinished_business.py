@@ -114,6 +114,7 @@ async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, dae
         assert kinds[-1] == "closed"
 
 
+@pytest.mark.slow
 async def test_a_reboot_while_the_daemon_was_off_is_audited_at_its_start(document, daemon, port):
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
@@ -202,6 +203,7 @@ async def test_a_diagnosis_is_of_one_sensor_and_of_no_other(document, daemon, po
             assert vehicle.sets == []
 
 
+@pytest.mark.slow
 async def test_a_new_flight_ends_what_was_kept(document, daemon, port):
     async with Vehicle(port) as vehicle:
         async with daemon(document) as service:
@@ -217,6 +219,7 @@ async def test_a_new_flight_ends_what_was_kept(document, daemon, port):
             assert vehicle.sets == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["rejected", "rolled back"])
 async def test_what_a_person_has_refused_stays_refused_after_a_restart(document, daemon, port, how):
     async with Vehicle(port) as vehicle:

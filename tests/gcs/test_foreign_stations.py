@@ -11,6 +11,7 @@ import pytest
 from tests.gcs.test_ground_stations import WANTED, six
 
 
+@pytest.mark.slow
 async def test_mavsdk_reads_lists_and_sets(airfield):
     mavsdk = pytest.importorskip("mavsdk.asyncio", reason="mavsdk is not installed")
     from mavsdk.asyncio.plugins.param import (  # noqa: PLC0415

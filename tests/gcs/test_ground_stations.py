@@ -69,6 +69,7 @@ def six(vehicle, imu=1):
     return [vehicle.parameters[name] for name in parameter_names(imu).six]
 
 
+@pytest.mark.slow
 async def test_two_ground_stations_see_the_same_and_one_approves(airfield):
     async with (
         airfield() as (_, vehicle, router),
@@ -111,6 +112,7 @@ def approvals(station):
     ]
 
 
+@pytest.mark.slow
 async def test_the_policy_is_set_and_told(airfield):
     async with airfield() as (service, _, router), Ground(router.port) as station:
         station.set("OBC_PUSH", 0.0)

@@ -50,6 +50,7 @@ garbage = st.lists(
 ).map(b"".join)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.lists(st.tuples(garbage, messages()), min_size=1, max_size=10))
 def test_garbage_between_frames_costs_no_frame(parts):

@@ -69,6 +69,7 @@ def test_killed_at_every_step_of_a_push_and_of_a_roll_back(tmp_path, torn, denie
     assert steps > 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("earliest", [0, pytest.param(3, marks=pytest.mark.slow)])
 def test_killed_again_at_every_step_of_the_recovery(tmp_path, earliest):
     number = itertools.count()
@@ -109,6 +110,7 @@ def _restart_that_dies(world, life):
     return True
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(
     seed=st.integers(0, 2**32),

@@ -65,6 +65,7 @@ def test_records_equal_those_of_recv_msg(tmp_path, log):
     assert check_against_oracle(saved(tmp_path, log())) > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 @pytest.mark.parametrize(
     "name", ["sitl/c01.BIN", "real/real-quad-08.BIN", "real/real-quad-14-crash.BIN"]

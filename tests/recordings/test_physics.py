@@ -50,6 +50,7 @@ def fixes(path: Path) -> list[GpsFix]:
     return read(path).fixes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imu", [1, 2])
 def test_telemetry_and_log_of_one_flight_agree(recordings, imu):
     t_log, f_log, w_log = inertial(recordings / "sitl/c01.BIN", imu, ImuSource.LOG)
@@ -61,6 +62,7 @@ def test_telemetry_and_log_of_one_flight_agree(recordings, imu):
         assert log.std() > 5.0 * limit
 
 
+@pytest.mark.slow
 def test_fixes_of_one_flight_agree(recordings):
     log, link = fixes(recordings / "sitl/c01.BIN"), fixes(recordings / "sitl/c01.tlog")
     t = np.array([f.t for f in link])
@@ -70,6 +72,7 @@ def test_fixes_of_one_flight_agree(recordings):
     assert np.allclose(log[0].latitude, link[0].latitude, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["sitl/c01.BIN", "sitl/c02.BIN", "sitl/a01.tlog", "real/real-quad-08.BIN"]
 )
@@ -106,6 +109,7 @@ def test_attitude_turns_with_the_gyroscopes(recordings, name):
     assert np.corrcoef(by_attitude, by_gyroscope)[0, 1] > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["b01.tlog", "c01.tlog", "c01.BIN"])
 def test_at_rest_the_specific_force_points_up(recordings, name):
     path = recordings / "sitl" / name

@@ -175,6 +175,7 @@ def test_packets_of_an_unknown_message_are_stepped_over(tmp_path):
     assert recording.counts["RAW_IMU"] == 100
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_flight_at_rest_feels_gravity_upwards(recordings):
     for name in ("a01", "b01"):

@@ -39,6 +39,7 @@ def told(flight):
     return replay([flight], recorded), recorded.chronicle
 
 
+@pytest.mark.slow
 def test_watching_changes_nothing(flight, told):
     result, _ = told
     plain = replay([flight], Recorded())
@@ -47,6 +48,7 @@ def test_watching_changes_nothing(flight, told):
     assert plain.counts == result.counts
 
 
+@pytest.mark.slow
 def test_the_course_ends_at_the_answer_and_narrows_towards_the_truth(told):
     result, chronicle = told
     answer, course = result.calibrations[0], chronicle.figures(1).course
@@ -106,6 +108,7 @@ def test_the_page_is_complete_and_stands_alone(told):
     assert len(re.findall('class="ribbon', html)) == len(SIX_NAMES)
 
 
+@pytest.mark.slow
 def test_a_recording_without_flight_says_so_and_what_to_fly(tmp_path):
     path = tmp_path / "dull.tlog"
     spec = FlightSpec(vehicle="copter", duration=60.0, imus=(TRUE,), dull=True)

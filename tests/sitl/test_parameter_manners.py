@@ -224,6 +224,7 @@ def test_arming_says_why_not():
     assert "Arm: 3D Accel calibration needed" in texts(peer.drain())
 
 
+@pytest.mark.slow
 def test_no_reboot_and_no_second_flight_while_armed(peer):
     peer.run(8.0)
     peer.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)

@@ -170,6 +170,7 @@ def test_fates_are_reproducible_and_as_frequent_as_asked():
     assert all(0.1 <= d <= 0.15 for f in drawn for d in f)
 
 
+@pytest.mark.slow
 def test_mission_flies_its_flights_and_no_more():
     autopilot = Autopilot("copter", Truth(imus=random_imus(1, 2), seed=1))
     mission = Mission(flights=2, duration=60.0, ground=5.0)
@@ -214,6 +215,7 @@ async def test_pace_is_a_parameter_that_any_client_may_change():
             await asyncio.sleep(0.02)
 
 
+@pytest.mark.slow
 async def test_station_flies_on_command_and_impatience_does_no_harm():
     server = Server(Autopilot("copter", Truth(imus=random_imus(1), seed=1)), speedup=50.0)
     port = await server.listen_udp()
@@ -225,6 +227,7 @@ async def test_station_flies_on_command_and_impatience_does_no_harm():
     assert server.autopilot.instant().landed
 
 
+@pytest.mark.slow
 async def test_a_flight_on_command_lasts_as_long_as_it_may():
     autopilot = Autopilot("copter", Truth(imus=random_imus(1), seed=1), longest=90.0)
     server = Server(autopilot, speedup=50.0)

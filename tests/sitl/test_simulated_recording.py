@@ -55,6 +55,7 @@ def test_every_parameter_is_listed(flight):
     assert {m.param_index for m in values} == set(range(values[0].param_count))
 
 
+@pytest.mark.slow
 def test_right_parameters_leave_no_error():
     spec = FlightSpec(duration=FLIGHT_S, imus=(CALM,), parameters=RIGHT, rates={"HIGHRES_IMU": 50})
     flight = recording.run(spec)
@@ -100,6 +101,7 @@ def delay_of_gps(flight):
     return candidates[np.argmin([misfit(d) for d in candidates])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.06, 0.14, 0.26])
 def test_gps_is_as_late_as_declared(delay):
     spec = FlightSpec(duration=FLIGHT_S, gps=GpsTruth(delay=delay))
@@ -143,6 +145,7 @@ def test_attitude_can_be_true():
     assert np.abs(error).max() < 6e-3  # a millisecond of turning
 
 
+@pytest.mark.slow
 def test_trim_is_taken_off_the_attitude():
     common = {"duration": 40.0, "attitude_errors": False, "dull": True}
     plain = recording.run(FlightSpec(**common))
@@ -166,6 +169,7 @@ def test_raw_imu_is_truncated_toward_zero(flight):
     assert errors.min() > -1.001
 
 
+@pytest.mark.slow
 def test_frames_are_the_messages(tmp_path):
     spec = FlightSpec(vehicle="plane", duration=30.0)
     path = tmp_path / "flight.tlog"
@@ -189,6 +193,7 @@ def test_frames_are_the_messages(tmp_path):
     assert record["vehicle"] == "plane"
 
 
+@pytest.mark.slow
 def test_same_spec_same_recording():
     spec = FlightSpec(duration=30.0, seed=9)
     once = recording.fly(spec)

@@ -47,6 +47,7 @@ async def test_what_was_sent_comes_before_any_later_timer():
     ear.close()
 
 
+@pytest.mark.slow
 def test_waiting_for_nothing_is_an_error_and_no_hang():
     @virtual_time
     async def forever():

@@ -15,6 +15,7 @@ from tests.web.story import T0, story
 STALE = ("WebSocket", "Failed to load resource")
 
 
+@pytest.mark.slow
 def test_one_glance_says_what_is_trusted_known_missing_and_next(browser, served):
     served.tell(story(40))
     browser.open(served.url)
@@ -36,6 +37,7 @@ def test_values_change_as_snapshots_come(browser, served):
     assert browser.element('[data-axis="z offset"] canvas').size["height"] > 40
 
 
+@pytest.mark.slow
 def test_why_gps_is_not_trusted_is_said_in_words(browser, served):
     browser.open(served.url)
     trust = story(30).trust
@@ -54,6 +56,7 @@ def test_why_gps_is_not_trusted_is_said_in_words(browser, served):
     assert "too few satellites" in browser.text("#glance-trust .detail")
 
 
+@pytest.mark.slow
 def test_each_accelerometer_has_its_tab_reached_by_keyboard(browser, served):
     served.tell(story(160))
     browser.open(served.url)
@@ -64,6 +67,7 @@ def test_each_accelerometer_has_its_tab_reached_by_keyboard(browser, served):
     assert browser.element("#tab-2").get_attribute("aria-selected") == "true"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", ["approve", "reject"])
 def test_what_a_person_says_is_confirmed_first_and_reaches_the_service(browser, served, action):
     served.tell(story(160))
@@ -90,6 +94,7 @@ def test_approval_shows_before_and_after_and_cancelling_changes_nothing(browser,
     assert served.told.asked == []
 
 
+@pytest.mark.slow
 def test_roll_back_and_forgetting(browser, served):
     served.tell(story(30), push=wrote(story(0).push))
     browser.open(served.url)
@@ -100,6 +105,7 @@ def test_roll_back_and_forgetting(browser, served):
         assert served.told.asked[-1] == (action, imus)
 
 
+@pytest.mark.slow
 def test_a_roll_back_shows_what_is_in_force_and_what_would_be_written(browser, served):
     def shown():
         cells = (browser.text(f"#confirm-changes tbody td:nth-child({n})") for n in (1, 2, 3))
@@ -118,6 +124,7 @@ def test_a_roll_back_shows_what_is_in_force_and_what_would_be_written(browser, s
     assert browser.elements("#confirm-changes tr") == []
 
 
+@pytest.mark.slow
 def test_what_a_push_has_brought_stays_when_nothing_is_left_to_change(browser, served):
     """In force and estimate are the same then: the residual of before is in what was written."""
     imus = tuple(
@@ -132,6 +139,7 @@ def test_what_a_push_has_brought_stays_when_nothing_is_left_to_change(browser, s
     browser.until(lambda: browser.element("#written").get_attribute("hidden") is not None)
 
 
+@pytest.mark.slow
 def test_a_refusal_is_shown_with_its_reason(browser, served):
     served.tell(story(160))
     served.told.refusal = "nothing waits for approval"
@@ -142,6 +150,7 @@ def test_a_refusal_is_shown_with_its_reason(browser, served):
     browser.expect_complaints("409")
 
 
+@pytest.mark.slow
 def test_a_token_is_asked_for_and_then_works(browser, tmp_path):
     with PageServer(tmp_path, token="key") as served:
         served.tell(story(160))
@@ -159,6 +168,7 @@ def test_a_token_is_asked_for_and_then_works(browser, tmp_path):
         assert served.told.asked == [("approve", (1,))]
 
 
+@pytest.mark.slow
 def test_a_restart_of_the_service_is_said_and_survived(browser, served):
     served.tell(story(20))
     browser.open(served.url)
@@ -233,6 +243,7 @@ def test_the_state_of_an_accelerometer_is_told_as_the_service_says_it(browser, s
         assert contradiction not in browser.text("main")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("held_back", "approvable", "action", "enabled"),
     [
@@ -254,6 +265,7 @@ def test_what_can_be_approved_is_the_services_word(
         assert sentence in browser.text('.proposal[data-imu="1"] .held')
 
 
+@pytest.mark.slow
 def test_where_nothing_would_change_there_is_nothing_to_approve(browser, served):
     sentence = "the autopilot has these values already"
     imus = standing(name="up_to_date", title="up to date", sentence=sentence, severity="good")
@@ -264,6 +276,7 @@ def test_where_nothing_would_change_there_is_nothing_to_approve(browser, served)
     assert browser.elements('.proposal[data-imu="1"] button') == []
 
 
+@pytest.mark.slow
 def test_plain_latency_is_no_alarm(browser, served):
     effect = DIAGNOSIS["effects"][0] | {"severity": "info"}
     sentence, severity = headline("explained", ["gps_latency"])
@@ -277,6 +290,7 @@ def test_plain_latency_is_no_alarm(browser, served):
     browser.until_says("#diagnosis-body .warn", "Physics is missing")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seconds", "labels"),
     [
@@ -296,6 +310,7 @@ def test_the_time_axis_has_its_unit(browser, served, seconds, labels):
     assert shown == labels
 
 
+@pytest.mark.slow
 def test_the_diagnosis_says_what_it_holds_back(browser, served):
     served.tell(story(160), diagnosis=DIAGNOSIS)
     browser.open(served.url)
@@ -304,6 +319,7 @@ def test_the_diagnosis_says_what_it_holds_back(browser, served):
     browser.until_says("#diagnosis-body", "held back for IMU 1, IMU 2")
 
 
+@pytest.mark.slow
 def test_the_page_says_of_every_effect_what_the_catalogue_states(browser, served):
     effects = [DIAGNOSIS["effects"][0] | {"name": kind.effect} for kind in kinds()]
     served.tell(story(160), diagnosis=DIAGNOSIS | {"effects": effects})
@@ -338,6 +354,7 @@ def test_before_the_autopilot_is_heard_and_without_numbers_nothing_breaks(browse
     browser.until_says('[data-axis="x scale"] .value', "no estimate yet")
 
 
+@pytest.mark.slow
 def test_a_day_does_not_make_the_page_grow(browser, served):
     browser.open(served.url)
     rows, first, last, every = browser.driver.execute_async_script(
@@ -365,6 +382,7 @@ def test_a_day_does_not_make_the_page_grow(browser, served):
     assert browser.run("return document.getElementsByTagName('*').length") == before
 
 
+@pytest.mark.slow
 def test_charts_survive_a_reload_and_a_restart_of_the_service(browser, served):
     for second in range(0, 161, 20):
         served.tell(story(second))
@@ -381,6 +399,7 @@ def test_charts_survive_a_reload_and_a_restart_of_the_service(browser, served):
     browser.until_says("#axes-span", "2 min 40 s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [PHONE, LAPTOP])
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_it_fits_and_can_be_read(browser, served, size, theme):
@@ -400,6 +419,7 @@ def test_it_fits_and_can_be_read(browser, served, size, theme):
     assert small == []
 
 
+@pytest.mark.slow
 def test_everything_that_can_be_done_can_be_reached_by_tabulator(browser, served):
     served.tell(story(160))
     browser.open(served.url)
@@ -415,6 +435,7 @@ def test_everything_that_can_be_done_can_be_reached_by_tabulator(browser, served
     assert {"SUMMARY", "journal-lines"} <= reached
 
 
+@pytest.mark.slow
 def test_the_page_is_light_and_asks_nobody_else(browser, served):
     browser.open(served.url)
     entries = browser.run(

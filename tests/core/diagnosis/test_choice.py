@@ -105,6 +105,7 @@ def test_no_more_than_the_limit_is_taken():
     assert len(chosen(problem)) == MOST_EFFECTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "inflation"), [(1.0, 1.0), (2.0, 4.0)])
 def test_of_noise_nothing_is_made(noise, inflation):
     """The margin bounds it: chi-square has to exceed it, and what BIC charges, for any of them."""

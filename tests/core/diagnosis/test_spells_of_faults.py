@@ -47,11 +47,13 @@ V, R = ("velocity",), ("recovery",)
 NONE = (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_short_fault_ends_when_the_velocity_is_right_again(batches):
     stages = [(20, NONE, ()), (22, OFF, V), (24, NONE, R), (60, NONE, ())]
     assert interval(stages, batches) == pytest.approx((20.0, 21.8), abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("patience", [1.6, 8.0, 20.0])
 def test_one_that_the_filter_gave_in_to_ends_at_the_jump_back(batches, patience):
     gave_in = 20 + patience

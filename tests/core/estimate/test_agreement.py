@@ -65,6 +65,7 @@ def test_a_second_flight_of_the_same_board_adds_up(saved):
     assert np.all(tighter < 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imu", [OURS, ANOTHER])
 def test_a_hop_that_would_not_notice_another_sensor_confirms_nothing(saved, imu):
     flight = samples(imu, seed=4, duration=50.0)

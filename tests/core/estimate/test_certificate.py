@@ -135,6 +135,7 @@ def test_a_known_slope_counts_only_if_the_data_do_not_refute_it():
     assert ResidualWindow.of(t, u, acceleration=1.0).acceleration == 2.0
 
 
+@pytest.mark.slow
 @given(lipschitz(dimensions=3), lipschitz(dimensions=3))
 def test_the_combined_certificate_holds_on_both_sides_of_a_gap(first, second):
     t = np.concatenate([first[0], first[0][-1] + 100.0 + second[0]])

@@ -45,6 +45,7 @@ def windows(errors):
     return list(zip(begins, [*begins[1:], len(errors.t)], strict=True))
 
 
+@pytest.mark.slow
 def test_a_window_ends_with_the_drift_over_it(flight):
     chain, states, in_force, estimate = flight
     errors = free_errors(chain, states, (in_force, estimate), horizon_s=HORIZON_S)
@@ -54,6 +55,7 @@ def test_a_window_ends_with_the_drift_over_it(flight):
     assert any(np.allclose(end, drift.end, rtol=1e-9) for end in ends)
 
 
+@pytest.mark.slow
 def test_windows_follow_each_other_and_last_no_longer_than_the_horizon(flight):
     chain, states, in_force, _ = flight
     errors = free_errors(chain, states, (in_force,), horizon_s=HORIZON_S)

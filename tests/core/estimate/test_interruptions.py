@@ -69,10 +69,12 @@ def near_truth(calibrator, sigmas=4.0):
     assert np.all(np.abs(value - np.array(SCALE + OFFSET)) < sigmas * sigma)
 
 
+@pytest.mark.slow
 def test_the_flight_by_itself(plain):
     near_truth(plain)
 
 
+@pytest.mark.slow
 def test_parameters_changed_in_flight_leave_the_estimate_alone(flight, plain):
     before, after = SixParameters((1.0,) * 3, (0.1,) * 3), SixParameters(SCALE, OFFSET)
     names = parameter_names(1).six
@@ -218,6 +220,7 @@ def identified(flight):
     return [ParameterValue("INS_ACC_ID", 2753028.0), *flight]
 
 
+@pytest.mark.slow
 def test_saved_sums_are_taken_in_by_the_flight_that_agrees_with_them(identified):
     first = fed(identified)[0]
     saved = first.to_bytes()
@@ -350,6 +353,7 @@ def test_a_slow_track_refuses_what_is_late_and_keeps_two():
     assert len(track) == 2
 
 
+@pytest.mark.slow
 def test_flight_that_left_the_buffer_stays_in_the_sums(flight):
     every = replace(ONCE, assembly=AssemblySettings(batch_s=2.0), memory_s=1e12)
     short = fed(flight, replace(every, buffer_s=10.0))[0].engine(1)

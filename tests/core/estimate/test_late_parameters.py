@@ -53,6 +53,7 @@ def estimate(samples, *, told_at):
     return calibrator.calibration(1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told_at", [12.0, 40.0])
 def test_late_parameters_cost_flight_but_no_truth(flight, told_at):
     late = estimate(flight, told_at=told_at)

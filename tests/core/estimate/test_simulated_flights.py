@@ -300,12 +300,14 @@ def saved():
     return fed(flown("copter", 50.0)[0]).to_bytes()
 
 
+@pytest.mark.slow
 def test_sums_that_wait_for_their_sensor_are_not_lost(saved):
     restored = Calibrator.from_bytes(saved)
     assert restored.waiting == (1,)
     assert restored.to_bytes() == saved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     [

@@ -259,6 +259,7 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
     assert kernel.chosen() is NUMPY
 
 
+@pytest.mark.slow
 def test_two_processes_may_fill_the_same_cache(tmp_path):
     code = """
         from onboard.core.filter.loops import compiled

@@ -105,6 +105,7 @@ def literal_and_whitened(noise, gaps=()):
     )
 
 
+@pytest.mark.slow
 def test_without_process_noise_windows_add_up_as_in_the_criterion_of_the_paper():
     literal, whitened, N_literal, N_whitened = literal_and_whitened(0.1, gaps=(40, 70))
     truth = np.concatenate([SCALE, BETA])
@@ -246,6 +247,7 @@ def test_rows_are_independent(white):
         assert np.abs(product).max() < 5.0 / np.sqrt(n), lag
 
 
+@pytest.mark.slow
 def test_the_likelihood_prefers_the_levels_that_made_the_data():
     """``chi^2 + log det`` of the right levels is the lowest of its neighbours'."""
     rng = np.random.default_rng(1)

@@ -365,6 +365,7 @@ anything = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.lists(anything, max_size=60))
 def test_invariants_under_anything(inputs):

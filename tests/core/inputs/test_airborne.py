@@ -59,6 +59,7 @@ def without_states(samples):
     return [s for s in samples if not isinstance(s, VehicleState)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [True, False])
 def test_a_long_stand_after_the_landing_changes_nothing(flight, before, told):
     samples = flight if told else without_states(flight)
@@ -73,6 +74,7 @@ def test_a_long_stand_after_the_landing_changes_nothing(flight, before, told):
     assert "hovering" not in two.note
 
 
+@pytest.mark.slow
 def test_ten_seconds_of_being_armed_on_the_ground_are_no_flight(flight, before):
     stand = standing_on(flight, 60.0)
     begin = stand[0].t
@@ -106,6 +108,7 @@ def test_that_it_moved_is_known_after_a_restart(flight):
     assert resumed.engine(1).brisk_s == pytest.approx(2.0 * once.engine(1).brisk_s)
 
 
+@pytest.mark.slow
 def test_the_frozen_flight_stays_while_the_live_one_goes_on(flight):
     live = Calibrator(SHORT)
     for sample in flight:

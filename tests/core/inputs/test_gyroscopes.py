@@ -60,6 +60,7 @@ def six(made, imu):
     return np.array(c.scale + c.offset)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refine", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_notice(
     flight, refine
@@ -73,6 +74,7 @@ def test_accelerometers_share_the_gyroscope_of_the_first_and_the_first_does_not_
     np.testing.assert_allclose(six(both, 2), six(both, 1), rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_gyroscope_of_the_same_chip_is_the_accelerometers_own(flight):
     ids = [("INS_ACC2_ID", ONE_CHIP | 22 << 16), ("INS_GYR2_ID", ONE_CHIP | 36 << 16)]
     made = calibrated(flight, second=True, ids=ids, settings=CalibratorSettings(refine=False))
