@@ -10,9 +10,9 @@ from typing import Final
 
 # Linearisation (calibration_model): the range in which timing is looked for.
 
-LONGEST_WINDOW_S: Final = 0.45
+LONGEST_WINDOW_S: Final = 0.85
 """Longest averaging span of a receiver, s: what the nodes around a fix resolve, less a margin
-[cost; real receivers ask for 0.5 to 0.6, to be widened with the nodes]."""
+[cost; real receivers ask for 0.5 to 0.75]."""
 DELAY_RANGE_S: Final = (-0.1, 0.45)
 """Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
 ATTITUDE_DELAY_RANGE_S: Final = (-0.15, 0.15)
@@ -25,7 +25,8 @@ HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 ROUNDS: Final = 4
 """Rounds of a refinement: latency is found to a millisecond in two or three [cost]."""
 NOISE_ROUNDS: Final = 3
-"""Rounds that may begin a search for noise levels; each search takes two [cost]."""
+"""Rounds that may begin a search for noise levels; each search takes two, and moves a level by a
+factor of four at the most [cost]."""
 SETTLED_LOG_RATIO: Final = 0.15
 """Noise levels closer than this are the same: only their order of magnitude matters [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)

@@ -75,6 +75,7 @@ tens of seconds [tuned]."""
 LIMITS: Final[dict[str, tuple[float, float]]] = {
     "velocity": (0.02, 2.0),
     "velocity_colour": (0.005, 1.0),
+    "vertical": (0.5, 6.0),
     "height": (0.05, 10.0),
     "height_walk": (0.01, 2.0),
     "force_walk": (0.01, 3.0),

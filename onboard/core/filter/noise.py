@@ -23,9 +23,10 @@ class NoiseLevels:
     """Standard deviations and random-walk densities that the whitening filter assumes.
 
     Attributes:
-        velocity: white noise of a GPS velocity component, m/s.
-        velocity_colour: Gauss-Markov error of a GPS velocity component (correlation time
+        velocity: white noise of a horizontal GPS velocity component, m/s.
+        velocity_colour: Gauss-Markov error of it (correlation time
             :data:`~onboard.core.filter.limits.COLOUR_TIME_S`), m/s.
+        vertical: how many times as large both are for the velocity down: satellites are above.
         height: white noise of GPS height, m.
         height_walk: wander of GPS height, m/sqrt(s).
         force_walk: velocity random walk from accelerometer noise and all that is like it,
@@ -39,6 +40,7 @@ class NoiseLevels:
 
     velocity: float = 0.05
     velocity_colour: float = 0.02
+    vertical: float = 1.0
     height: float = 0.2
     height_walk: float = 0.05
     force_walk: float = 0.02
@@ -56,6 +58,7 @@ class NoiseLevels:
 ESTIMATED = (
     "velocity",
     "velocity_colour",
+    "vertical",
     "height",
     "height_walk",
     "force_walk",

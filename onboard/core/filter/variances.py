@@ -38,8 +38,11 @@ class Variances:
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
-            self.settled[i, V] = q.velocity_colour**2
-            self.reading[i] = (*(q.velocity**2,) * 3, q.height**2, *(q.attitude**2,) * 3)
+            velocity = np.array([1.0, 1.0, q.vertical**2])
+            self.settled[i, V] = q.velocity_colour**2 * velocity
+            self.reading[i, V] = q.velocity**2 * velocity
+            self.reading[i, H] = q.height**2
+            self.reading[i, PSI] = q.attitude**2
             if attitude:
                 self.walk[i, PSI] = q.tilt_walk**2
                 self.walk[i, BIAS] = q.bias_walk**2

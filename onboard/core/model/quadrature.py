@@ -16,9 +16,9 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
 
-AROUND_SPAN_S = 0.25
-"""Reach of the nodes to either side of an epoch: receivers average over less than 0.5 s."""
-AROUND_COUNT = 8
+AROUND_SPAN_S = 0.44
+"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s."""
+AROUND_COUNT = 14
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,9 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 
 _FINE = 4001
+SECOND_DERIVATIVE_S = 0.12
+"""s; to either side, over which a second derivative is taken: shorter is noise, longer misses a
+manoeuvre of 1 Hz."""
 
 
 def mean_weights(offset: Array, window: float) -> Array:
@@ -40,10 +43,11 @@ def mean_weights(offset: Array, window: float) -> Array:
 
 
 def second_difference(offset: Array) -> Array:
-    """Weights of the second derivative at zero over the middle half of ``offset``, 1/s^2."""
+    """Weights (n,) of the second derivative at zero over 0.12 s to either side, 1/s^2."""
     n = len(offset)
     weights = np.zeros(n)
-    middle, reach = n // 2, n // 4
+    middle = n // 2
+    reach = max(1, round(SECOND_DERIVATIVE_S / float(offset[1] - offset[0])))
     h = offset[middle + reach]
     weights[[middle - reach, middle, middle + reach]] = np.array([1.0, -2.0, 1.0]) / h**2
     return weights

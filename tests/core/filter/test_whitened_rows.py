@@ -38,7 +38,7 @@ GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 def quiet(velocity):
     """Noise of GPS velocity alone."""
     none = 1e-12
-    return NoiseLevels(velocity, none, 1.0, none, none, none, none, none, none)
+    return NoiseLevels(velocity, none, 1.0, 1.0, none, none, none, none, none, none)
 
 
 def manoeuvres(t):
@@ -260,7 +260,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        NoiseLevels(velocity, *(1e-12, 1.0, 1e-12), walk, *(1e-12,) * 4)
+        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 4)
         for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
     )
     made = Pass(

@@ -10,7 +10,13 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.inputs.tracks import untruncated
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
-from onboard.core.model.quadrature import NodeMaker, rotation_increments, simpson_weights
+from onboard.core.model.quadrature import (
+    AROUND_COUNT,
+    AROUND_SPAN_S,
+    NodeMaker,
+    rotation_increments,
+    simpson_weights,
+)
 from onboard.core.model.smoothing import mean_slope, mean_weights, second_difference
 
 NOMINAL = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -135,7 +141,7 @@ def test_around_an_epoch_forces_are_in_its_axes():
     assert np.abs(made.now.f_b - force(epoch)).max() < 2e-4
 
 
-@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45])
+@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45, 0.8])
 @pytest.mark.parametrize("recorded", [False, True])
 def test_a_lever_arm_is_seen_as_the_receiver_averages_it(window, recorded):
     """Against the mean of ``R (w x arm)`` over the span, by brute force."""
@@ -166,9 +172,9 @@ def test_simpson_is_exact_for_cubics(count):
         assert simpson_weights(count) @ x**power == pytest.approx(1.0 / (power + 1))
 
 
-@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.2, 0.346, 0.45])
+@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.2, 0.346, 0.45, 0.8])
 def test_smoothing_is_the_average_of_the_velocity(window):
-    offset = np.linspace(-0.25, 0.25, 17)
+    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
     for frequency, phase in ((3.0, 0.3), (6.0, 1.1)):
         fine = np.linspace(-window / 2, window / 2, 20001)
         mean = np.mean(-np.cos(frequency * fine + phase) / frequency) if window else 0.0
