@@ -119,7 +119,7 @@ def test_without_process_noise_windows_add_up_as_in_the_criterion_of_the_paper()
 @pytest.mark.slow
 def test_what_a_fit_leaves_is_chi_square():
     noise, rng = 0.1, np.random.default_rng(5)
-    t = np.arange(0.0, 201.0, 5e-3)
+    t = np.arange(0.0, 101.0, 5e-3)
     euler, raw = manoeuvres(t)
     R = matrices(euler)
     a = np.einsum("nij,nj->ni", R, SCALE * raw + BETA) + GRAVITY

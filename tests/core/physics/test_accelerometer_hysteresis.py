@@ -138,8 +138,7 @@ def test_a_model_without_memory_leaves_the_segment_as_it_is():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [1.0, 2.0, 4.0])
-@pytest.mark.parametrize("vehicle", ["copter", "plane"])
+@pytest.mark.parametrize(("vehicle", "width"), [("copter", 1.0), ("plane", 2.0), ("plane", 4.0)])
 def test_a_flight_that_conceals_it_is_explained_however_wide_it_is(vehicle, width):
     concealed = Concealed(x=0.2, y=-0.16, z=0.2, width=width)
     said = diagnose(heard(replace(Secret(601, vehicle, "control").spec(), effects=(concealed,))), 1)
