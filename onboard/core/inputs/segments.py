@@ -10,9 +10,15 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import interpolate_rotation
+from onboard.core.maths.frames import (
+    interpolate_rotation,
+    rotation_from_vector,
+    vector_from_rotation,
+)
 from onboard.core.maths.interpolation import Hermite
 
+PARTS = 6
+"""Into which the time from one attitude sample to the next is cut: 0.1 s at the longest."""
 Signal: TypeAlias = tuple[Array, Array]
 """A slow signal: times (j,), s, and values (j,) or (j, k)."""
 SLOW_SIGNALS = {
@@ -83,6 +89,30 @@ class Segment:
         """Interpolant of (rate, raw) stacked to (n, 6)."""
         return Hermite(self.t, np.hstack([self.w_b, self.raw_s]))
 
+    def _between_samples(self, at: Array, delay: float) -> Array:
+        t_k, R_k = self.t_attitude, self.R_attitude
+        if len(t_k) < 2:
+            return interpolate_rotation(at, t_k, R_k)
+        at = np.clip(at, t_k[0], t_k[-1])
+        k = np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
+        start, end = t_k[k], t_k[k + 1]
+        rate = Hermite(self.t, self.w_b)
+
+        def turned(until: Array) -> Array:
+            """Rotation (m, 3, 3) by the gyroscope since the sample before: PARTS turns in a row."""
+            h = (until - start) / PARTS
+            out = np.broadcast_to(np.eye(3), (len(until), 3, 3))
+            for part in range(PARTS):
+                middle = start - delay + (part + 0.5) * h
+                out = out @ rotation_from_vector(rate(middle) * h[:, None])
+            return out
+
+        share = ((at - start) / (end - start))[:, None]
+        recorded = np.swapaxes(R_k[k], -1, -2) @ R_k[k + 1]
+        missed = vector_from_rotation(np.swapaxes(turned(end), -1, -2) @ recorded)
+        out: Array = R_k[k] @ turned(at) @ rotation_from_vector(share * missed)
+        return out
+
     def slow_at(self, name: str, at: Array) -> Array | None:
         """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""
         if name not in self.slow:
@@ -92,9 +122,17 @@ class Segment:
             return np.interp(at, t, x)
         return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
 
-    def attitude_at(self, at: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it."""
-        R = interpolate_rotation(at, self.t_attitude, self.R_attitude)
+    def attitude_at(self, at: Array, delay: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
+        """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it.
+
+        Between samples it turns as the gyroscope says, and what that misses of the next sample is
+        spread evenly: at 10 Hz a constant rate would be 6 mrad off in a roll of 5 rad/s^2.
+
+        Args:
+            at: (m,) on the clock of the attitude, s.
+            delay: by how much that clock is ahead of the gyroscope's, s.
+        """
+        R = self._between_samples(at, delay)
         i = np.clip(np.searchsorted(self.t_attitude, at) - 1, 0, max(len(self.t_attitude) - 2, 0))
         if len(self.t_attitude) < 2:
             return R, np.zeros(len(at), dtype=bool)

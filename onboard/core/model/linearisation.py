@@ -56,7 +56,7 @@ class Linearisation:
 
     def attitude(self, segment: Segment, t: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
-        R, near = segment.attitude_at(t + self.attitude_delay)
+        R, near = segment.attitude_at(t + self.attitude_delay, self.attitude_delay)
         return rotation_from_euler(0.0, 0.0, -self.heading) @ R, near
 
     @property
