@@ -111,3 +111,28 @@ WHOLE_SHARE: Final = 0.97
 """Share of a horizon that a window must reach [cost]."""
 FEWEST_INTERVALS: Final = 3
 """Intervals between fixes that a window must have [cost]."""
+
+# Pairs of accelerometers (shared_windows, relative, joint, common_cause).
+
+SHARED_WINDOW_S: Final = 1.0
+"""Windows in which two accelerometers are compared, s: longer than vibration, shorter than a
+manoeuvre [cost]."""
+FEWEST_IN_WINDOW: Final = 5
+"""Samples that each of them must have in it [cost]."""
+FEWEST_WINDOWS: Final = 20
+"""Fewer windows say nothing of the scatter [cost]."""
+UNKNOWN_PLACE_M: Final = 0.03
+"""Sigma of the distance between two accelerometers beyond what is configured, m, each axis
+[physics: half an autopilot]."""
+PAIR_NOISE_FLOOR: Final = 1e-4
+"""Sigma of a window's difference, m/s^2, that no pair goes below: the step of a logged number
+[physics]."""
+OUTLYING: Final = 6.0
+"""Robust sigmas past which a window is no part of the flight: clipping, a bump [probability]."""
+SHORTEST_CLUSTER_S: Final = 10.0
+"""Blocks whose scatter is compared with what windows promise, s; then twice as long, and so on
+[cost]."""
+LIKE_SIGMAS: Final = 3.0
+"""Sigmas past which two accelerometers differ, or a common change is one [probability]."""
+LIKE_SHARE: Final = 0.25
+"""Share of a common change up to which the differences of the changes are details of it [tuned]."""
