@@ -1,4 +1,4 @@
-"""All accelerometers of a vehicle at once: what each knows by GPS, and what pairs know of each other.
+"""All accelerometers of a vehicle at once: what each knows by GPS, and what pairs of them know.
 
 Solutions of one flight share GPS and attitude and their errors, by an amount that nobody knows.  So
 they do not add up: the covariance of all of them stacked is at most ``n`` times the block diagonal

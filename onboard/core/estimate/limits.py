@@ -112,7 +112,7 @@ WHOLE_SHARE: Final = 0.97
 FEWEST_INTERVALS: Final = 3
 """Intervals between fixes that a window must have [cost]."""
 
-# Pairs of accelerometers (shared_windows, relative, joint, common_cause).
+# Pairs of accelerometers (shared_windows, wandering, relative, joint, common_cause).
 
 SHARED_WINDOW_S: Final = 1.0
 """Windows in which two accelerometers are compared, s: longer than vibration, shorter than a
@@ -129,9 +129,8 @@ PAIR_NOISE_FLOOR: Final = 1e-4
 [physics]."""
 OUTLYING: Final = 6.0
 """Robust sigmas past which a window is no part of the flight: clipping, a bump [probability]."""
-SHORTEST_CLUSTER_S: Final = 10.0
-"""Blocks whose scatter is compared with what windows promise, s; then twice as long, and so on
-[cost]."""
+CLUSTER_S: Final = 10.0
+"""Blocks whose scatter is compared with what windows promise, s [cost]."""
 LIKE_SIGMAS: Final = 3.0
 """Sigmas past which two accelerometers differ, or a common change is one [probability]."""
 LIKE_SHARE: Final = 0.25

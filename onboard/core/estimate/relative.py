@@ -13,9 +13,9 @@ makes the residual small.  So the derivative is taken at the force that both agr
 the two: its noise is uncorrelated with that of their difference where both are alike.
 
 *Noise.*  Its level is that of the residuals.  Misalignment, temperature and vibration leave them
-correlated, so the variance of each axis is inflated by what the scatter of the scores of blocks of
-the flight is wider than promised (cluster-robust, as in :mod:`onboard.core.estimate.solution`),
-for blocks of 10 s, 20 s, and so on, as long as there are enough of them; the worst counts.
+correlated, so the variance is inflated for it (:mod:`onboard.core.estimate.wandering`), that of
+their mean and that of what varies with the force each by its own factor: what wanders spoils an
+offset more than a gain.
 """
 
 from __future__ import annotations
@@ -25,15 +25,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.estimate.limits import (
-    FEWEST_BLOCKS,
     FEWEST_WINDOWS,
-    ONE_IN_A_THOUSAND,
     OUTLYING,
     PAIR_NOISE_FLOOR,
-    SHORTEST_CLUSTER_S,
     UNKNOWN_PLACE_M,
 )
 from onboard.core.estimate.shared_windows import SharedWindows
+from onboard.core.estimate.wandering import inflation as inflation_of
 from onboard.core.maths.arrays import Array
 
 ROUNDS = 4
@@ -55,7 +53,7 @@ class Relative:
         vector: (12,) information times the change that the flight asks for.
         distance: (3,) unknown rest of the distance, body axes, m: how much further a is from b.
         noise: (3,) sigma of a window's difference, m/s^2.
-        inflation: (3,) factor on its variance, at least 1.
+        inflation: (2, 3) factors, at least 1, on the variance of its mean and of what varies.
         mean_raw: (2, 3) mean raw samples of a and b, sensor axes, m/s^2.
         lever: (3,) mean of what the configured places do, m/s^2.
     """
@@ -105,6 +103,12 @@ class Relative:
         out: Array = self.weights @ self.covariance[:12, :12] @ self.weights.T
         return out
 
+    @property
+    def mean_force(self) -> Array:
+        """(3,) mean force of a, m/s^2."""
+        out: Array = self.theta[:3] * self.mean_raw[0] + self.theta[3:6]
+        return out
+
     def other(self, a: Array, prior_sigma: Array) -> tuple[Array, Array]:
         """What b is if a is known: (6,) scale and beta, and their covariance (6, 6).
 
@@ -113,9 +117,10 @@ class Relative:
             prior_sigma: (6,) of b.
         """
         R = self.information
-        covariance = np.linalg.inv(R[6:, 6:] + np.diag(prior_sigma**-2.0))
+        covariance: Array = np.linalg.inv(R[6:, 6:] + np.diag(prior_sigma**-2.0))
         change = covariance @ (self.vector[6:] - R[6:, :6] @ (a - self.before[:6]))
-        return self.before[6:] + change, covariance
+        b: Array = self.before[6:] + change
+        return b, covariance
 
 
 def relative_of(
@@ -138,9 +143,9 @@ def relative_of(
     if not np.all(well) and int(np.sum(well)) >= FEWEST_WINDOWS:
         kept = windows.where(well)
         fit = _Fit(kept, before, prior_sigma)
-    inflation = cluster_inflation(kept.t, fit.residual, fit.force)
-    covariance = np.linalg.inv(fit.information(inflation) + fit.prior)
+    inflation = fit.inflation()
     N, b = fit.information(inflation), fit.vector(inflation)
+    covariance = np.linalg.inv(N + fit.prior)
     change = covariance @ b
     # The distance is eliminated with what is known of it beforehand.
     gain = N[:12, 12:] @ np.linalg.inv(N[12:, 12:] + fit.prior[12:, 12:])
@@ -162,6 +167,9 @@ def relative_of(
     )
 
 
+AXES = range(3)
+
+
 class _Fit:
     """Least squares over windows, linear but for the force at which derivatives are taken."""
 
@@ -170,15 +178,14 @@ class _Fit:
         self._windows = windows
         felt = self._forces(before)
         self._y = felt[0] - felt[1] - windows.lever
-        self.residual = self._y
-        self.variance = np.var(self._y, axis=0) + PAIR_NOISE_FLOOR**2
+        self.variance: Array = np.var(self._y, axis=0) + PAIR_NOISE_FLOOR**2
         change = np.zeros(15)
-        one = np.ones(3)
+        one = np.ones((2, 3))
         for _ in range(ROUNDS):
             self._H = self._rows(before + change[:12])
             N = self.information(one) + self.prior
             change = np.linalg.solve(N, self.vector(one))
-            self.residual = self._y - self._H @ change
+            self.residual: Array = self._y - self._H @ change
             self.variance = np.mean(self.residual**2, axis=0) + PAIR_NOISE_FLOOR**2
 
     def _forces(self, x: Array) -> tuple[Array, Array]:
@@ -199,53 +206,30 @@ class _Fit:
         H[:, :, 12:] = w.swing
         return H
 
+    def inflation(self) -> Array:
+        """(2, 3) what correlation of the residuals adds to variances of mean and variation."""
+        t, r = self._windows.t, self.residual
+        varies = self.force - self.force.mean(axis=0)
+        each = [(inflation_of(t, r[:, j]), inflation_of(t, varies[:, j] * r[:, j])) for j in AXES]
+        return np.array(each).T
+
     def information(self, inflation: Array) -> Array:
         """(15, 15) of the windows alone."""
         weights = 1.0 / (self.variance * inflation)
-        out: Array = np.einsum("nji,j,njk->ik", self._H, weights, self._H)
+        mean, varies = self._split(self._H)
+        out: Array = np.einsum("nji,j,njk->ik", varies, weights[1], varies)
+        out += len(self._y) * np.einsum("ji,j,jk->ik", mean, weights[0], mean)
         return out
 
     def vector(self, inflation: Array) -> Array:
         """(15,) what goes with it."""
         weights = 1.0 / (self.variance * inflation)
-        out: Array = np.einsum("nji,j,nj->i", self._H, weights, self._y)
+        mean, varies = self._split(self._H)
+        out: Array = np.einsum("nji,j,nj->i", varies, weights[1], self._y)
+        out += len(self._y) * np.einsum("ji,j,j->i", mean, weights[0], self._y.mean(axis=0))
         return out
 
-
-def cluster_inflation(t: Array, residual: Array, force: Array) -> Array:
-    """(3,) how much wider blocks of residuals scatter than white noise would, each axis, at least 1.
-
-    Args:
-        t: (n,) when windows begin, s.
-        residual: (n, 3) of windows.
-        force: (n, 3) what they are regressed on, besides a constant.
-    """
-    shortest = min(SHORTEST_CLUSTER_S, (t[-1] - t[0]) / (2.0 * FEWEST_BLOCKS))
-    out, length = np.ones(3), shortest
-    while True:
-        block = np.unique(np.floor((t - t[0]) / length), return_inverse=True)[1]
-        if block.max() + 1 < 2 * FEWEST_BLOCKS:
-            return out
-        for j in range(3):
-            out[j] = max(out[j], _scatter(block, residual[:, j], force[:, j]))
-        length *= 2.0
-
-
-def _scatter(block: Array, residual: Array, force: Array) -> float:
-    """Ratio of found to promised variance of the blocks' scores, for a gain and an offset."""
-    centred = force - force.mean()
-    Z = np.stack([np.ones_like(force), centred / max(float(centred.std()), 1e-9)], axis=-1)
-    count = int(block.max()) + 1
-    score, gram = np.zeros((count, 2)), np.zeros((count, 2, 2))
-    np.add.at(score, block, Z * residual[:, None])
-    np.add.at(gram, block, Z[:, :, None] * Z[:, None, :])
-    # The fit has followed each block: its score scatters less than its information.
-    followed = gram - gram @ np.linalg.solve(gram.sum(axis=0) + 1e-9 * np.eye(2), gram)
-    promised = np.mean(residual**2) * np.diagonal(followed, axis1=1, axis2=2)
-    whole = np.maximum(promised.sum(axis=0), 1e-30)
-    ratio = np.sum(score**2, axis=0) / whole
-    blocks_that_count = whole**2 / np.maximum(np.sum(promised**2, axis=0), 1e-60)
-    # Wilson and Hilferty (1931): the cube root of chi-square is nearly normal.
-    width = 2.0 / (9.0 * blocks_that_count)
-    beyond = ratio > (1.0 - width + ONE_IN_A_THOUSAND * np.sqrt(width)) ** 3
-    return float(ratio[beyond].max() if beyond.any() else ratio.mean())
+    @staticmethod
+    def _split(H: Array) -> tuple[Array, Array]:
+        mean: Array = H.mean(axis=0)
+        return mean, H - mean

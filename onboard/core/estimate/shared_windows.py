@@ -1,4 +1,4 @@
-"""Windows of flight that two accelerometers of one vehicle share: what each of them felt on average.
+"""Windows of flight that two accelerometers of one vehicle share: what each felt on average.
 
 Two accelerometers at places ``r_a`` and ``r_b`` of one rigid body feel
 
@@ -70,7 +70,7 @@ def _parts(
     for one in a:
         start, end = float(one.fixes.t[0]), float(one.fixes.t[-1])
         for i in np.flatnonzero((begins < end) & (ends > start)):
-            first, second = one.segment, b[i].segment
+            first, second = one.segment, b[int(i)].segment
             low = max(start, begins[i], first.t[0], second.t[0])
             high = min(end, ends[i], first.t[-1], second.t[-1])
             count = int((high - low) / SHARED_WINDOW_S)
