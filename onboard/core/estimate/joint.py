@@ -50,16 +50,31 @@ class Single:
 
 
 def single(c: Calibration) -> Single | None:
-    """A calibration without its prior; None if it has no finite covariance."""
-    six = np.array(c.scale + c.offset)
-    P = np.array(c.covariance, dtype=np.float64)
+    """A calibration without its prior; None if it has no covariance."""
+    six, P = np.array(c.scale + c.offset), np.array(c.covariance, dtype=np.float64)
+    in_force = SixParameters(c.in_force_scale, c.in_force_offset)
+    return without_prior(c.imu, in_force, np.array(c.prior_sigma), six, P)
+
+
+def without_prior(
+    imu: int, in_force: SixParameters, prior_sigma: Array, six: Array, P: Array
+) -> Single | None:
+    """What a flight alone says of one accelerometer; None if that has no covariance.
+
+    Args:
+        imu: which.
+        in_force: centre of the prior.
+        prior_sigma: (6,) of scale (1) and of beta (m/s^2).
+        six: (6,) estimate, scale (1) and offset (m/s^2).
+        P: (6, 6) covariance of it.
+    """
     if not (np.all(np.isfinite(six)) and np.all(np.isfinite(P))):
         return None
-    before = SixParameters(c.in_force_scale, c.in_force_offset).as_linear()
+    before = in_force.as_linear()
     estimate = linear_of(six)
     back = np.linalg.inv(parameters_jacobian(estimate))
     covariance = back @ P @ back.T
-    unit = np.array(c.prior_sigma)
+    unit = prior_sigma
     try:
         inverse = np.linalg.inv(covariance / np.outer(unit, unit))
     except np.linalg.LinAlgError:
@@ -70,7 +85,7 @@ def single(c: Calibration) -> Single | None:
     asked = V.T @ inverse @ ((estimate - before) / unit)
     asked[share <= 0.0] = 0.0
     information = (V * share) @ V.T / np.outer(unit, unit)
-    return Single(c.imu, before, unit, estimate, covariance, information, (V @ asked) / unit)
+    return Single(imu, before, unit, estimate, covariance, information, (V @ asked) / unit)
 
 
 @dataclass(frozen=True, slots=True)

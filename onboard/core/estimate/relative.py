@@ -117,7 +117,7 @@ class Relative:
             prior_sigma: (6,) of b.
         """
         R = self.information
-        covariance: Array = np.linalg.inv(R[6:, 6:] + np.diag(prior_sigma**-2.0))
+        covariance = np.asarray(np.linalg.inv(R[6:, 6:] + np.diag(prior_sigma**-2.0)), np.float64)
         change = covariance @ (self.vector[6:] - R[6:, :6] @ (a - self.before[:6]))
         b: Array = self.before[6:] + change
         return b, covariance
@@ -184,7 +184,7 @@ class _Fit:
         for _ in range(ROUNDS):
             self._H = self._rows(before + change[:12])
             N = self.information(one) + self.prior
-            change = np.linalg.solve(N, self.vector(one))
+            change = np.asarray(np.linalg.solve(N, self.vector(one)), np.float64)
             self.residual: Array = self._y - self._H @ change
             self.variance = np.mean(self.residual**2, axis=0) + PAIR_NOISE_FLOOR**2
 
