@@ -51,16 +51,37 @@ def remarks(comparison: Comparison | None) -> tuple[str, ...]:
 
 
 def _misplaced(comparison: Comparison) -> Iterator[str]:
-    for pair in comparison.pairs:
-        found = zip("xyz", pair.distance, pair.distance_sigma, strict=True)
-        far = [(axis, d) for axis, d, s in found if abs(d) > max(FAR_M, FAR_SIGMAS * s)]
-        if far:
-            a, b = pair.imus
-            by = " and ".join(f"{d:+.2f} m in {axis}" for axis, d in far)
+    """Accelerometers that are not where the parameters have them: one to blame, or a pair."""
+    far = {pair.imus: off for pair in comparison.pairs if (off := _off(pair))}
+    for imu in comparison.joint.imus:
+        mine = {pair.imus for pair in comparison.pairs if imu in pair.imus}
+        if len(mine) > 1 and far.keys() == mine:
+            signs = {imus: 1.0 if imus[0] == imu else -1.0 for imus in mine}
+            off = {
+                axis: sum(signs[imus] * far[imus].get(axis, 0.0) for imus in mine) / len(mine)
+                for axis in "xyz"
+                if any(axis in far[imus] for imus in mine)
+            }
             yield (
-                f"accelerometer {a} as seen from {b} is {by} away from where INS_POS{a} and "
-                f"INS_POS{b} have it"
+                f"accelerometer {imu} is {_metres(off)} from where INS_POS{imu} has it, as the "
+                "others have it"
             )
+            return
+    for (a, b), off in far.items():
+        yield (
+            f"accelerometer {a}, as seen from {b}, is {_metres(off)} from where INS_POS{a} and "
+            f"INS_POS{b} have it"
+        )
+
+
+def _off(pair: PairDifference) -> dict[str, float]:
+    """By axis how much further the first is from the second than configured, where it is far."""
+    found = zip("xyz", pair.distance, pair.distance_sigma, strict=True)
+    return {axis: d for axis, d, s in found if abs(d) > max(FAR_M, FAR_SIGMAS * s)}
+
+
+def _metres(off: dict[str, float]) -> str:
+    return " and ".join(f"{d:+.2f} m in {axis}" for axis, d in off.items())
 
 
 def _pair(pair: PairDifference) -> PairDocument:

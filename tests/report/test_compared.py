@@ -68,6 +68,17 @@ def test_a_sensor_that_is_not_where_it_is_said_to_be_is_a_note():
     assert " in x" not in note
 
 
+def test_one_that_all_others_see_elsewhere_is_named_alone():
+    pairs = (
+        replace(PAIR, distance=(0.0, 0.0, 0.0)),
+        replace(PAIR, imus=(1, 3), distance=(0.0, 0.0, 0.23)),
+        replace(PAIR, imus=(2, 3), distance=(0.0, 0.0, 0.25)),
+    )
+    joint = Joint((1, 2, 3), np.zeros((3, 6)), np.ones((3, 6)), np.eye(18))
+    (note,) = remarks(Comparison(pairs, joint, (), 2))
+    assert note.startswith("accelerometer 3 is -0.24 m in z from where INS_POS3 has it")
+
+
 def test_other_programs_get_pairs_cause_and_joint_numbers():
     _, document = shown(COMPARISON)
     found = document["accelerometers"]

@@ -124,6 +124,8 @@ FEWEST_WINDOWS: Final = 20
 UNKNOWN_PLACE_M: Final = 0.03
 """Sigma of the distance between two accelerometers beyond what is configured, m, each axis
 [physics: half an autopilot]."""
+MISPLACED_M: Final = 0.5
+"""The same where the flight contradicts what is configured, m [physics: the size of a vehicle]."""
 PAIR_NOISE_FLOOR: Final = 1e-4
 """Sigma of a window's difference, m/s^2, that no pair goes below: the step of a logged number
 [physics]."""
@@ -132,6 +134,7 @@ OUTLYING: Final = 6.0
 CLUSTER_S: Final = 10.0
 """Blocks whose scatter is compared with what windows promise, s [cost]."""
 LIKE_SIGMAS: Final = 3.0
-"""Sigmas past which two accelerometers differ, or a common change is one [probability]."""
+"""Sigmas past which two accelerometers differ, a common change is one, or a place is wrong
+[probability]."""
 LIKE_SHARE: Final = 0.25
 """Share of a common change up to which the differences of the changes are details of it [tuned]."""

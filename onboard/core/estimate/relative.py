@@ -26,6 +26,8 @@ import numpy as np
 
 from onboard.core.estimate.limits import (
     FEWEST_WINDOWS,
+    LIKE_SIGMAS,
+    MISPLACED_M,
     OUTLYING,
     PAIR_NOISE_FLOOR,
     UNKNOWN_PLACE_M,
@@ -136,13 +138,15 @@ def relative_of(
     """
     if len(windows) < FEWEST_WINDOWS:
         return None
-    kept = windows
-    fit = _Fit(kept, before, prior_sigma)
+    kept, place = windows, UNKNOWN_PLACE_M
+    fit = _Fit(kept, before, prior_sigma, place)
     spread = np.median(np.abs(fit.residual), axis=0) / 0.6745 + PAIR_NOISE_FLOOR
     well = np.all(np.abs(fit.residual) < OUTLYING * spread, axis=1)
     if not np.all(well) and int(np.sum(well)) >= FEWEST_WINDOWS:
         kept = windows.where(well)
-        fit = _Fit(kept, before, prior_sigma)
+        fit = _Fit(kept, before, prior_sigma, place)
+    if np.any(np.abs(fit.distance) > LIKE_SIGMAS * place):  # configured wrongly: a slip of any size
+        fit = _Fit(kept, before, prior_sigma, MISPLACED_M)
     inflation = fit.inflation()
     N, b = fit.information(inflation), fit.vector(inflation)
     covariance = np.linalg.inv(N + fit.prior)
@@ -173,8 +177,10 @@ AXES = range(3)
 class _Fit:
     """Least squares over windows, linear but for the force at which derivatives are taken."""
 
-    def __init__(self, windows: SharedWindows, before: Array, prior_sigma: Array) -> None:
-        self.prior = np.diag(np.concatenate([prior_sigma, np.full(3, UNKNOWN_PLACE_M)]) ** -2.0)
+    def __init__(
+        self, windows: SharedWindows, before: Array, prior_sigma: Array, place: float
+    ) -> None:
+        self.prior = np.diag(np.concatenate([prior_sigma, np.full(3, place)]) ** -2.0)
         self._windows = windows
         felt = self._forces(before)
         self._y = felt[0] - felt[1] - windows.lever
@@ -185,6 +191,7 @@ class _Fit:
             self._H = self._rows(before + change[:12])
             N = self.information(one) + self.prior
             change = np.asarray(np.linalg.solve(N, self.vector(one)), np.float64)
+            self.distance = change[12:]
             self.residual: Array = self._y - self._H @ change
             self.variance = np.mean(self.residual**2, axis=0) + PAIR_NOISE_FLOOR**2
 

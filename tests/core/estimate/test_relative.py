@@ -76,6 +76,13 @@ def test_a_place_that_was_configured_wrongly_is_found():
     assert np.all(np.abs(found.distance + APART) < 4.0 * sigma + 1e-3)
 
 
+def test_a_slip_of_the_configured_place_is_not_pulled_to_what_is_configured():
+    """A sign that is wrong: 0.24 m, eight times what a place is usually unknown by."""
+    slip = np.array([0.0, 0.0, 0.12])
+    found = pair(np.random.default_rng(10), noise=0.02, true=-slip, configured=slip)
+    assert found.distance[2] == pytest.approx(0.24, abs=0.005)
+
+
 def test_too_little_shared_flight_is_no_comparison():
     assert pair(np.random.default_rng(6), seconds=15.0) is None
 
