@@ -161,6 +161,9 @@ def disagreement(relative: Relative, a: Single, b: Single) -> float:
     * the accelerometers' own noise, as the pair shows it, once in the solutions and once in the
       pair: the same noise, so this is rather too much;
     * the floors of both, for what no model knows.
+
+    Gyroscopes are not shared where each accelerometer is solved with its own: what one of them does
+    wrong is in one solution only, and shows here.  Priors are taken for independent.
     """
     off = relative.difference(a.estimate, b.estimate) - relative.own
     apart = 2.0 * relative.own_covariance
