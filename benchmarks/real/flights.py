@@ -20,6 +20,7 @@ from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.recordings.opening import open_recording
 
@@ -56,6 +57,7 @@ class Fit:
         epochs: how many, ``believed`` how many were to be used.
         refused: epochs that each gate refused, by name.
         white: of the whitened residuals, by kind.
+        batches: the flight itself.
         chain: integrals between epochs.
         states: filter states at epochs.
     """
@@ -82,6 +84,7 @@ class Fit:
     believed: int
     refused: dict[str, int]
     white: tuple[Whiteness, ...]
+    batches: tuple[Batch, ...] = ()
     chain: tuple[Interval, ...] = ()
     states: tuple[EpochState, ...] = ()
 
@@ -157,6 +160,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         believed=judge.evidence.believed,
         refused=dict(engine.refused),
         white=whiteness(engine.traces, solution.theta),
+        batches=tuple(engine.batches),
         chain=tuple(intervals([(b.segment, b.fixes) for b in engine.batches], engine.point)),
         states=tuple(engine.states),
     )

@@ -6,6 +6,10 @@ sigma of the difference takes the two solutions for independent.  They are not: 
 attitude, whose errors cancel in the difference.  So chi-square should be *below* its degrees
 of freedom, and a pair that is far above them is contradicted.  Left out is what the places of the
 sensors do (``w x (w x r)``, some mm/s^2 for 10 cm).
+
+The second table is of the pair itself (:mod:`onboard.core.estimate.relative`): how well it knows
+the difference without GPS, all flight in which both were heard and places taken into account, and
+the chi-square of the two estimates against it, with what they share left out.
 """
 
 from __future__ import annotations
@@ -20,9 +24,12 @@ from numpy.typing import NDArray
 
 from benchmarks.real.flights import Fit, fits
 from benchmarks.real.split import WHERE, available
+from onboard.core.estimate.joint import Single, disagreement, without_prior
+from onboard.core.estimate.relative import relative_of
+from onboard.core.estimate.shared_windows import shared_windows
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import vector3
-from onboard.core.maths.chi_square import survival
+from onboard.core.maths.chi_square import CHI_SQUARE_999, survival
 
 Array = NDArray[np.float64]
 
@@ -37,6 +44,8 @@ class Pair:
         before: (3,) with the parameters in force.
         after: (3,) with each accelerometer's own estimate.
         covariance: (3, 3) of ``after`` as the estimates claim.
+        own_sigma: (3,) of the difference as the pair itself has it; NaN if it does not.
+        own_chi_square: of the estimates against that.
     """
 
     flight: str
@@ -44,6 +53,8 @@ class Pair:
     before: Array
     after: Array
     covariance: Array
+    own_sigma: Array
+    own_chi_square: float
 
     @property
     def sigma(self) -> Array:
@@ -105,9 +116,28 @@ def run(made: Sequence[Fit]) -> list[Pair]:
                 one.force - other.force,
                 a.force - b.force,
                 a.covariance + b.covariance,
+                *_own(one, other),
             )
         )
     return out
+
+
+def _own(one: Fit, other: Fit) -> tuple[Array, float]:
+    """(3,) sigma of the difference as the pair itself has it, and chi-square against that."""
+    a, b = _single(one), _single(other)
+    if a is None or b is None:
+        return np.full(3, np.nan), float("nan")
+    before, prior = (np.concatenate(x) for x in ((a.before, b.before), (a.prior_sigma,) * 2))
+    windows = shared_windows(one.batches, other.batches)
+    relative = relative_of((one.imu, other.imu), windows, before, prior)
+    if relative is None:
+        return np.full(3, np.nan), float("nan")
+    return np.sqrt(np.diag(relative.own_covariance)), disagreement(relative, a, b)
+
+
+def _single(fit: Fit) -> Single | None:
+    in_force = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
+    return without_prior(fit.imu, in_force, fit.prior_sigma, fit.estimate, fit.covariance)
 
 
 def agreements(made: Sequence[Fit]) -> list[Agreement]:
@@ -132,13 +162,31 @@ def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:
     """One line for each pair, and what they say together."""
     lines = [f"{'flight, IMUs':17}{'in force':^19}{'estimated':^19}{'its sigma':^18}{'chi2':>6}"]
     for p in pairs:
-        label = f"{p.flight.removeprefix('real-')[:13]:13} {p.imus[0]}-{p.imus[1]}"
+        label = _label(p)
         before, after = ("".join(f"{x:6.2f}" for x in d) for d in (p.before, p.after))
         sigma = "".join(f"{x:6.3f}" for x in p.sigma)
         lines.append(f"{label:17}{before} {after} {sigma}{p.chi_square:6.1f}")
     if pairs:
         lines += summary(pairs, agreed)
     return "\n".join(lines)
+
+
+def own_table(pairs: Sequence[Pair]) -> str:
+    """One line for each pair: how well it knows the difference, and the estimates against it."""
+    header = "".join(f"{'sigma ' + axis:>10}" for axis in "xyz")
+    lines = [f"{'flight, IMUs':17}{header}{'chi2':>8}   of the pair itself"]
+    for p in pairs:
+        sigma = "".join(f"{x:10.4f}" for x in p.own_sigma)
+        lines.append(f"{_label(p):17}{sigma}{p.own_chi_square:8.1f}")
+    known = [p.own_chi_square for p in pairs if np.isfinite(p.own_chi_square)]
+    if known:
+        beyond = sum(x > CHI_SQUARE_999[3] for x in known)
+        lines.append(f"contradicted once in a thousand: {beyond} of {len(known)} pairs")
+    return "\n".join(lines)
+
+
+def _label(p: Pair) -> str:
+    return f"{p.flight.removeprefix('real-')[:13]:13} {p.imus[0]}-{p.imus[1]}"
 
 
 def summary(pairs: Sequence[Pair], agreed: Sequence[Agreement]) -> list[str]:
@@ -166,7 +214,10 @@ def main(arguments: list[str] | None = None) -> None:
         print(WHERE)
         return
     made = fits(flights, chosen.jobs)
-    print(table(run(made), agreements(made)))
+    pairs = run(made)
+    print(table(pairs, agreements(made)))
+    print()
+    print(own_table(pairs))
 
 
 if __name__ == "__main__":

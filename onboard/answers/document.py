@@ -176,11 +176,56 @@ class RecordingDocument(msgspec.Struct, frozen=True, kw_only=True):
     notes: list[str] = []
 
 
+class PairDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Mean force of the first accelerometer less that of the second, x, y, z, over the flight.
+
+    ``own`` is what it should be, as the pair itself has it without GPS; ``chi_square`` (three
+    degrees of freedom) and ``p_value`` are of the estimates against that.  The first is further
+    from the second than configured by ``distance_m``, body axes.
+    """
+
+    imus: list[int]
+    windows: int
+    in_force_m_s2: Numbers
+    estimated_m_s2: Numbers
+    own_m_s2: Numbers
+    own_sigma_m_s2: Numbers
+    chi_square: float | None
+    p_value: float | None
+    distance_m: Numbers
+    distance_sigma_m: Numbers
+
+
+class JointDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One accelerometer's six from all accelerometers together; nothing is set from them."""
+
+    imu: int
+    scale: Numbers
+    offset: Numbers
+    scale_sigma: Numbers
+    offset_sigma: Numbers
+
+
+class AccelerometersDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """The accelerometers of the vehicle compared.
+
+    ``common_cause`` has sentences: what all of them ask for alike is not their own.
+    """
+
+    pairs: list[PairDocument]
+    joint: list[JointDocument]
+    common_cause: list[str]
+
+
 class ReplayDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """``onboard replay --json`` (and, with ``truth`` and ``pushed``, ``onboard demo --json``)."""
+    """``onboard replay --json`` (and, with ``truth`` and ``pushed``, ``onboard demo --json``).
+
+    ``accelerometers`` is there where a recording has several that can be compared.
+    """
 
     recording: RecordingDocument
     imus: list[ImuDocument]
+    accelerometers: AccelerometersDocument | msgspec.UnsetType = msgspec.UNSET
     schema: str = REPLAY_SCHEMA
 
     def to_json(self) -> bytes:
@@ -209,10 +254,10 @@ def calibration_document(calibration: Calibration, autopilot: str) -> Calibratio
     named = zip(names, values, strict=True) if autopilot == "ardupilot" else ()
     return CalibrationDocument(
         status=calibration.status.value,
-        scale=_numbers(calibration.scale),
-        offset=_numbers(calibration.offset),
-        scale_sigma=_numbers(calibration.scale_sigma),
-        offset_sigma=_numbers(calibration.offset_sigma),
+        scale=numbers(calibration.scale),
+        offset=numbers(calibration.offset),
+        scale_sigma=numbers(calibration.scale_sigma),
+        offset_sigma=numbers(calibration.offset_sigma),
         parameters={name: float(value) for name, value in named if math.isfinite(value)},
         observable=[bool(flag) for flag in calibration.observable],
         known=list(seen(calibration)),
@@ -227,8 +272,8 @@ def worth_document(calibration: Calibration) -> WorthDocument | None:
     if found is None:
         return None
     return WorthDocument(
-        scale=_numbers(found.six.scale),
-        offset=_numbers(found.six.offset),
+        scale=numbers(found.six.scale),
+        offset=numbers(found.six.offset),
         directions=found.directions,
         change_m_s2=found.change,
         error_before_m_s2=found.error_before,
@@ -257,7 +302,7 @@ def imu_document(
         imu=c.imu,
         status=c.status.value,
         calibration=calibration_document(c, autopilot),
-        in_force=SixDocument(scale=_numbers(c.in_force_scale), offset=_numbers(c.in_force_offset)),
+        in_force=SixDocument(scale=numbers(c.in_force_scale), offset=numbers(c.in_force_offset)),
         parameters_known=c.parameters_known,
         timing=timing_document(c.timing),
         trusted_s=finite(c.trusted_s),
@@ -274,7 +319,7 @@ def imu_document(
         dead_reckoning=_dead_reckoning(c),
         coverage=CoverageDocument(
             percent=finite(c.coverage.percent),
-            per_parameter=dict(zip(SIX_NAMES, _numbers(c.coverage.per_parameter), strict=True)),
+            per_parameter=dict(zip(SIX_NAMES, numbers(c.coverage.per_parameter), strict=True)),
             weakest=c.coverage.weakest,
             advice=c.coverage.advice,
         ),
@@ -282,7 +327,7 @@ def imu_document(
         advice=msgspec.UNSET if advice is None else advice,
         truth=msgspec.UNSET
         if truth is None
-        else SixDocument(scale=_numbers(truth.scale), offset=_numbers(truth.offset)),
+        else SixDocument(scale=numbers(truth.scale), offset=numbers(truth.offset)),
         pushed=msgspec.UNSET if pushed is None else list(pushed),
     )
 
@@ -334,5 +379,6 @@ def _dead_reckoning(calibration: Calibration) -> DeadReckoningDocument | None:
     )
 
 
-def _numbers(values: Sequence[float]) -> Numbers:
+def numbers(values: Sequence[float]) -> Numbers:
+    """Numbers for a document; None where one is not finite."""
     return [finite(value) for value in values]

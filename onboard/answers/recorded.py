@@ -8,7 +8,7 @@ happened at a time happened in one of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from onboard.answers.chronicle import Chronicle
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.kernel import prefer_compiled
@@ -94,6 +95,18 @@ class Recorded:
         if imu not in self._answers:
             self._answers[imu] = self._asked(imu)
         return self._answers[imu]
+
+    def compared(self, calibrations: Sequence[Calibration]) -> Comparison | None:
+        """What the accelerometers say of each other; None if there is nothing to compare.
+
+        Args:
+            calibrations: of the accelerometers, as the answers have them.
+        """
+        flights = {imu: self.calibrator.engine(imu).batches for imu in self.imus}
+        try:
+            return compare(calibrations, flights)
+        except (ArithmeticError, ValueError):  # numbers that no model fits
+            return None
 
     def _asked(self, imu: int) -> Answer:
         plain = self.calibrator.calibration(imu)

@@ -11,6 +11,7 @@ import numpy as np
 
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
+from onboard.answers.compared import accelerometers_document, remarks
 from onboard.answers.document import (
     RecordingDocument,
     ReplayDocument,
@@ -18,6 +19,7 @@ from onboard.answers.document import (
     imu_document,
 )
 from onboard.answers.recorded import unanswered
+from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage, Status
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import parameter_names
@@ -64,6 +66,9 @@ class Estimator(Reader, Protocol):
     def answer(self, imu: int) -> Answer:
         """The answer for one of them."""
 
+    def compared(self, calibrations: Sequence[Calibration]) -> Comparison | None:
+        """What the accelerometers say of each other; None if there is nothing to compare."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
@@ -88,7 +93,8 @@ class Replay:
     """Recordings and what they gave.
 
     ``counts`` are samples fed, ``imu <n>`` and ``gps``; ``notes`` says what is left out;
-    ``parameters`` are the autopilot's as they were reported last.
+    ``parameters`` are the autopilot's as they were reported last; ``comparison`` is of the
+    accelerometers with each other, if there are several.
     """
 
     recordings: tuple[Recording, ...]
@@ -96,6 +102,7 @@ class Replay:
     counts: dict[str, int]
     notes: tuple[str, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
+    comparison: Comparison | None = None
 
     @property
     def calibrations(self) -> tuple[Calibration, ...]:
@@ -135,6 +142,7 @@ class Replay:
                 imu_document(c, self.autopilot, advice=advice_document(advice))
                 for c, advice in zip(self.calibrations, self.advice, strict=True)
             ],
+            accelerometers=accelerometers_document(self.comparison),
         )
 
 
@@ -165,8 +173,9 @@ def replay(
         estimator.answer(n) if n in answered else unanswered(vehicle.unanswered(n)) for n in wanted
     )
     quiet = () if imu is not None else sorted({*vehicle.imus} - {*wanted})
-    notes = tuple(map(vehicle.silence, quiet))
-    return Replay(source.recordings, answers, vehicle.counts, notes, estimator.parameters)
+    compared = estimator.compared([a.calibration for a in answers]) if len(answers) > 1 else None
+    notes = (*map(vehicle.silence, quiet), *remarks(compared))
+    return Replay(source.recordings, answers, vehicle.counts, notes, estimator.parameters, compared)
 
 
 def read(

@@ -14,6 +14,7 @@ from onboard.answers.advice import Advice
 from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
+from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
 from onboard.core.maths.accelerometer import parameter_names
 
@@ -36,6 +37,10 @@ def replay_report(result: Replay) -> Iterator[RenderableType]:
         yield _headline(calibration)
         yield _six(calibration, result.autopilot, advice)
         yield _sentences(_about(calibration, result.autopilot, advice))
+    if result.comparison is not None:
+        yield Text()
+        yield Text("Accelerometers compared: mean difference in flight, m/s^2")
+        yield _pairs(result.comparison)
 
 
 def _recordings(result: Replay) -> RenderableType:
@@ -83,6 +88,23 @@ def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Tab
             parameter,
             Text(observed, KNOWN_STYLE.get(observed, "yellow")),
         )
+    return table
+
+
+def _pairs(comparison: Comparison) -> Table:
+    """Each axis of each pair: what is left of the difference with each set of parameters."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for header in ("in force", "estimate", "itself", "sigma", "chi2 of 3"):
+        table.add_column(header, justify="right", no_wrap=True)
+    for pair in comparison.pairs:
+        rows = zip("xyz", pair.in_force, pair.estimated, pair.own, pair.own_sigma, strict=True)
+        for axis, *values in rows:
+            label = f"{pair.imus[0]} less {pair.imus[1]}, {axis}"
+            together = _fixed(pair.chi_square, 1) if axis == "x" else ""
+            table.add_row(
+                label, *(_fixed(v, 3) for v in values[:3]), _fixed(values[3], 4), together
+            )
     return table
 
 

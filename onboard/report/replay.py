@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from onboard.answers import words
 from onboard.answers.advice import Advice
 from onboard.answers.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
+from onboard.answers.compared import common_cause
 from onboard.answers.knowledge import ALL_SIX, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
+from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
@@ -48,6 +50,7 @@ def replay_html(result: Replay, chronicle: Chronicle) -> str:
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
     """
+    common = common_cause(result.comparison) if result.comparison is not None else ()
     statuses = [c.status for c in result.calibrations]
     worst = next((s for s in reversed(Status) if s in statuses), Status.INSUFFICIENT)
     done = sum(s is Status.CALIBRATED for s in statuses)
@@ -64,7 +67,7 @@ def replay_html(result: Replay, chronicle: Chronicle) -> str:
         headline=headline,
         damage=[f"{r.path.name}: {n}" for r in result.recordings for n in r.damage],
         notes=[f"{r.path.name}: {n}" for r in result.recordings for n in r.notes]
-        + list(result.notes),
+        + [n for n in result.notes if n not in common],
         trust_chart=_trust_chart(chronicle),
         trust=_trust(chronicle),
         imus=[
@@ -72,7 +75,47 @@ def replay_html(result: Replay, chronicle: Chronicle) -> str:
             for c, advice in zip(result.calibrations, result.advice, strict=True)
         ],
         free=f"{FREE_S:.0f}",
+        pairs=_pairs(result.comparison),
+        joint=_joint(result),
+        common=common,
     )
+
+
+def _pairs(comparison: Comparison | None) -> list[dict[str, Any]]:
+    """Rows of the table of pairs, one for each axis."""
+    out = []
+    for pair in () if comparison is None else comparison.pairs:
+        rows = zip("xyz", pair.in_force, pair.estimated, pair.own, pair.own_sigma, strict=True)
+        for axis, before, after, own, sigma in rows:
+            out.append(
+                {
+                    "label": f"{pair.imus[0]} less {pair.imus[1]}, {axis}",
+                    "before": words.fixed(before, 3),
+                    "after": words.fixed(after, 3),
+                    "own": words.fixed(own, 3),
+                    "sigma": words.fixed(sigma, 4),
+                    "chi_square": words.fixed(pair.chi_square, 1) if axis == "x" else "",
+                }
+            )
+    return out
+
+
+def _joint(result: Replay) -> list[dict[str, Any]]:
+    """Rows of the six of each accelerometer: by itself, and together with the others."""
+    if result.comparison is None:
+        return []
+    found, out = result.comparison.joint, []
+    for c in result.calibrations:
+        if c.imu not in found.imus:
+            continue
+        value, covariance = found.of(c.imu)
+        alone = zip(c.scale + c.offset, c.scale_sigma + c.offset_sigma, strict=True)
+        both = zip(value, np.sqrt(np.diag(covariance)), strict=True)
+        for name, (x, s), (y, u) in zip(SIX_NAMES, alone, both, strict=True):
+            digits = 4 if "scale" in name else 3
+            cells = [words.fixed(float(v), digits) for v in (x, s, y, u)]
+            out.append({"label": f"{c.imu}: {name}", "cells": cells})
+    return out
 
 
 def _imu(

@@ -9,13 +9,15 @@ from benchmarks.real.concealed import KINDS
 from benchmarks.real.flights import Fit, moving_force
 from benchmarks.real.levels import gate_table
 from benchmarks.real.outcomes import Said, compared, table
-from benchmarks.real.pairs import agreements, mean_force, run
+from benchmarks.real.pairs import agreements, mean_force, own_table, run
 from benchmarks.real.pairs import table as pair_table
 from benchmarks.real.repeats import average, scatter_of
 from benchmarks.real.whiteness import whiteness_of
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
-from onboard.core.maths.accelerometer import linear_of, parameters_jacobian
+from onboard.core.inputs.segments import Batch
+from onboard.core.maths.accelerometer import SixParameters, linear_of, parameters_jacobian
+from tests.core.estimate.two_accelerometers import Motion, batches
 
 RNG = np.random.default_rng(3)
 PRIOR_SIGMA = np.repeat([0.03, 0.5], 3)
@@ -205,4 +207,24 @@ def test_tables_fit_eighty_columns() -> None:
     lines += gate_table([replace(a, believed=4235, epochs=4234)]).splitlines()
     made = [drawn(1), drawn(2), drawn(3)]
     lines += pair_table(run(made), agreements(made)).splitlines()
+    lines += own_table(run(made)).splitlines()
     assert max(map(len, lines)) <= 80
+
+
+def test_a_pair_that_kept_its_flight_knows_its_difference_itself() -> None:
+    rng = np.random.default_rng(5)
+    motion = Motion(rng)
+    six = SixParameters((1.0, 1.0, 1.0), (0.1, 0.0, 0.0))
+    noise = 0.05 * rng.standard_normal((2, len(motion.t), 3))
+    first, second = (replace(drawn(imu), flight="b") for imu in (1, 2))
+    right = replace(first, estimate=six.as_vector(), batches=tuple(heard(motion, six, noise[0])))
+    other = replace(second, estimate=PRIOR, batches=tuple(heard(motion, SixParameters(), noise[1])))
+    (pair,) = run([right, other])
+    assert np.all(pair.own_sigma < 0.2 * pair.sigma)
+    assert pair.own_chi_square < 16.3
+    (apart,) = run([replace(right, estimate=PRIOR), other])
+    assert apart.own_chi_square > 16.3
+
+
+def heard(motion: Motion, six: SixParameters, noise: np.ndarray) -> list[Batch]:
+    return batches(motion, six, np.zeros(3), noise)

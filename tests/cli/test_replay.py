@@ -46,6 +46,9 @@ class Listener:
     def answer(self, imu: int) -> object:
         return unanswered(replace(CALIBRATED, imu=imu))
 
+    def compared(self, calibrations: object) -> None:
+        """It keeps no flight to compare."""
+
 
 def saved(tmp_path: Path, name: str, data: object) -> Path:
     path = tmp_path / name

@@ -111,3 +111,30 @@ WHOLE_SHARE: Final = 0.97
 """Share of a horizon that a window must reach [cost]."""
 FEWEST_INTERVALS: Final = 3
 """Intervals between fixes that a window must have [cost]."""
+
+# Pairs of accelerometers (shared_windows, wandering, relative, joint, common_cause).
+
+SHARED_WINDOW_S: Final = 1.0
+"""Windows in which two accelerometers are compared, s: longer than vibration, shorter than a
+manoeuvre [cost]."""
+FEWEST_IN_WINDOW: Final = 5
+"""Samples that each of them must have in it [cost]."""
+FEWEST_WINDOWS: Final = 20
+"""Fewer windows say nothing of the scatter [cost]."""
+UNKNOWN_PLACE_M: Final = 0.03
+"""Sigma of the distance between two accelerometers beyond what is configured, m, each axis
+[physics: half an autopilot]."""
+MISPLACED_M: Final = 0.5
+"""The same where the flight contradicts what is configured, m [physics: the size of a vehicle]."""
+PAIR_NOISE_FLOOR: Final = 1e-4
+"""Sigma of a window's difference, m/s^2, that no pair goes below: the step of a logged number
+[physics]."""
+OUTLYING: Final = 6.0
+"""Robust sigmas past which a window is no part of the flight: clipping, a bump [probability]."""
+CLUSTER_S: Final = 10.0
+"""Blocks whose scatter is compared with what windows promise, s [cost]."""
+LIKE_SIGMAS: Final = 3.0
+"""Sigmas past which two accelerometers differ, a common change is one, or a place is wrong
+[probability]."""
+LIKE_SHARE: Final = 0.25
+"""Share of a common change up to which the differences of the changes are details of it [tuned]."""
