@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
-from onboard.core.estimate.determined import determine, force_moments
+from onboard.core.estimate.determined import determine, flown_loads, force_moments
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import (
     APART_S,
@@ -61,18 +61,12 @@ def calibration_of(
     Raises:
         KeyError: no flight was processed.
     """
-    solution = _solved(engine, imu)
-    in_force = parameters.six(imu)
-    value = parameters_of(solution.theta)
-    covariance = six_covariance(solution)
+    solution, in_force = _solved(engine, imu), parameters.six(imu)
+    value, covariance = parameters_of(solution.theta), six_covariance(solution)
     sigma = np.sqrt(np.diag(covariance))
     seen = assess(six_information(solution), engine.settings.needs, kind)
-    held = {i: float(x) for i, x in enumerate(in_force.as_linear())}
-    blocks, model = engine.all_blocks, engine.model
-    without, with_it = held_out(blocks, model, held), held_out(blocks, model)
-    needs, (load_mean, load_square) = engine.settings.needs, engine.loads
-    long, short = _drifts(engine, in_force.as_linear(), solution.theta[:6])
-    before, after = (float("nan"),) * 2 if short is None else (float(x) for x in short.rms[:2])
+    residuals = _residuals(engine, solution, in_force.as_linear())
+    load_mean, load_square = flown_loads(engine.batches)
     made = Calibration(
         imu=imu,
         status=Status.INSUFFICIENT if finished else Status.COLLECTING,
@@ -89,25 +83,51 @@ def calibration_of(
         timing=timing_of(engine, solution),
         trusted_s=engine.trusted_s,
         rejected=_refused(rejected, engine.refused),
-        whitened_rms_before=fitted_rms(blocks, model, held),
-        whitened_rms_after=fitted_rms(blocks, model),
-        held_out_before=without,
-        held_out_after=with_it,
-        velocity_rms_before=before,
-        velocity_rms_after=after,
+        whitened_rms_before=residuals.fitted[0],
+        whitened_rms_after=residuals.fitted[1],
+        held_out_before=residuals.held_out[0],
+        held_out_after=residuals.held_out[1],
+        velocity_rms_before=residuals.velocity[0],
+        velocity_rms_after=residuals.velocity[1],
         coverage=seen.coverage,
-        prior_sigma=_six(needs.prior),
+        prior_sigma=_six(engine.settings.needs.prior),
         load_mean=load_mean,
         load_square=load_square,
-        predictive_gain=solution.rows
-        * (without**2 - with_it**2)
-        / 2.0
-        / solution.variance_inflation,
+        predictive_gain=residuals.predictive_gain,
         certificate=_certificate(engine),
-        dead_reckoning=_dead_reckoning(long),
+        dead_reckoning=residuals.dead_reckoning,
         temperature=_temperature(engine),
     )
     return _judged(made, engine, solution, parameters)
+
+
+@dataclass(frozen=True, slots=True)
+class _Residuals:
+    """What is left with the six in force, and with the estimate: pairs, RMS."""
+
+    fitted: tuple[float, float]
+    held_out: tuple[float, float]
+    velocity: tuple[float, float]
+    predictive_gain: float
+    dead_reckoning: DeadReckoning | None
+
+
+def _residuals(engine: Engine, solution: Solution, in_force: Array) -> _Residuals:
+    """Residuals of an engine's blocks; ``in_force`` (6,) is scale and beta."""
+    held = {i: float(x) for i, x in enumerate(in_force)}
+    blocks, model = engine.all_blocks, engine.model
+    without, with_it = held_out(blocks, model, held), held_out(blocks, model)
+    # Twice a difference of log-likelihoods is one of squares, as far as they are independent.
+    independent = solution.rows / solution.variance_inflation
+    long, short = _drifts(engine, in_force, solution.theta[:6])
+    nan = float("nan")
+    return _Residuals(
+        fitted=(fitted_rms(blocks, model, held), fitted_rms(blocks, model)),
+        held_out=(without, with_it),
+        velocity=(nan, nan) if short is None else (float(short.rms[0]), float(short.rms[1])),
+        predictive_gain=independent * (without**2 - with_it**2) / 2.0,
+        dead_reckoning=_dead_reckoning(long),
+    )
 
 
 def _six(values: Array) -> Six:

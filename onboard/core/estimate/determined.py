@@ -29,15 +29,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.estimate.limits import PRIOR_SHARE
 from onboard.core.estimate.result import Calibration, Six, SixFlags
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
-from onboard.core.maths.arrays import Array, vector3
+from onboard.core.maths.arrays import Array, Vector3, vector3
 from onboard.core.maths.chi_square import CHI_SQUARE_999
+from onboard.core.maths.earth import STANDARD_GRAVITY
+
+LEVEL_LOADS: Final = ((0.0, 0.0, -STANDARD_GRAVITY), (1.0, 1.0, STANDARD_GRAVITY**2 + 1.0))
+"""Mean and mean square of the force at level rest, with 1 m/s^2 of motion in each axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +119,20 @@ def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined
         contradiction=contradiction,
         contradiction_limit=CHI_SQUARE_999[held],
     )
+
+
+def flown_loads(batches: Sequence[Batch]) -> tuple[Vector3, Vector3]:
+    """Means of the raw samples of some flight and of their squares, sensor axes, m/s^2 (squared).
+
+    Those of level rest where nothing is kept (sums of before a restart).
+    """
+    raw = [b.segment.raw_s for b in batches]
+    if not raw:
+        return LEVEL_LOADS
+    count = sum(len(r) for r in raw)
+    first = np.sum([r.sum(axis=0) for r in raw], axis=0) / count
+    second = np.sum([np.einsum("ij,ij->j", r, r) for r in raw], axis=0) / count
+    return vector3(first), vector3(second)
 
 
 def force_moments(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -31,14 +31,10 @@ from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochState, PassResult
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
-from onboard.core.maths.arrays import Array, Vector3, vector3
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
-from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.linearisation import MOVING, Linearisation
 from onboard.core.model.regressors import Family, Model
-
-LEVEL_LOAD: Final = ((0.0, 0.0, -STANDARD_GRAVITY), (1.0, 1.0, STANDARD_GRAVITY**2 + 1.0))
-"""Mean and mean square of the force at rest, with 1 m/s^2 of motion in each axis."""
 
 
 class PassObserver(Protocol):
@@ -251,20 +247,6 @@ class Engine:
         """Trusted flight faster than :attr:`CalibratorSettings.brisk_speed`, s."""
         fast = self.settings.brisk_speed
         return self.left_brisk_s + sum(c.seconds_above(fast) for c in self.batches)
-
-    @property
-    def loads(self) -> tuple[Vector3, Vector3]:
-        """Means of the buffer's raw samples and of their squares, sensor axes: what was flown.
-
-        Those of level rest where nothing is kept (sums of before a restart).
-        """
-        raw = [b.segment.raw_s for b in self.batches]
-        if not raw:
-            return LEVEL_LOAD
-        count = sum(len(r) for r in raw)
-        first = np.sum([r.sum(axis=0) for r in raw], axis=0) / count
-        second = np.sum([np.einsum("ij,ij->j", r, r) for r in raw], axis=0) / count
-        return vector3(first), vector3(second)
 
     @property
     def moving(self) -> bool:

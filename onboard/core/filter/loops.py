@@ -177,10 +177,9 @@ def whiten(
     Returns:
         0, or the first (from 1) whose covariance is not positive.
     """
-    members, _, columns = carried.shape
-    m1, r = z.shape[1], len(number)
+    m1, r, columns = z.shape[1], len(number), carried.shape[2]
     L = np.empty((r, r))
-    for b in range(members):
+    for b in range(len(carried)):
         log_det[b] = 0.0
         for a in range(r):
             i = number[a]
