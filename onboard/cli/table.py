@@ -66,8 +66,11 @@ def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Tab
     table.add_column("", no_wrap=True)
     for header in ("in force", "estimate", "sigma"):
         table.add_column(header, justify="right", no_wrap=True)
-    table.add_column("set" if advice is not None and advice.settable else "parameter", no_wrap=True)
-    table.add_column("observed", no_wrap=True)
+    to_set = {} if advice is None else advice.to_set()
+    if to_set:
+        table.add_column("set to", justify="right", no_wrap=True)
+    table.add_column("parameter", no_wrap=True)
+    table.add_column("known", no_wrap=True)
     names = parameter_names(c.imu).six if autopilot != "px4" else (UNKNOWN,) * 6
     rows = zip(
         SIX_NAMES,
@@ -85,6 +88,7 @@ def _six(calibration: Calibration, autopilot: str, advice: Advice | None) -> Tab
             _fixed(before, digits) if c.parameters_known else UNKNOWN,
             _fixed(value, digits),
             _fixed(sigma, digits),
+            *([_fixed(to_set[parameter], digits) if parameter in to_set else ""] if to_set else ()),
             parameter,
             Text(observed, KNOWN_STYLE.get(observed, "yellow")),
         )

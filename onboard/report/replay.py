@@ -14,7 +14,7 @@ from onboard.answers import words
 from onboard.answers.advice import Advice
 from onboard.answers.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
 from onboard.answers.compared import common_cause
-from onboard.answers.knowledge import ALL_SIX, knowledge, seen
+from onboard.answers.knowledge import ALL_SIX, determined, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
 from onboard.core.estimate.comparison import Comparison
@@ -185,7 +185,7 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
         yield (
             "Set the parameters below."
             if whole
-            else "Set the parameters below that are named: together, for they belong together."
+            else "Set the parameters in bold, all of them: they belong together."
         )
     else:
         yield about_six(advice)
@@ -201,11 +201,16 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
 def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:
     """The table of parameters: before, after, how well known."""
     names = parameter_names(c.imu).six if autopilot == "ardupilot" else SIX_NAMES
+    found = determined(c)
+    values: tuple[float, ...] = c.scale + c.offset
+    if found is not None:  # what is free is set to what belongs to the rest
+        own = found.six.scale + found.six.offset
+        values = tuple(o if f else v for o, f, v in zip(own, found.free, values, strict=True))
     rows = zip(
         SIX_NAMES,
         names,
         c.in_force_scale + c.in_force_offset,
-        c.scale + c.offset,
+        values,
         c.scale_sigma + c.offset_sigma,
         seen(c),
         strict=True,
