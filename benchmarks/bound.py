@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, STAMP_JITTER_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
@@ -117,8 +117,7 @@ def _updated(
     M[3:, PSI] = M[3:, ATT] = np.eye(3)
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
-    white = q.attitude_white**2 + STAMP_JITTER_S**2 * float(path.w_b[row] @ path.w_b[row])
-    noise = np.array([q.velocity**2] * 2 + [q.height**2] + [white] * 3)
+    noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude**2] * 3)
     HP = M @ P
     gain = np.linalg.solve(HP @ M.T + np.diag(noise), HP).T
     out: Array = P - gain @ HP

@@ -41,7 +41,6 @@ LEVELS = NoiseLevels(
     tilt_walk=4e-4,
     bias_walk=4e-5,
     attitude=0.015,
-    attitude_white=0.005,
     heading=0.03,
 )
 """A common receiver and common MEMS; none of the values the search for levels begins with."""
@@ -183,7 +182,7 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
     """White noise is that of the epochs: samples between two share that of the nearest."""
     t, epochs = path.t[path.imu], path.t[path.epochs]
     nearest = np.clip(np.round((t - START_S) * GPS_HZ), 0, len(epochs) - 1).astype(int)
-    white = q.attitude_white * rng.standard_normal((len(epochs), 3))[nearest]
+    white = q.attitude * rng.standard_normal((len(epochs), 3))[nearest]
     slow = _gauss_markov(rng, len(t), 1.0 / IMU_HZ, ATTITUDE_TIME_S)
     slow *= (q.attitude, q.attitude, q.heading)
     body = np.array([*TILT_OFFSET * rng.standard_normal(2), 0.0])

@@ -87,7 +87,6 @@ class Epoch:
             reported one is known to differ by (the receiver's averaging, the lever arm).
         ned: (7, m + 1) what it has in NED: in column 0 velocity and height.
         along_velocity: (m,) regressors of the position as multiples of the velocity, s per unit.
-        noise: (MEASURED,) variance of each measured number beside its level, its unit squared.
         trusted: whether the receiver is to be believed.
     """
 
@@ -99,7 +98,6 @@ class Epoch:
     body: Array
     ned: Array
     along_velocity: Array
-    noise: Array
     trusted: bool
 
 

@@ -70,10 +70,6 @@ ATTITUDE_TIME_S: Final = 10.0
 """Of the recorded attitude: an EKF that weighs GPS against gyroscopes forgets a tilt error in some
 tens of seconds [tuned]."""
 
-STAMP_JITTER_S: Final = 8e-4
-"""s; by how much the stamp of a recorded attitude is off beside a constant delay: milliseconds are
-whole (0.29) and the loop has 2.5 ms (0.72), both uniform [physics]."""
-
 # The search for noise levels (noise).
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
@@ -87,7 +83,6 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "bias_walk": (1e-5, 3e-4),
     "attitude": (0.01, 0.2),
     "heading": (0.015, 0.5),
-    "attitude_white": (1e-3, 0.03),
 }
 """Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 

@@ -36,8 +36,6 @@ class NoiseLevels:
         attitude: Gauss-Markov error of the recorded tilt (correlation time
             :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
         heading: the same of the recorded heading, rad.
-        attitude_white: white noise of the recorded attitude, each axis, rad; beside it the rate
-            times :data:`~onboard.core.filter.limits.STAMP_JITTER_S`.
     """
 
     velocity: float = 0.05
@@ -50,7 +48,6 @@ class NoiseLevels:
     bias_walk: float = 3e-5
     attitude: float = 0.01
     heading: float = 0.03
-    attitude_white: float = 4e-3
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -69,7 +66,6 @@ ESTIMATED = (
     "bias_walk",
     "attitude",
     "heading",
-    "attitude_white",
 )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import Epoch, Step, steps
-from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S
+from onboard.core.filter.limits import LONGEST_STEP_S
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -138,9 +138,6 @@ def _epochs(
     ned[:, V, 1:] = c.velocity_ned
     ned[:, H, 1:] = -c.position_ned[:, 2]
     ned[:, PSI, 1:] = c.attitude_ned
-    noise = np.zeros((n, MEASURED))
-    # A stamp that is off is an attitude that is off, the more the faster the vehicle turns.
-    noise[:, PSI] = (STAMP_JITTER_S * around.now.w_b) ** 2 @ np.ones((3, 3))
     return [
         Epoch(
             float(around.now.t[e]),
@@ -151,7 +148,6 @@ def _epochs(
             body[e],
             ned[e],
             c.along_velocity[e],
-            noise[e],
             bool(trusted[e]),
         )
         for e in range(len(fixes))

@@ -202,9 +202,8 @@ class WhiteningFilter:
         refused: list[str] = []
         off = np.zeros(0)
         z = self._measured(epoch, theta)
-        noise = self._variances.reading + epoch.noise
         while kinds:
-            made = self._kernel.whiten(self._carried, z, reading(kinds), noise)
+            made = self._kernel.whiten(self._carried, z, reading(kinds), self._variances.reading)
             refusal = None
             if self._gates is not None:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]

@@ -153,7 +153,7 @@ def test_what_an_epoch_measures_is_the_same_of_both(seed, m):
     ned = measurement(rng, m)
     ned[2, 0] = np.nan  # no vertical speed
     body, along = rng.normal(size=(9, m + 1)), rng.normal(size=m)
-    epoch = Epoch(0.0, ned[:3, 0], 0.0, 0.0, None, body, ned, along, np.zeros(7), trusted=True)
+    epoch = Epoch(0.0, ned[:3, 0], 0.0, 0.0, None, body, ned, along, trusted=True)
     R, turn = turned(rng), rng.normal(size=3)
     one, two = (who.measured(R, epoch, 1.7, turn) for who in (NUMPY, compiled.COMPILED))
     assert np.isnan(one[2, 0])
