@@ -2,60 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.real.concealed_kind import About, Array, Kind
+from benchmarks.real.concealed_kind import About, Array, Kind, Lay
 from onboard.core.inputs.samples import AttitudeSample, Sample
+
+
+def _each(change: Callable[[AttitudeSample], AttitudeSample]) -> Lay:
+    """Lay a change into every recorded attitude."""
+
+    def lay(samples: Sequence[Sample], _: About) -> Iterator[Sample]:
+        return (change(s) if isinstance(s, AttitudeSample) else s for s in samples)
+
+    return lay
 
 
 def heading(by: float) -> Kind:
     """The recorded yaw is ``by`` rad too large."""
-
-    def lay(samples: Sequence[Sample], _: About) -> Iterator[Sample]:
-        return (
-            replace(s, yaw=_wrapped(s.yaw + by)) if isinstance(s, AttitudeSample) else s
-            for s in samples
-        )
-
     return Kind(
         f"heading {np.degrees(by):+.0f} deg",
         ("heading_error",),
-        lay,
+        _each(lambda s: replace(s, yaw=_wrapped(s.yaw + by))),
         lambda before, _: {"heading": before["heading"] + by},
     )
 
 
 def tilted(by: float) -> Kind:
     """The recorded attitude is turned about the body's x axis by ``by`` rad too much."""
-
-    def lay(samples: Sequence[Sample], _: About) -> Iterator[Sample]:
-        for s in samples:
-            if isinstance(s, AttitudeSample):
-                yield _turned_attitude(s, about_x(by))
-            else:
-                yield s
-
     return Kind(
         f"attitude tilted {np.degrees(by):+.0f} deg",
         ("mount_tilt",),
-        lay,
+        _each(lambda s: _turned_attitude(s, about_x(by))),
         lambda before, _: {"tilt_roll": before["tilt_roll"] + by},
     )
 
 
 def attitude_late(by: float) -> Kind:
     """The recorded attitude is stamped ``by`` seconds later."""
-
-    def lay(samples: Sequence[Sample], _: About) -> Iterator[Sample]:
-        return (replace(s, t=s.t + by) if isinstance(s, AttitudeSample) else s for s in samples)
-
     return Kind(
         f"attitude later {1e3 * by:.0f} ms",
         ("imu_delay",),
-        lay,
+        _each(lambda s: replace(s, t=s.t + by)),
         lambda before, _: {"imu_delay": before["imu_delay"] + by},
     )
 

@@ -21,8 +21,10 @@ from onboard.core.estimate.joint import Joint
 from onboard.core.maths.arrays import vector3
 
 FAR_M = 0.05
-"""A sensor that is further from its configured place than this is worth a word, m."""
+"""A sensor that is further from its configured place than this is worth a word, m [physics: twice
+what a person with a ruler is off]."""
 FAR_SIGMAS = 5.0
+"""And by so many sigmas [probability: 6e-7 an axis]."""
 
 
 def accelerometers_document(

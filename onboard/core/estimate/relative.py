@@ -37,7 +37,7 @@ from onboard.core.estimate.wandering import inflation as inflation_of
 from onboard.core.maths.arrays import Array
 
 ROUNDS = 4
-"""The agreed force moves with the estimate: it stands still after two or three rounds."""
+"""The agreed force moves with the estimate: it stands still after two or three rounds [cost]."""
 
 
 @dataclass(frozen=True, slots=True)

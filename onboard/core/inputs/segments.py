@@ -18,7 +18,8 @@ from onboard.core.maths.frames import (
 from onboard.core.maths.interpolation import Hermite
 
 PARTS = 6
-"""Into which the time from one attitude sample to the next is cut: 0.1 s at the longest."""
+"""Into which the time from one attitude sample to the next is cut: 0.1 s at the longest, within
+which no vehicle cones by a milliradian [physics]."""
 Signal: TypeAlias = tuple[Array, Array]
 """A slow signal: times (j,), s, and values (j,) or (j, k)."""
 SLOW_SIGNALS = {

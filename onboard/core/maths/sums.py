@@ -24,7 +24,7 @@ from onboard.errors import StateError
 _MAGIC = b"OBS1"
 _HEAD = struct.Struct("<4sII")
 _TOGETHER = 128
-"""Whitened innovations that are multiplied at once."""
+"""Whitened innovations that are multiplied at once [cost: more saves no time]."""
 
 
 @dataclass(slots=True)

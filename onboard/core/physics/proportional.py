@@ -42,4 +42,4 @@ class Proportional(Effect, abstract=True):
 
     def amount(self, f_b: Array) -> Array:
         """What one unit of each unknown takes off a force (..., 3): (..., 3, k)."""
-        raise NotImplementedError
+        raise NotImplementedError  # abstract: every effect in proportion states its own
