@@ -79,6 +79,24 @@ class AutopilotRebooted:
 
 
 @dataclass(frozen=True, slots=True)
+class RivalHeard:
+    """Somebody else, or another way, sent the vehicle's HEARTBEAT.
+
+    ``same_clock``: its time stamps are those of the vehicle, so that it is another way to it.
+    """
+
+    armed: bool
+    same_clock: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TwinHeard:
+    """Another service speaks under our own name; ``earlier``: it was there before us."""
+
+    earlier: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ConnectionChanged:
     """A connection changed its state, and why where there is a reason."""
 
@@ -108,6 +126,8 @@ LinkEvent: TypeAlias = (
     | AutopilotSilent
     | AutopilotReturned
     | AutopilotRebooted
+    | RivalHeard
+    | TwinHeard
     | ConnectionChanged
     | ConnectionTrouble
     | ConnectionRestored

@@ -27,6 +27,16 @@ WRAP_S = 4294967.296
 """``time_boot_ms`` is a 32-bit count of milliseconds: it starts again after 49.7 days."""
 
 
+def boot_seconds(message: Message) -> float | None:
+    """The boot time that a stamped message tells as it stands, s; None for Unix time or nothing."""
+    number = message.get_msgId()
+    if number in _MS or number == _SYSTEM_TIME:
+        return float(message.time_boot_ms) * 1e-3
+    if number in _US and message.time_usec < limits.UNIX_FROM_US:
+        return float(message.time_usec) * 1e-6
+    return None
+
+
 class BootClock:
     """Turns message stamps into seconds since boot and notices reboots.
 
@@ -41,6 +51,11 @@ class BootClock:
         self.reboots = 0
         self._suspect: float | None = None
         self._unix_offset: float | None = None
+        self._paired = False
+
+    def begin_anew(self) -> None:
+        """It is another autopilot from here on."""
+        self.latest = self._suspect = self._unix_offset = None
         self._paired = False
 
     def observe(self, message: Message) -> bool:

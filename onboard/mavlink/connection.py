@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import Enum
 
 from onboard.mavlink import limits
-from onboard.mavlink.codec import Codec
+from onboard.mavlink.codec import Codec, CodecStatistics, Frame
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.peers import Address, Peer, Peers
 from onboard.mavlink.transport import Transport, open_transport
 from onboard.outage import Outage, Over
 
@@ -64,8 +65,8 @@ class Connection:
 
     Args:
         endpoint: where to.
-        codec: framing for this connection.
-        receive: called with (connection, bytes).
+        make_codec: framing, a new one for each peer.
+        receive: called with (connection, peer, frames).
         changed: called with (connection, reason) after each change of state.
         tell: called with (connection, news) when trouble begins or has another reason (that
             reason), and when it is over.
@@ -77,9 +78,9 @@ class Connection:
     def __init__(
         self,
         endpoint: Endpoint,
-        codec: Codec,
+        make_codec: Callable[[], Codec],
         *,
-        receive: Callable[[Connection, bytes], None],
+        receive: Callable[[Connection, Peer, list[Frame]], None],
         changed: Callable[[Connection, str], None],
         tell: Callable[[Connection, str | Over], None],
         clock: Callable[[], float],
@@ -87,7 +88,9 @@ class Connection:
         linger: float = limits.LINGER_S,
     ) -> None:
         self.endpoint = endpoint
-        self.codec = codec
+        self.codec = make_codec()
+        """Packs what is sent; what comes is opened by the peers'."""
+        self.peers = Peers(make_codec, addressed=endpoint.kind is EndpointKind.UDP_IN)
         self.state = ConnectionState.IDLE
         self.last_error = ""
         self.connects = 0
@@ -114,12 +117,24 @@ class Connection:
         """Frames that could not be sent: no connection, no peer yet, or a stalled line."""
         return self._dropped + (self._transport.dropped if self._transport is not None else 0)
 
-    def write(self, data: bytes) -> None:
-        """Send if the connection is up; count the loss if not."""
+    def statistics(self) -> Iterator[CodecStatistics]:
+        """What was counted, of what was sent and of each peer."""
+        yield self.codec.statistics
+        yield from self.peers.statistics()
+
+    def write(self, data: bytes, to: Address | None = None) -> None:
+        """Send if the connection is up; count the loss if not.
+
+        Args:
+            data: a frame.
+            to: one address of a listening socket; None: everybody there who speaks MAVLink.
+        """
         if self._transport is None:
             self._dropped += 1
+        elif to is not None:
+            self._transport.write(data, (to,))
         else:
-            self._transport.write(data)
+            self._transport.write(data, self.peers.answered(self._clock()))
 
     def check(self, now: float) -> None:
         """See whether trouble is over; break a TCP or serial line that is silent for too long."""
@@ -168,6 +183,7 @@ class Connection:
         except OSError as error:
             return error.strerror or str(error)
         self.connects += 1
+        self.peers.begin_anew()
         since = self.last_received = self._clock()
         self._enter(ConnectionState.UP, "")
         if not self._is_stream:
@@ -195,11 +211,13 @@ class Connection:
         if news:
             self._tell(self, reason)
 
-    def _received(self, data: bytes) -> None:
-        self.last_received = self._clock()
+    def _received(self, data: bytes, address: Address | None = None) -> None:
+        now = self.last_received = self._clock()
         # A line that opens and stays dumb is no better than one that does not open.
-        self.outage.works(self.last_received)
-        self._receive(self, data)
+        self.outage.works(now)
+        peer, frames = self.peers.feed(address, data, now)
+        if frames:
+            self._receive(self, peer, frames)
 
     def _lost(self, reason: str) -> None:
         if self._broken is not None and not self._broken.done():

@@ -19,13 +19,24 @@ CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536
 """bytes; no datagram is longer [protocol: UDP]."""
-DATAGRAMS_PER_WAKE: Final = 128
-"""So many are read before the loop has its turn: above all that comes within a linger [data]."""
+DATAGRAMS_PER_WAKE: Final = 1024
+"""So many are read before the loop has its turn, 3 us each; a socket holds about 300 small ones, so
+that a flood is drained and not left to push the vehicle's out [cost]."""
+BUSY_DATAGRAMS: Final = 128
+"""More than that at once, and the socket is read again without the pause of a linger [data]."""
 WRITE_LIMIT: Final = 65536
 """bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast: 11 s of a line
 of 57600 baud [tuned]."""
 PEER_LIMIT: Final = 8
 """UDP peers that are answered: a router, a few ground stations; bounds what we send [tuned]."""
+PEERS_KNOWN: Final = 32
+"""UDP addresses that are listened to at a time; beyond that merit decides [cost: 5 kB each]."""
+NEWCOMERS_HZ: Final = 100.0
+"""1/s; new addresses that are looked at while the table is full: each costs 40 us [cost]."""
+PEER_BYTES_S: Final = 100e3
+"""bytes/s of one UDP address that is not the vehicle's: ten times what a fast link brings [cost]."""
+VEHICLE_BYTES_S: Final = 2e6
+"""bytes/s of the vehicle's address: more than a core can take in [cost]."""
 PEER_SILENCE_S: Final = 30.0
 """s; a UDP peer that sent nothing for so long has gone: 30 HEARTBEATs [tuned]."""
 DEFAULT_BAUD: Final = 57600
@@ -59,6 +70,20 @@ HEARTBEAT_TIMEOUT_S: Final = 5.0
 FAILOVER_S: Final = 1.5
 """s of silence on the endpoint in use after which another one that hears the autopilot takes over:
 one HEARTBEAT missed [data]."""
+PROOF_S: Final = 5.0
+"""s that somebody who calls himself an autopilot has to show time stamps that advance: its rates are
+asked for at once, and an answer takes a second or two on a poor link [tuned]."""
+PROOF_STAMPS: Final = 3
+"""Time stamps that advance make a stream; a HEARTBEAT alone is easily said [tuned]."""
+CLOCK_AGREES_S: Final = 2.0
+"""s between the boot clocks of two ways to one vehicle: the longest delay of a link [data]."""
+CLAIMS_KNOWN: Final = 32
+"""Claims to be an autopilot that are followed at a time [cost]."""
+SOURCES_KNOWN: Final = 256
+"""Senders (system and component) whose way is remembered [cost]."""
+TWIN_S: Final = 10.0
+"""s; another service under our own name that is silent for so long has gone: ten HEARTBEATs
+[data]."""
 EARLY_SOURCES: Final = 8
 """Senders whose parameters are kept until one of them turns out to be the autopilot [tuned]."""
 EARLY_PARAMETERS: Final = 3000

@@ -6,45 +6,55 @@ import asyncio
 import random
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from onboard.errors import LinkError
-from onboard.mavlink import limits
+from onboard.mavlink import framing, limits
 from onboard.mavlink.audience import Audience, EventHandler, Handler
 from onboard.mavlink.autopilot import (
     Autopilot,
     AutopilotFound,
     AutopilotRebooted,
+    AutopilotReturned,
     AutopilotState,
     ConnectionChanged,
     ConnectionRestored,
     ConnectionTrouble,
     Participant,
+    RivalHeard,
 )
-from onboard.mavlink.bootclock import STAMPED, BootClock
+from onboard.mavlink.bootclock import STAMPED, BootClock, boot_seconds
+from onboard.mavlink.claims import Source, Way
 from onboard.mavlink.codec import Codec, Frame
 from onboard.mavlink.connection import Connection
-from onboard.mavlink.dialect import Message, mavlink
+from onboard.mavlink.decode import is_autopilot
+from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
 from onboard.mavlink.endpoint import Endpoint
-from onboard.mavlink.presence import Presence
+from onboard.mavlink.peers import Address, Merit, Peer
+from onboard.mavlink.presence import Presence, Whose
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.routes import Routes
 from onboard.mavlink.signing import Signing
+from onboard.mavlink.twins import Twins
 from onboard.outage import Over
 
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+_STAMPED = frozenset(MESSAGE_IDS[name] for name in STAMPED)
 
 
 class Link:
     """MAVLink over any number of endpoints.
 
     Handlers run in the loop's reader callback, so they must be quick and must not block; an
-    exception in one ends :meth:`run` with it.  Where the autopilot is heard on several
-    endpoints, one is in use and the others stand by.
+    exception in one ends :meth:`run` with it.  The vehicle is one source on one way
+    (:mod:`onboard.mavlink.presence`): what comes from there is handed on, what claims to be it and
+    comes from elsewhere is counted; what is addressed to it goes there and nowhere else.
 
     Args:
         endpoints: where to listen and connect.
         system: the vehicle's system id if only that one is to be used; None takes the first
-            autopilot heard, and its system id becomes ours.
+            that proves to be an autopilot, and its system id becomes ours.
+        component: its component id, likewise.
         signing: sign and verify; None for plain MAVLink 2.
         recorder: gets every frame handed on and every frame sent.
         clock: monotonic time, s; what handlers and participants get as ``now``.
@@ -58,6 +68,7 @@ class Link:
         endpoints: Sequence[Endpoint],
         *,
         system: int | None = None,
+        component: int | None = None,
         signing: Signing | None = None,
         recorder: Recorder | None = None,
         clock: Callable[[], float] = time.monotonic,
@@ -66,19 +77,23 @@ class Link:
         linger: float = limits.LINGER_S,
     ) -> None:
         self.boot_clock = BootClock()
-        self.routes = Routes(system or 1)
-        self._presence = Presence(system)
+        self.presence = Presence(system, component)
+        self.twins = Twins(clock)
+        self.echoed = 0
+        """Our own packets that came back."""
+        self._routes = Routes()
+        self._signing = signing
         self._recorder = recorder
         self._clock = clock
         self._wall_clock = wall_clock
-        self._audience = Audience((_HEARTBEAT,))
+        self._audience = Audience((_HEARTBEAT, *_STAMPED))
+        self._own: Source = (system or 1, COMPONENT)
         jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
-        wanted = self._audience.wanted
         self.connections = tuple(
             Connection(
                 endpoint,
-                Codec(system=system or 1, wanted=wanted, signing=signing, link_id=number),
-                receive=self._received,
+                partial(self._make_codec, number),
+                receive=partial(self._received, number),
                 changed=self._connection_changed,
                 tell=self._connection_told,
                 clock=clock,
@@ -97,12 +112,12 @@ class Link:
     @property
     def autopilot(self) -> Autopilot | None:
         """Who was found; None before its first HEARTBEAT."""
-        return self._presence.autopilot
+        return self.presence.autopilot
 
     @property
     def state(self) -> AutopilotState:
         """Whether it is heard now."""
-        return self._presence.state
+        return self.presence.state
 
     # Who gets what
 
@@ -114,7 +129,8 @@ class Link:
         """
         self._audience.add(handler, names)
         for connection in self.connections:
-            connection.codec.wanted = self._audience.wanted
+            for peer in connection.peers:
+                peer.codec.wanted = self._audience.wanted
 
     def subscribe_events(self, handler: EventHandler) -> None:
         """Have ``handler(now, event)`` called for what happens to autopilot and connections."""
@@ -188,57 +204,113 @@ class Link:
 
     def send(self, message: Message) -> None:
         """Send a message under our ids: to where its target was heard, else everywhere."""
-        route = self.routes.to(message)
-        chosen = self.connections if route is None else (route,)
         recorder = self._recorder
-        for connection in chosen:
+        for connection, address in self._ways_to(message):
             if connection.is_up:
                 frame = connection.codec.encode(message)
-                connection.write(frame)
+                connection.write(frame, address)
                 if recorder is not None:
                     recorder.write(self._wall_clock(), frame)
                     recorder = None
 
+    def _ways_to(self, message: Message) -> Iterable[tuple[Connection, Address | None]]:
+        """Where its target was heard; every endpoint where that is not known or is down."""
+        way = self._routes.to(message, self.presence.source, self.presence.way)
+        if way is not None and self.connections[way[0]].is_up:
+            return ((self.connections[way[0]], way[1]),)
+        return ((connection, None) for connection in self.connections)
+
     # Receiving
 
-    def _received(self, connection: Connection, data: bytes) -> None:
+    def _make_codec(self, number: int) -> Codec:
+        signing = None if self._signing is None else self._signing.of_a_way()
+        system, wanted = self._own[0], self._audience.wanted
+        return Codec(system=system, wanted=wanted, signing=signing, link_id=number)
+
+    def _received(
+        self, number: int, _connection: Connection, peer: Peer, frames: list[Frame]
+    ) -> None:
         try:
-            self._hand_on(connection, connection.codec.feed(data))
+            self._hand_on((number, peer.address), peer, frames)
         except Exception as error:  # noqa: BLE001 - handlers are others' code: their failure must end run(), not vanish in the loop
             if self._stopped is not None and not self._stopped.done():
                 self._stopped.set_exception(error)
 
-    def _hand_on(self, connection: Connection, frames: list[Frame]) -> None:
+    def _hand_on(self, way: Way, peer: Peer, frames: list[Frame]) -> None:
         now = self._clock()
         wall = self._wall_clock()
         recorder = self._recorder
         for frame in frames:
-            source = (frame.system, frame.component)
-            if not self.routes.accepts(source, connection, now):
+            if not self._is_believed((frame.system, frame.component), way, peer, frame, now):
                 continue
             if recorder is not None:
                 recorder.write(wall, frame.raw)
-            if frame.message is None:
-                continue
-            if frame.message_id == _HEARTBEAT:
-                self._heartbeat(connection, source, frame.message, now)
-            self._audience.hear(now, frame.message_id, frame.message)
+            if frame.message is not None:
+                self._audience.hear(now, frame.message_id, frame.message)
 
-    def _heartbeat(
-        self, connection: Connection, source: tuple[int, int], message: Message, now: float
+    def _is_believed(
+        self, source: Source, way: Way, peer: Peer, frame: Frame, now: float
+    ) -> bool:
+        """Take note of a packet; whether it is to be handed on."""
+        if source == self._own:
+            self.echoed += 1
+            self._heard_own_name(frame, now)
+            return False
+        if not self._counts(frame):
+            # Nobody can vouch for it: it is no sign of life of the vehicle, and moves nothing.
+            return self._signing is None and source != self.presence.source
+        message = frame.message
+        boot = None
+        if message is not None and frame.message_id in _STAMPED:
+            boot = boot_seconds(message)
+        heard = self.presence.hear(source, way, message, boot, now)
+        if heard.whose is Whose.VEHICLE:
+            peer.rise(Merit.VEHICLE, now)
+        for event in heard.events:
+            self._tell(event, peer, now)
+        if heard.whose in {Whose.STANDBY, Whose.FOREIGN}:
+            return False
+        if self._signing is not None:
+            self._signing.act_on(frame.raw)
+        if heard.whose is Whose.SOMEBODY:
+            if message is not None and is_autopilot(message):
+                peer.rise(Merit.CLAIMS, now)
+            self._routes.note(source, way)
+        return True
+
+    def _counts(self, frame: Frame) -> bool:
+        """Whether a packet is of a kind that we know and, where that is demanded, signed."""
+        if frame.message_id not in mavlink.mavlink_map:
+            return False
+        return self._signing is None or framing.header(frame.raw, 0).signed
+
+    def _tell(
+        self, event: AutopilotFound | AutopilotReturned | RivalHeard, peer: Peer, now: float
     ) -> None:
-        event = self._presence.heartbeat(source, message, now)
+        """Somebody was found, is back, or is contradicted."""
         if isinstance(event, AutopilotFound):
-            self.routes.settle(source, connection, now)
-            for other in self.connections:
-                other.codec.system = source[0]
+            for other in (p for c in self.connections for p in c.peers if p is not peer):
+                other.merit = min(other.merit, Merit.CLAIMS)
+            self._own = (event.autopilot.system, COMPONENT)
+            for connection in self.connections:
+                connection.codec.system = event.autopilot.system
+            if self._found.is_set():
+                self.boot_clock.begin_anew()
             self._found.set()
-        if event is not None:
-            self._audience.hear_of(now, event)
+        self._audience.hear_of(now, event)
+        if not isinstance(event, RivalHeard):
             self._restart_participants(now)
 
+    def _heard_own_name(self, frame: Frame, now: float) -> None:
+        """Somebody sends under our own ids: a router that gives us back, or a second service."""
+        if frame.message is None or frame.message_id != _HEARTBEAT or not self._counts(frame):
+            return
+        event = self.twins.hear(int(frame.message.custom_mode), now)
+        if event is not None:
+            self._audience.hear_of(now, event)
+
     def _watch_boot_clock(self, now: float, message: Message) -> None:
-        if (message.get_srcSystem(), message.get_srcComponent()) != self.routes.autopilot:
+        if (message.get_srcSystem(), message.get_srcComponent()) != self.presence.source:
             return
         if self.boot_clock.observe(message):
             self._audience.hear_of(now, AutopilotRebooted(self.boot_clock.reboots))
@@ -254,10 +326,10 @@ class Link:
     def _tick(self, now: float) -> None:
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
-            self.send(_our_heartbeat())  # over UDP it also tells the peer where we are
+            self.send(_our_heartbeat(self.twins.signature(now)))  # over UDP it also tells the peer where we are
         for connection in self.connections:
             connection.check(now)
-        silent = self._presence.check(now)
+        silent = self.presence.check(now)
         if silent is not None:
             self._audience.hear_of(now, silent)
         if self.state is AutopilotState.PRESENT:
@@ -266,9 +338,9 @@ class Link:
                     self.send(message)
 
     def _restart_participants(self, now: float) -> None:
-        if self.routes.autopilot is not None:
+        if self.presence.source is not None:
             for participant in self._participants:
-                participant.start(*self.routes.autopilot, now)
+                participant.start(*self.presence.source, now)
 
     def _connection_changed(self, connection: Connection, reason: str) -> None:
         if connection.is_up:
@@ -285,12 +357,12 @@ class Link:
             self._audience.hear_of(now, ConnectionTrouble(endpoint, news))
 
 
-def _our_heartbeat() -> Message:
+def _our_heartbeat(signature: int) -> Message:
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
         mavlink.MAV_AUTOPILOT_INVALID,
         0,
-        0,
+        signature,
         mavlink.MAV_STATE_ACTIVE,
         3,
     )

@@ -1,6 +1,23 @@
-"""Whether the autopilot is there: found by its first HEARTBEAT, silent, and back again."""
+"""Who the vehicle is: one source on one way, found, proven, silent, back again, or given up.
+
+**One vehicle is one (system, component, endpoint, address).**  The first HEARTBEAT of an autopilot is
+taken up, for without asking it for messages nothing can be proven; it is *pinned* once it has shown
+a stream whose time advances.  What speaks as the vehicle on another way is counted and not handed
+on.  The pin moves in four cases, and never while it is held (a push is under way):
+
+* the one taken up has proven nothing, and another has, or has not been tried yet;
+* it has been silent for a moment, and another way leads to the same boot clock (a second
+  endpoint, a router that got another port): that is the same vehicle, nothing has happened;
+* it has been silent for as long as counts as lost, and another way claims to be it: that is told
+  as a vehicle that is back, which is asked anew which board it is;
+* it is lost, nothing was learned of it, and another vehicle is there.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import TypeAlias
 
 from onboard.mavlink import limits
 from onboard.mavlink.autopilot import (
@@ -9,47 +26,185 @@ from onboard.mavlink.autopilot import (
     AutopilotReturned,
     AutopilotSilent,
     AutopilotState,
+    RivalHeard,
 )
+from onboard.mavlink.claims import Claim, Claims, Source, Way
 from onboard.mavlink.decode import is_autopilot
-from onboard.mavlink.dialect import Message
+from onboard.mavlink.dialect import Message, mavlink
+
+Events: TypeAlias = list[AutopilotFound | AutopilotReturned | RivalHeard]
+AUTOPILOT1 = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
+
+
+class Whose(Enum):
+    """Whose word a packet is."""
+
+    VEHICLE = auto()
+    SOMEBODY = auto()
+    STANDBY = auto()
+    FOREIGN = auto()
+
+
+@dataclass(slots=True)
+class Heard:
+    """What a packet amounts to; ``events`` are to be told before it is handed on."""
+
+    whose: Whose
+    events: Events = field(default_factory=list)
 
 
 class Presence:
-    """Settles on one autopilot for good; ``now`` is the link's clock, s.
+    """Settles on one autopilot; ``now`` is the link's clock, s.
 
     Args:
-        system: the only system id that counts; None takes the first autopilot heard.
+        system: the only system id that counts; None takes any.
+        component: likewise.
     """
 
-    def __init__(self, system: int | None) -> None:
+    def __init__(self, system: int | None, component: int | None = None) -> None:
         self.autopilot: Autopilot | None = None
         self.state = AutopilotState.SEARCHING
-        self._system = system
-        self._heard = 0.0
+        self.held = False
+        """A push is under way: the pin stays where it is."""
+        self.committed = False
+        """Something was learned of this vehicle, or written to it."""
+        self.standby = 0
+        self.foreign = 0
+        self._system, self._component = system, component
+        self._claims = Claims()
+        self._pinned: Claim | None = None
 
-    def heartbeat(
-        self, source: tuple[int, int], message: Message, now: float
-    ) -> AutopilotFound | AutopilotReturned | None:
-        """Take the HEARTBEAT of any source; what it changes."""
-        if self.autopilot is None:
-            if not is_autopilot(message) or self._system not in (None, source[0]):
-                return None
-            self.autopilot = Autopilot(*source, message.type, message.autopilot)
-            self.state = AutopilotState.PRESENT
-            self._heard = now
-            return AutopilotFound(self.autopilot)
-        if source != (self.autopilot.system, self.autopilot.component):
-            return None
-        self._heard = now
-        if self.state is AutopilotState.SILENT:
-            self.state = AutopilotState.PRESENT
-            return AutopilotReturned()
-        return None
+    @property
+    def way(self) -> Way | None:
+        """The way that leads to the vehicle."""
+        return None if self._pinned is None else self._pinned.way
+
+    @property
+    def source(self) -> Source | None:
+        """The vehicle's system and component."""
+        return None if self._pinned is None else self._pinned.source
+
+    @property
+    def proven(self) -> bool:
+        """Whether the vehicle has shown a stream."""
+        return self._pinned is not None and self._pinned.proven
+
+    def rivals(self, now: float) -> int:
+        """How many others claim to be this vehicle, with another clock or none, these seconds."""
+        pinned = self._pinned
+        if pinned is None:
+            return 0
+        return sum(
+            claim is not pinned
+            and claim.source == pinned.source
+            and now - claim.heard <= limits.TWIN_S
+            and not claim.continues(pinned, now)
+            for claim in self._claims
+        )
+
+    def hear(
+        self, source: Source, way: Way, message: Message | None, boot: float | None, now: float
+    ) -> Heard:
+        """Take a packet that counts (of a known kind, signed where that is demanded).
+
+        Args:
+            source: its system and component.
+            way: where it came from.
+            message: None where nobody wants it.
+            boot: the boot time that it tells, s; None if none.
+            now: the link's clock, s.
+        """
+        claim = self._claims.get(source, way)
+        beats = message is not None and is_autopilot(message) and self._counts(source)
+        if message is not None and beats:
+            armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            claim = claim or self._claims.make(source, way, message, now)
+            if claim is not None:
+                claim.note_heartbeat(message, armed=armed, now=now)
+        if claim is not None:
+            if boot is not None:
+                claim.note_stamp(boot, now)
+        heard = self._judge(source, way, claim, beats=beats, now=now)
+        if claim is not None:
+            claim.heard = now
+        return heard
 
     def check(self, now: float) -> AutopilotSilent | None:
         """See whether the autopilot has fallen silent; tell it once."""
-        silence = now - self._heard
-        if self.state is AutopilotState.PRESENT and silence > limits.HEARTBEAT_TIMEOUT_S:
-            self.state = AutopilotState.SILENT
-            return AutopilotSilent(silence)
-        return None
+        if self._pinned is None or self.state is not AutopilotState.PRESENT:
+            return None
+        silence = now - self._pinned.beat
+        if silence <= limits.HEARTBEAT_TIMEOUT_S:
+            return None
+        self.state = AutopilotState.SILENT
+        return AutopilotSilent(silence)
+
+    # How
+
+    def _counts(self, source: Source) -> bool:
+        return self._system in (None, source[0]) and self._component in (None, source[1])
+
+    def _judge(
+        self, source: Source, way: Way, claim: Claim | None, *, beats: bool, now: float
+    ) -> Heard:
+        pinned = self._pinned
+        if pinned is None:
+            if claim is None or not beats:
+                return Heard(Whose.SOMEBODY)
+            return Heard(Whose.VEHICLE, self._take(claim, now))
+        if claim is pinned:
+            return Heard(Whose.VEHICLE, self._back() if beats else [])
+        if claim is not None and not self.held and self._better(claim, pinned, now, beats=beats):
+            return Heard(Whose.VEHICLE, self._take(claim, now))
+        if source != pinned.source:
+            self.foreign += claim is not None
+            return Heard(Whose.SOMEBODY)
+        other = way[0] != pinned.way[0]
+        self.standby += other
+        self.foreign += not other
+        events: Events = []
+        if claim is not None and beats:
+            events.append(RivalHeard(claim.armed, same_clock=claim.continues(pinned, now)))
+        return Heard(Whose.STANDBY if other else Whose.FOREIGN, events)
+
+    def _better(self, claim: Claim, pinned: Claim, now: float, *, beats: bool) -> bool:
+        """Whether this claim is to be believed instead of the one that is."""
+        if claim.continues(pinned, now):
+            return now - pinned.heard > limits.FAILOVER_S
+        lost = self.state is AutopilotState.SILENT
+        same = claim.source == pinned.source
+        if same and (lost or (claim.proven and not pinned.proven)):
+            return beats
+        if self.committed:
+            return False
+        if not pinned.proven and claim.proven:
+            return True
+        if lost and beats:
+            return True
+        if claim.proven and pinned.proven:  # both are: the autopilot's own component
+            same_system = claim.source[0] == pinned.source[0]
+            return same_system and claim.source[1] == AUTOPILOT1 != pinned.source[1]
+        waited = now - (pinned.tried or 0.0)
+        turn = claim.tried is None or claim.tried < (pinned.tried or 0.0)
+        return not pinned.proven and beats and waited > limits.PROOF_S and turn
+
+    def _take(self, claim: Claim, now: float) -> Events:
+        """This is the vehicle from here on."""
+        before, self._pinned = self._pinned, claim
+        claim.tried = now
+        self._claims.keep(claim)
+        if before is not None and before.source == claim.source:
+            if claim.continues(before, now) and self.state is AutopilotState.PRESENT:
+                claim.beat = max(claim.beat, before.beat)
+                return []
+            self.state = AutopilotState.PRESENT
+            return [AutopilotReturned()]
+        self.autopilot = Autopilot(*claim.source, claim.vehicle_type, claim.firmware)
+        self.state = AutopilotState.PRESENT
+        return [AutopilotFound(self.autopilot)]
+
+    def _back(self) -> Events:
+        if self.state is not AutopilotState.SILENT:
+            return []
+        self.state = AutopilotState.PRESENT
+        return [AutopilotReturned()]

@@ -14,16 +14,17 @@ import contextlib
 import errno
 import os
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from onboard.mavlink import limits
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.peers import Address
 from onboard.mavlink.serialport import open_serial
 
 UNUSABLE = (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES, errno.EPERM)
 
-Receive = Callable[[bytes], None]
+Receive = Callable[[bytes, Address | None], None]
 Lost = Callable[[str], None]
 
 
@@ -32,8 +33,11 @@ class Transport(Protocol):
 
     dropped: int
 
-    def write(self, data: bytes) -> None:
-        """Send without waiting; drops and counts when the line does not take it."""
+    def write(self, data: bytes, to: Sequence[Address] = ()) -> None:
+        """Send without waiting; drops and counts when the line does not take it.
+
+        ``to``: addresses, for a listening datagram socket; all others have one other end.
+        """
 
     def close(self) -> None:
         """Let go of the descriptor; nothing is received after this.  May be called twice."""
@@ -46,7 +50,7 @@ async def open_transport(
 
     Args:
         endpoint: where to.
-        receive: called with what was read.
+        receive: called with what was read and the address that it came from (None: the only one).
         lost: called once with the reason when the connection breaks by itself.
         linger: longest delay of a message, s (see the module's text).
 
@@ -74,7 +78,7 @@ async def open_transport(
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
             if endpoint.kind is EndpointKind.UDP_IN:
                 sock.bind(address)
-                return DatagramTransport(sock, receive, linger, clock=loop.time)
+                return DatagramTransport(sock, receive, linger, listening=True)
             sock.connect(address)
             return DatagramTransport(sock, receive, linger)
         except OSError as error:
@@ -91,30 +95,38 @@ async def open_transport(
 class Pace:
     """Calls ``drain`` when the descriptor is readable, but not oftener than ``linger`` allows.
 
-    ``drain`` reads all there is and says whether there was anything.
+    ``drain`` reads what there is and says how much that was; more than ``busy`` is read on at the
+    loop's next turn, so that a flood cannot fill the socket while it is left alone.
     """
 
-    def __init__(self, descriptor: int, drain: Callable[[], bool], linger: float) -> None:
+    def __init__(
+        self, descriptor: int, drain: Callable[[], int], linger: float, *, busy: int = 1 << 30
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._descriptor = descriptor
         self._drain = drain
         self._linger = linger
+        self._busy = busy
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
         self._loop.add_reader(descriptor, self._readable)
 
     def _readable(self) -> None:
-        self._drain()
+        read = self._drain()
         if self._linger > 0.0 and not self._closed:
             self._loop.remove_reader(self._descriptor)
-            self._timer = self._loop.call_later(self._linger, self._again)
+            self._wait(read)
+
+    def _wait(self, read: int) -> None:
+        pause = self._linger if read <= self._busy else 0.0
+        self._timer = self._loop.call_later(pause, self._again)
 
     def _again(self) -> None:
-        busy = self._drain()
+        read = self._drain()
         if self._closed:
             return
-        if busy:
-            self._timer = self._loop.call_later(self._linger, self._again)
+        if read:
+            self._wait(read)
         else:
             self._timer = None
             self._loop.add_reader(self._descriptor, self._readable)
@@ -130,49 +142,36 @@ class Pace:
 
 
 class DatagramTransport:
-    """UDP, connected (``udpout``) or listening (``udpin``: answers everyone heard of late).
+    """UDP, connected (``udpout``) or listening (``udpin``: who is answered is the caller's to say).
 
     UDP is never lost: an ICMP refusal only says that nobody listens yet.
     """
 
     def __init__(
-        self,
-        sock: socket.socket,
-        receive: Receive,
-        linger: float,
-        clock: Callable[[], float] | None = None,
+        self, sock: socket.socket, receive: Receive, linger: float, *, listening: bool = False
     ) -> None:
         self.dropped = 0
         self._socket = sock
         self._receive = receive
-        self._clock = clock
-        self._peers: dict[tuple[object, ...], float] = {}
+        self._listening = listening
         self._buffer = memoryview(bytearray(limits.READ_SIZE))
         self._closed = False
-        self._pace = Pace(sock.fileno(), self._drain, linger)
+        self._pace = Pace(sock.fileno(), self._drain, linger, busy=limits.BUSY_DATAGRAMS)
 
     @property
     def port(self) -> int:
         """The local port, of interest where the system chose it."""
         return int(self._socket.getsockname()[1])
 
-    def write(self, data: bytes) -> None:
-        """Send one datagram to the peer, or to each peer heard within 30 s."""
-        if self._closed:
+    def write(self, data: bytes, to: Sequence[Address] = ()) -> None:
+        """Send one datagram to the peer, or to each of these."""
+        if self._closed or (self._listening and not to):
             self.dropped += 1
-        elif self._clock is None:
-            self._send(data, None)
+        elif self._listening:
+            for address in to:
+                self._send(data, address)
         else:
-            now = self._clock()
-            silent = [
-                peer for peer, heard in self._peers.items() if now - heard > limits.PEER_SILENCE_S
-            ]
-            for peer in silent:
-                del self._peers[peer]
-            for peer in self._peers:
-                self._send(data, peer)
-            if not self._peers:
-                self.dropped += 1
+            self._send(data, None)
 
     def close(self) -> None:
         """Stop and release the port."""
@@ -181,32 +180,39 @@ class DatagramTransport:
             self._pace.close()
             self._socket.close()
 
-    def _send(self, data: bytes, peer: tuple[object, ...] | None) -> None:
+    def _send(self, data: bytes, address: Address | None) -> None:
         try:
-            if peer is None:
+            if address is None:
                 self._socket.send(data)
             else:
-                self._socket.sendto(data, peer)
+                self._socket.sendto(data, address)
         except OSError:
             self.dropped += 1
 
-    def _drain(self) -> bool:
+    def _drain(self) -> int:
+        """Read what waits; hand it on in order, what came from one address in a row together."""
         chunks: list[bytes] = []
+        source: Address | None = None
+        read = 0
         for _ in range(limits.DATAGRAMS_PER_WAKE):
             try:
-                size, peer = self._socket.recvfrom_into(self._buffer)
+                size, address = self._socket.recvfrom_into(self._buffer)
             except BlockingIOError:
                 break
             except OSError:
                 continue  # an ICMP error about something we sent
+            read += 1
+            sender = address if self._listening else None
+            if chunks and sender != source:
+                self._receive(b"".join(chunks), source)
+                chunks.clear()
+                if self._closed:
+                    return read
+            source = sender
             chunks.append(bytes(self._buffer[:size]))
-            if self._clock is not None and (
-                peer in self._peers or len(self._peers) < limits.PEER_LIMIT
-            ):
-                self._peers[peer] = self._clock()
         if chunks:
-            self._receive(b"".join(chunks))
-        return bool(chunks)
+            self._receive(b"".join(chunks), source)
+        return read
 
 
 class StreamTransport:
@@ -225,7 +231,7 @@ class StreamTransport:
         self._closed = False
         self._pace = Pace(self._descriptor, self._drain, linger)
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, to: Sequence[Address] = ()) -> None:  # noqa: ARG002 - one other end
         """Send; what the line does not take at once waits, up to a limit."""
         if self._closed or len(self._waiting) + len(data) > limits.WRITE_LIMIT:
             self.dropped += 1
@@ -261,19 +267,19 @@ class StreamTransport:
         else:
             self._loop.remove_writer(self._descriptor)
 
-    def _drain(self) -> bool:
+    def _drain(self) -> int:
         try:
             data = os.read(self._descriptor, limits.READ_SIZE)
         except BlockingIOError:
-            return False
+            return 0
         except OSError as error:
             self._break(error.strerror or str(error))
-            return False
+            return 0
         if not data:
             self._break("closed by the other side")
-            return False
-        self._receive(data)
-        return True
+            return 0
+        self._receive(data, None)
+        return len(data)
 
     def _break(self, reason: str) -> None:
         if not self._closed:

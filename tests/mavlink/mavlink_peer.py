@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message, mavlink
-from onboard.mavlink.endpoint import Endpoint
+from onboard.mavlink.endpoint import Endpoint, EndpointKind
 
 
 def heartbeat(vehicle=2, autopilot=3, base_mode=0):
@@ -58,11 +58,13 @@ class FakeTransport:
         self.dropped = 0
         self.closed = False
         self.codec = Codec(system=1, component=1)
+        listening = endpoint.kind is EndpointKind.UDP_IN
+        self.address = ("127.0.0.1", 40_000) if listening else None
         self.heard: list[Message] = []
         self.answer: Callable[[Message], Iterator[Message]] | None = None
         self._inbound = Codec()
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, to=()) -> None:
         assert not self.closed
         for frame in self._inbound.feed(data):
             self.heard.append(frame.message)
@@ -73,9 +75,9 @@ class FakeTransport:
     def close(self) -> None:
         self.closed = True
 
-    def say(self, message: Message, codec: Codec | None = None) -> None:
+    def say(self, message: Message, codec: Codec | None = None, address=None) -> None:
         if not self.closed:
-            self.receive((codec or self.codec).encode(message))
+            self.receive((codec or self.codec).encode(message), address or self.address)
 
 
 class LossyLine:

@@ -229,7 +229,7 @@ class TestTraffic:
                     transport.say(attitude(ms))
                 await asyncio.sleep(0.1)
             assert heard == list(range(10_000, 12_000, 100))
-            assert link.routes.standby == 40
+            assert link.presence.standby == 40
             for ms in range(12_000, 16_000, 100):
                 tcp.say(attitude(ms))
                 await asyncio.sleep(0.1)
@@ -260,7 +260,7 @@ class TestTraffic:
             air.transports[0].say(heartbeat())
             air.transports[0].say(heartbeat(18, 8), Codec(system=1, component=191))
             assert len(heard) == 1
-            assert link.routes.echoed == 1
+            assert link.echoed == 1
 
     @virtual_time
     async def test_handlers_get_messages_in_order_with_their_receive_times(self, air):

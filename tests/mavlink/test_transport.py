@@ -23,11 +23,13 @@ class Inbox:
     def __init__(self) -> None:
         self.data = b""
         self.calls = 0
+        self.senders = []
         self.reason: str | None = None
         self._news = asyncio.Event()
 
-    def receive(self, data: bytes) -> None:
+    def receive(self, data: bytes, address=None) -> None:
         self.data += data
+        self.senders.append(address)
         self.calls += 1
         self._news.set()
 
@@ -55,7 +57,7 @@ def linger(request):
     return request.param
 
 
-async def test_udpin_hears_and_answers_everyone_heard(linger):
+async def test_udpin_says_who_spoke_and_answers_whom_it_is_told(linger):
     inbox = Inbox()
     transport = await open_transport(
         Endpoint.parse("udpin:127.0.0.1:0"), inbox.receive, inbox.lost, linger=linger
@@ -66,9 +68,16 @@ async def test_udpin_hears_and_answers_everyone_heard(linger):
     for peer in peers:
         peer.sendto(b"hello", ("127.0.0.1", transport.port))
     await inbox.until(lambda i: len(i.data) == 10)
-    transport.write(b"answer")
+    addresses = [peer.getsockname() for peer in peers]
+    assert inbox.senders == addresses
+    transport.write(b"answer", addresses)
+    transport.write(b"for you", addresses[1:])
+    assert [peer.recv(100) for peer in peers] == [b"answer"] * 2
+    assert peers[1].recv(100) == b"for you"
+    peers[0].settimeout(0.0)
+    with pytest.raises(BlockingIOError):
+        peers[0].recv(100)
     for peer in peers:
-        assert peer.recv(100) == b"answer"
         peer.close()
     transport.close()
 

@@ -17,17 +17,19 @@ def link_view(
     """Health of the link, and who is behind it."""
     autopilot = link.autopilot
     counters: dict[str, int] = {
-        "standby": link.routes.standby,
-        "echoed": link.routes.echoed,
+        "standby": link.presence.standby,
+        "foreign": link.presence.foreign,
+        "echoed": link.echoed,
         "reboots": link.boot_clock.reboots,
     }
     for connection in link.connections:
-        statistics = connection.codec.statistics
-        for name in ("frames", "bad_bytes", "bad_frames", "bad_signatures", "unknown", "sent"):
-            counters[name] = counters.get(name, 0) + getattr(statistics, name)
-        for source in statistics.sources.values():
-            for name in ("lost", "late", "duplicated"):
-                counters[name] = counters.get(name, 0) + getattr(source, name)
+        for statistics in connection.statistics():
+            for name in ("frames", "bad_bytes", "bad_frames", "bad_signatures", "unknown", "sent"):
+                counters[name] = counters.get(name, 0) + getattr(statistics, name)
+            for source in statistics.sources.values():
+                for name in ("lost", "late", "duplicated"):
+                    counters[name] = counters.get(name, 0) + getattr(source, name)
+        counters["rationed"] = counters.get("rationed", 0) + connection.peers.refused
         for name in ("dropped", "connects", "failures"):
             counters[name] = counters.get(name, 0) + getattr(connection, name)
     return LinkView(

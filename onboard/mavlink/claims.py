@@ -1,0 +1,112 @@
+"""Who calls himself an autopilot, by which way, and what he has shown for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from onboard.mavlink import limits
+from onboard.mavlink.dialect import Message
+from onboard.mavlink.peers import Address
+
+Source: TypeAlias = tuple[int, int]
+"""System and component."""
+Way: TypeAlias = tuple[int, Address | None]
+"""Number of the endpoint, and the address there."""
+
+
+@dataclass(slots=True)
+class Claim:
+    """One source on one way that has sent an autopilot's HEARTBEAT; times are the link's, s.
+
+    ``stamps`` counts boot times that advanced: three of them make a stream, which is proof enough
+    to be listened to.  A HEARTBEAT alone is easily said.
+    """
+
+    source: Source
+    way: Way
+    vehicle_type: int
+    firmware: int
+    heard: float
+    beat: float
+    armed: bool = False
+    tried: float | None = None
+    stamps: int = 0
+    boot: float | None = None
+    boot_at: float = 0.0
+    first_boot: float = 0.0
+    first_at: float = 0.0
+
+    @property
+    def proven(self) -> bool:
+        """Whether it has a stream whose time advances."""
+        return self.stamps >= limits.PROOF_STAMPS
+
+    def note_heartbeat(self, message: Message, *, armed: bool, now: float) -> None:
+        """Take its HEARTBEAT."""
+        self.beat, self.armed = now, armed
+        self.vehicle_type, self.firmware = message.type, message.autopilot
+
+    def note_stamp(self, boot: float, now: float) -> None:
+        """Take the boot time of a stamped message, s."""
+        if self.boot is None or boot > self.boot:
+            if self.boot is None:
+                self.first_boot, self.first_at = boot, now
+            self.stamps += 1
+        elif boot < self.boot - limits.CLOCK_AGREES_S:
+            self.stamps, self.first_boot, self.first_at = 1, boot, now  # it began anew
+        else:
+            return
+        self.boot, self.boot_at = boot, now
+
+    def boot_expected(self, now: float) -> float | None:
+        """Boot time that its clock should show now, s; a simulator's may run faster than ours."""
+        if self.boot is None:
+            return None
+        elapsed = self.boot_at - self.first_at
+        rate = (self.boot - self.first_boot) / elapsed if elapsed > 1.0 else 1.0
+        return self.boot + rate * (now - self.boot_at)
+
+    def continues(self, other: Claim, now: float) -> bool:
+        """Whether its clock is that of another one, so that both are ways to one vehicle."""
+        if self.source != other.source or self.boot is None:
+            return False
+        mine, theirs = self.boot_expected(now), other.boot_expected(now)
+        if mine is None or theirs is None:
+            return False
+        return abs(mine - theirs) <= limits.CLOCK_AGREES_S
+
+
+class Claims:
+    """The claims that are followed: a bounded number, those that prove nothing give way."""
+
+    def __init__(self) -> None:
+        self._claims: dict[tuple[Source, Way], Claim] = {}
+
+    def __iter__(self) -> Iterator[Claim]:
+        return iter(self._claims.values())
+
+    def get(self, source: Source, way: Way) -> Claim | None:
+        """The claim of this source on this way, None if it has made none."""
+        return self._claims.get((source, way))
+
+    def make(self, source: Source, way: Way, message: Message, now: float) -> Claim | None:
+        """A new claim; None while all places are taken by better ones."""
+        if len(self._claims) >= limits.CLAIMS_KNOWN:
+            key = min(self._claims, key=lambda k: self._worth(self._claims[k], now))
+            if self._claims[key].proven and now - self._claims[key].heard < limits.PEER_SILENCE_S:
+                return None
+            del self._claims[key]
+        claim = Claim(source, way, message.type, message.autopilot, heard=now, beat=now)
+        self._claims[source, way] = claim
+        return claim
+
+    def keep(self, pinned: Claim) -> None:
+        """The vehicle's own claim is not given up."""
+        self._claims[pinned.source, pinned.way] = pinned
+
+    @staticmethod
+    def _worth(claim: Claim, now: float) -> tuple[bool, bool, float]:
+        silent = now - claim.heard > limits.PEER_SILENCE_S
+        return not silent, claim.proven, claim.heard
