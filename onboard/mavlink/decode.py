@@ -122,6 +122,11 @@ class Decoder:
         return True
 
 
+def is_armed(heartbeat: Message) -> bool:
+    """Whether a HEARTBEAT says armed."""
+    return bool(heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+
+
 def is_autopilot(message: Message) -> bool:
     """Whether this is the HEARTBEAT of an autopilot (not of a gimbal, a station, a companion)."""
     return bool(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import termios
 from dataclasses import dataclass
 from enum import Enum
@@ -43,6 +44,18 @@ class Endpoint:
     port: int = 0
     device: str = ""
     baud: int = 0
+
+    @property
+    def is_open_to_a_network(self) -> bool:
+        """Whether packets of other machines can come in by UDP, whose senders are easily forged."""
+        if self.kind not in (EndpointKind.UDP_IN, EndpointKind.UDP_OUT):
+            return False
+        if self.host == "localhost":
+            return False
+        try:
+            return not ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return True  # no host: all interfaces; a name: wherever it leads
 
     @classmethod
     def parse(cls, text: str) -> Endpoint:

@@ -84,6 +84,8 @@ SOURCES_KNOWN: Final = 256
 TWIN_S: Final = 10.0
 """s; another service under our own name that is silent for so long has gone: ten HEARTBEATs
 [data]."""
+DOUBTFUL_S: Final = 10.0
+"""s after a contradiction between samples for which it is shown [tuned]."""
 EARLY_SOURCES: Final = 8
 """Senders whose parameters are kept until one of them turns out to be the autopilot [tuned]."""
 EARLY_PARAMETERS: Final = 3000

@@ -15,6 +15,7 @@ on.  The pin moves in four cases, and never while it is held (a push is under wa
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TypeAlias
@@ -29,7 +30,7 @@ from onboard.mavlink.autopilot import (
     RivalHeard,
 )
 from onboard.mavlink.claims import Claim, Claims, Source, Way
-from onboard.mavlink.decode import is_autopilot
+from onboard.mavlink.decode import is_armed, is_autopilot
 from onboard.mavlink.dialect import Message, mavlink
 
 Events: TypeAlias = list[AutopilotFound | AutopilotReturned | RivalHeard]
@@ -64,10 +65,10 @@ class Presence:
     def __init__(self, system: int | None, component: int | None = None) -> None:
         self.autopilot: Autopilot | None = None
         self.state = AutopilotState.SEARCHING
-        self.held = False
-        """A push is under way: the pin stays where it is."""
-        self.committed = False
-        """Something was learned of this vehicle, or written to it."""
+        self.held: Callable[[], bool] = _no
+        """Whether a push is under way: the pin stays where it is."""
+        self.committed: Callable[[], bool] = _no
+        """Whether something was learned of this vehicle, or written to it."""
         self.standby = 0
         self.foreign = 0
         self._system, self._component = system, component
@@ -117,7 +118,7 @@ class Presence:
         claim = self._claims.get(source, way)
         beats = message is not None and is_autopilot(message) and self._counts(source)
         if message is not None and beats:
-            armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            armed = is_armed(message)
             claim = claim or self._claims.make(source, way, message, now)
             if claim is not None:
                 claim.note_heartbeat(message, armed=armed, now=now)
@@ -154,7 +155,7 @@ class Presence:
             return Heard(Whose.VEHICLE, self._take(claim, now))
         if claim is pinned:
             return Heard(Whose.VEHICLE, self._back() if beats else [])
-        if claim is not None and not self.held and self._better(claim, pinned, now, beats=beats):
+        if claim is not None and not self.held() and self._better(claim, pinned, now, beats=beats):
             return Heard(Whose.VEHICLE, self._take(claim, now))
         if source != pinned.source:
             self.foreign += claim is not None
@@ -175,7 +176,7 @@ class Presence:
         same = claim.source == pinned.source
         if same and (lost or (claim.proven and not pinned.proven)):
             return beats
-        if self.committed:
+        if self.committed():
             return False
         if not pinned.proven and claim.proven:
             return True
@@ -208,3 +209,7 @@ class Presence:
             return []
         self.state = AutopilotState.PRESENT
         return [AutopilotReturned()]
+
+
+def _no() -> bool:
+    return False

@@ -36,6 +36,15 @@ EKF_WATCHED_S: Final = 30.0
 
 DISARMED_S: Final = 5.0
 """s: five HEARTBEATs that say so."""
+LEAST_DISARMED_S: Final = 2.0
+"""s: two HEARTBEATs, which come once a second.  A vehicle that has just been armed has not said so
+for up to a second, so that one HEARTBEAT alone says nothing of the time after it."""
+FRESH_S: Final = 1.5
+"""s; a landed push sends a new value only so long after a HEARTBEAT that said disarmed: one
+HEARTBEAT and a half, so that a lost one makes it wait."""
+ARMED_UNDO_S: Final = 2.0
+"""s after the first HEARTBEAT that says armed in which old values are still written back: ArduPilot
+lets motors leave the idle 2 s after arming at the earliest; in the air no step is taken."""
 SETTLE_S: Final = 2.0
 """s.  Must exceed the longest delay of a link that repeats packets, so that none of our writes is
 still on its way when all six are read and believed."""

@@ -55,6 +55,7 @@ class Objection(Enum):
     """Names of the reasons to refuse."""
 
     NEVER = "policy_never"
+    HEARTBEATS = "heartbeats_contradict"
     STATE_UNKNOWN = "armed_state_unknown"
     ARMED = "armed"
     DISARMED_TOO_SHORT = "disarmed_too_short"
@@ -107,12 +108,16 @@ class PolicySettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleCondition:
-    """The vehicle now; None where it has not said.  ``disarmed_for`` is in seconds."""
+    """The vehicle now; None where it has not said.  ``disarmed_for`` is in seconds.
+
+    ``contradicted``: its HEARTBEATs say armed and disarmed at the same time.
+    """
 
     armed: bool | None = None
     disarmed_for: float = 0.0
     landed: bool | None = None
     ekf_flags: int | None = None
+    contradicted: bool = False
 
     @property
     def may_fly(self) -> bool:
@@ -149,6 +154,9 @@ def moment(condition: VehicleCondition, settings: PolicySettings) -> tuple[Refus
     """Objections to writing anything now."""
     if settings.mode is Mode.NEVER:
         return (_no(Objection.NEVER, "the push policy is 'never': values are proposed only"),)
+    if condition.contradicted:
+        sentence = "heartbeats say armed and disarmed at the same time: two are speaking"
+        return (_no(Objection.HEARTBEATS, sentence),)
     if condition.armed is None:
         return (_no(Objection.STATE_UNKNOWN, "the autopilot has not said whether it is armed"),)
     if not condition.armed:

@@ -19,7 +19,7 @@ def document(tmp_path, port):
     """A configuration for this test alone; change it before starting a daemon."""
     return {
         "link": {"endpoints": [f"udpin:127.0.0.1:{port}"], "heartbeat_limit_s": 30.0},
-        "push": {"disarmed_s": 0.0},
+        "push": {"disarmed_s": 2.0},
         "state": {"directory": str(tmp_path / "state")},
         "http": {"port": 0},
     }

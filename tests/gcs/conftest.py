@@ -31,7 +31,7 @@ def airfield(tmp_path):
         async with Router() as router:
             document = {
                 "link": {"endpoints": [f"udpout:127.0.0.1:{router.port}"]},
-                "push": {"approval": True, "disarmed_s": 0.0},
+                "push": {"approval": True, "disarmed_s": 2.0},
                 "state": {"directory": str(tmp_path / "state")},
                 "http": {"enabled": False},
             }

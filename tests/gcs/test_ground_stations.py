@@ -127,7 +127,7 @@ async def test_the_policy_is_set_and_told(airfield):
 
 
 async def test_approving_where_nobody_is_asked_is_refused_in_words(airfield):
-    never = {"push": {"approval": False, "policy": "never", "disarmed_s": 0.0}}
+    never = {"push": {"approval": False, "policy": "never", "disarmed_s": 2.0}}
     async with airfield(never) as (_, vehicle, router), Ground(router.port) as station:
         station.set("OBC_APPROVE", 1.0)
         await station.until(lambda: approvals(station))

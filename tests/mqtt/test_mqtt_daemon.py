@@ -22,7 +22,7 @@ def hurry(monkeypatch):
 def configuration(tmp_path, port, broker_port, **mqtt):
     return {
         "link": {"endpoints": [f"udpin:127.0.0.1:{port}"]},
-        "push": {"approval": True, "disarmed_s": 0.0},
+        "push": {"approval": True, "disarmed_s": 2.0},
         "state": {"directory": str(tmp_path / "state")},
         "http": {"enabled": False},
         "mqtt": {"enabled": True, "port": broker_port, "state_interval_s": 0.1} | mqtt,

@@ -68,7 +68,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
 
         async with (
             harness.simulator(kind, "copter", speedup=1.0, imus=2, board="0d0e0f") as other,
-            daemons.running(document(other, tmp_path, disarmed_s=0.0)) as service,
+            daemons.running(document(other, tmp_path, disarmed_s=2.0)) as service,
         ):
             await daemons.until(lambda: service.handover.identified)
             await daemons.until(lambda: service.snapshot().link.armed is False)
@@ -77,7 +77,7 @@ async def test_what_one_board_has_flown_another_does_not_get(kind, tmp_path):
             assert not any(isinstance(entry, Planned) for _, entry in service.parts.journal.entries)
 
         # Back on the first board, which has not flown since: it waits, until a person approves.
-        async with daemons.running(document(sitl, tmp_path, disarmed_s=0.0)) as service:
+        async with daemons.running(document(sitl, tmp_path, disarmed_s=2.0)) as service:
             await daemons.until(lambda: "unconfirmed" in held_back(service).get(1, {}))
             await daemons.until(lambda: service.snapshot().uptime_s > 20.0)
             assert np.array_equal(await six(sitl), before)
@@ -91,7 +91,7 @@ async def test_what_a_station_sets_in_the_middle_of_a_push_stays(kind, tmp_path)
     theirs = 0.625
     async with harness.simulator(kind, "copter", speedup=speedup) as sitl:
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
-        async with daemons.running(document(sitl, tmp_path, disarmed_s=0.0)) as service:
+        async with daemons.running(document(sitl, tmp_path, disarmed_s=2.0)) as service:
             await daemons.until(lambda: service.snapshot().parameters.keys() >= set(SIX))
             await sitl.fly(FLIGHT_S[kind])
             await sitl.land()

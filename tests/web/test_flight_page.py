@@ -29,7 +29,7 @@ async def serving(tmp_path):
         "link": {"endpoints": [f"udpin:127.0.0.1:{port}"], "heartbeat_limit_s": 30.0},
         "push": {
             "approval": True,
-            "disarmed_s": 0.0,
+            "disarmed_s": 2.0,
             # A short flight cannot show everything as well as the default policy wants it.
         },
         "state": {"directory": str(tmp_path / "state")},

@@ -17,6 +17,7 @@ from onboard.daemon.view.notices import Notices
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
+from onboard.mavlink.repetitions import Repetitions
 from onboard.outage import Outage
 
 P = ParamSpec("P")
@@ -67,6 +68,7 @@ class Handover:
         save_every_s: float,
     ) -> None:
         self.decoder = Decoder()
+        self.repetitions = Repetitions()
         self.learned: Learned | None = None
         self.counters: Counter[str] = Counter()
         self._learner = learner
@@ -94,7 +96,7 @@ class Handover:
 
     def take(self, message: Message) -> tuple[Sample, ...]:
         """Decode a message of the autopilot and put its samples into the next batch."""
-        samples = self.decoder.decode(message)
+        samples = self._consistent(self.decoder.decode(message))
         if samples and self._arrived is None:
             self._arrived = self._clock()
         self._samples += samples
@@ -103,6 +105,26 @@ class Handover:
             self.counters["samples_dropped"] += half
             del self._samples[:half]
         return samples
+
+    def _consistent(self, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+        """Without those that contradict one of the same stamp, which is taken back, too."""
+        for sample in samples:
+            before = self.repetitions.contradicts(sample, self._clock())
+            if before is not None:
+                self.counters["samples_contradict"] += 1
+                self._samples = [s for s in self._samples if s is not before]
+                samples = tuple(s for s in samples if s is not sample)
+        return samples
+
+    @property
+    def has_learned(self) -> bool:
+        """Whether a flight of this run has taught anything."""
+        learned = self.learned
+        if learned is None:
+            return False
+        return learned.trust.trusted_s > 0.0 or (
+            learned.flight is not None and learned.flight.current
+        )
 
     @property
     def identified(self) -> bool:

@@ -75,6 +75,7 @@ class Outlets:
         self._service = service
         self._notices = notices
         self._settings = configuration.parameters
+        self._may_loosen = configuration.push.allow_loosening
         self._approval: asyncio.Task[None] | None = None
         self._approving = False
         self._clock = clock
@@ -155,6 +156,9 @@ class Outlets:
 
     def _set_policy(self, value: float) -> None:
         name = POLICIES[int(value)]
+        now = self._service.snapshot().push.policy
+        if POLICIES.index(name) > POLICIES.index(now) and not self._may_loosen:
+            raise RefusedError(f"{now} is stricter; [push] allow_loosening")
         self._service.set_policy(Mode(name))
         self._notices.post("parameter_done", f"push policy is now {name.replace('_', ' ')}")
 

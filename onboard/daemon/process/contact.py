@@ -6,6 +6,7 @@ import logging
 from collections import Counter
 from dataclasses import dataclass, field
 
+from onboard.daemon.process import limits
 from onboard.daemon.process.parts import Parts
 from onboard.mavlink.autopilot import (
     Autopilot,
@@ -17,6 +18,7 @@ from onboard.mavlink.autopilot import (
     ConnectionRestored,
     ConnectionTrouble,
     LinkEvent,
+    RivalHeard,
 )
 from onboard.mavlink.decode import Decoder
 from onboard.outage import Outage
@@ -44,6 +46,8 @@ class Contact:
         self._parts = parts
         self._life = life
         self._silence, self._reboots = Outage(), Outage()
+        self._yields = False
+        self._next_kept = 0.0
 
     def on_link_event(self, now: float, event: LinkEvent) -> None:
         """Take note of what happened to the autopilot or a connection."""
@@ -57,8 +61,10 @@ class Contact:
                 if self._silence.lost("no heartbeat", now):
                     post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
             case AutopilotReturned():
-                self._parts.handover.gap()
+                self._nothing_is_known()
                 self._silence.works(now)
+            case RivalHeard(armed):
+                self._parts.observed.rival(now, armed=armed)
             case AutopilotRebooted():
                 counters["autopilot_rebooted"] += 1
                 self._nothing_is_known()
@@ -73,6 +79,42 @@ class Contact:
             case ConnectionChanged(endpoint, state, reason):
                 logger.debug("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
         self._parts.pusher.on_event(now, event)
+
+    def heartbeat(self, now: float, *, armed: bool) -> None:
+        """Take the vehicle's HEARTBEAT: one that contradicts those before it stops a push."""
+        if self._parts.observed.heartbeat(now, armed=armed):
+            self._life.counters["heartbeats_contradict"] += 1
+            self._parts.pusher.stop("heartbeats say armed and disarmed at the same time", now)
+
+    def look_around(self, now: float) -> None:
+        """Tell what on the wire is not as it should be, and draw the consequences."""
+        parts = self._parts
+        parts.vigilance.tell(now)
+        if parts.handover.repetitions.contradictions:
+            parts.proposals.doubt = "samples contradict each other: find out who sends, then reset"
+        yields = not parts.link.twins.first(now)
+        if yields != self._yields:
+            self._yields = yields
+            self._decide()
+        if now >= self._next_kept:
+            self._next_kept = now + limits.SIGNING_KEPT_S
+            parts.keep_signing(limits.SIGNING_KEPT_S)
+
+    def _decide(self) -> None:
+        """Whether anything is written to whoever is there."""
+        autopilot = self._parts.link.autopilot
+        foreign = autopilot is not None and not autopilot.is_ardupilot
+        if autopilot is not None and foreign:
+            self._advise_only(
+                f"the autopilot is {autopilot.firmware_name}, not ArduPilot: "
+                "nothing is written to it"
+            )
+        elif self._yields:
+            self._advise_only("another onboard service was there first")
+        else:
+            self._life.mode, self._life.mode_reason = "active", ""
+            self._parts.proposals.forbidden = ""
+        self._parts.parameters.enabled = not foreign
 
     def tell_of_recovery(self, now: float) -> None:
         """Say that heartbeats are back, and how often it rebooted, once it has settled."""
@@ -89,23 +131,20 @@ class Contact:
 
     def _found(self, autopilot: Autopilot) -> None:
         parts = self._parts
+        if self._life.phase == "running":  # another one before
+            self._nothing_is_known()
         who = f"{autopilot.firmware_name} {autopilot.vehicle}, system {autopilot.system}"
         parts.notices.post("autopilot_found", who)
         parts.handover.decoder = Decoder(
             autopilot.system, autopilot.component, clock=parts.link.boot_clock
         )
         self._life.phase = "running"
-        if not autopilot.is_ardupilot:
-            self._advise_only(
-                f"the autopilot is {autopilot.firmware_name}, not ArduPilot: "
-                "nothing is written to it"
-            )
+        self._decide()
 
     def _advise_only(self, reason: str) -> None:
         self._parts.notices.post("advise_only", f"advise-only: {reason}", warning=True)
         self._life.mode, self._life.mode_reason = "advise_only", reason
         self._parts.proposals.forbidden = reason
-        self._parts.parameters.enabled = False
 
     def _nothing_is_known(self) -> None:
         """Another autopilot, or another state of it, may be there when it is heard again."""

@@ -17,6 +17,14 @@ SAVE_S: Final = 5.0
 """s that the learner gets at shutdown for what has come and its last save [service: as before]."""
 STALE_S: Final = 5.0
 """s; a flag not repeated for so long says nothing about now [data: five HEARTBEATs]."""
+CONTRADICTION_S: Final = 1.2
+"""s; armed or disarmed that lasts for less was said by two: a HEARTBEAT's interval and a fifth for
+what delays it [data]."""
+CONTRADICTED_FOR_S: Final = 30.0
+"""s without a contradiction before HEARTBEATs are believed again [tuned]."""
+SIGNING_KEPT_S: Final = 10.0
+"""s between two records of the signing's time stamps; as much is added to what is recorded, so that
+nothing is used twice after a crash [cost: one small file]."""
 JOURNAL_SHOWN: Final = 50
 """Entries of the journal in a snapshot, the latest ones [tuned]."""
 BEHIND_WORTH_SAYING_S: Final = 5.0

@@ -11,7 +11,9 @@ from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.daemon.process.condition import Observed
+from onboard.daemon.process.signing_file import SigningFile
 from onboard.daemon.process.situation import Situation
+from onboard.daemon.process.vigilance import Vigilance
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.parameters import ParameterWatch
 from onboard.daemon.pushing.proposals import Proposals
@@ -25,6 +27,7 @@ from onboard.mavlink.autopilot import Participant
 from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
 from onboard.mavlink.recorder import Recorder
+from onboard.mavlink.signing import Signing
 from onboard.mavlink.streams import Streams
 from onboard.push.journal import Journal
 
@@ -35,7 +38,8 @@ class Parts:
 
     notices: Notices
     recorder: Recorder | None
-    signed: bool
+    signing: Signing | None
+    signing_file: SigningFile
     link: Link
     board: Board
     streams: Streams
@@ -48,6 +52,7 @@ class Parts:
     pusher: Pusher
     diagnoses: Diagnoses
     handover: Handover
+    vigilance: Vigilance
 
     @classmethod
     def of(
@@ -75,7 +80,8 @@ class Parts:
             Board(),
             ParameterWatch(),
         )
-        signing = settings.signing(configuration.link, wall_clock)
+        signing_file = SigningFile(directory / "signing.json")
+        signing = settings.signing(configuration.link, wall_clock, signing_file.load())
         endpoints = settings.endpoints(configuration.link)
         recorder = settings.recorder(configuration.recording, directory, wall_clock)
         journal = Journal(directory / "journal.jsonl")
@@ -84,29 +90,42 @@ class Parts:
         link = Link(
             endpoints,
             system=configuration.link.system_id or None,
+            component=configuration.link.component_id or None,
             signing=signing,
             recorder=recorder,
             clock=clock,
             wall_clock=wall_clock,
         )
+        observed = Observed()
+        pusher = Pusher(ledger, proposals, witness, notices)
         situation = Situation(link, board, parameters, witness, proposals)
+        handover = _handover(configuration, notices, situation, clock, wall_clock)
+        link.presence.held = lambda: pusher.busy
+        link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(
             notices=notices,
             recorder=recorder,
-            signed=signing is not None,
+            signing=signing,
+            signing_file=signing_file,
             link=link,
             board=board,
             streams=Streams(settings.stream_requests(configuration.link.rates)),
             parameters=parameters,
-            observed=Observed(),
+            observed=observed,
             traffic=Traffic(),
             journal=journal,
             witness=witness,
             proposals=proposals,
-            pusher=Pusher(ledger, proposals, witness, notices),
+            pusher=pusher,
             diagnoses=Diagnoses(ledger.append, notices),
-            handover=_handover(configuration, notices, situation, clock, wall_clock),
+            handover=handover,
+            vigilance=Vigilance(link, observed, signing, handover.repetitions, notices),
         )
+
+    def keep_signing(self, margin_s: float = 0.0) -> None:
+        """Put the signing's time stamps on disk; ``margin_s``: how long they will have to do."""
+        if self.signing is not None:
+            self.signing_file.save(self.signing.kept(margin_s))
 
     @property
     def participants(self) -> tuple[Participant, ...]:

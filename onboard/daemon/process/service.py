@@ -29,7 +29,7 @@ from onboard.daemon.process.portrait import Portrait
 from onboard.daemon.setup.configuration import Configuration, read_secret
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import OnboardError
-from onboard.mavlink.decode import Decoder
+from onboard.mavlink.decode import Decoder, is_armed, is_autopilot
 from onboard.mavlink.dialect import Message
 from onboard.push.policy import Mode
 from onboard.web.page import status_page
@@ -134,6 +134,7 @@ class Service:
         self._outlets.start(group)
         self._life.phase = "searching"
         self.ready.set()
+        self.contact.look_around(self._clock())
         self._notifier.send(READY="1", STATUS="waiting for an autopilot's heartbeat")
 
     async def _main_loop(self) -> None:
@@ -152,6 +153,7 @@ class Service:
         condition = parts.observed.condition(now)
         parts.traffic.tick(now)
         self.contact.tell_of_recovery(now)
+        self.contact.look_around(now)
         parts.pusher.judge(parts.witness.report(condition, now))
         self.handover.tell_of_lag(now)
         learned = self.handover.learned
@@ -192,6 +194,7 @@ class Service:
         if self._learner_task is not None:
             self._learner_task.cancel()
         await self.handover.close(limits.SAVE_S)
+        self.parts.keep_signing()
 
     async def _finish_push(self) -> None:
         try:
@@ -220,6 +223,8 @@ class Service:
         if self.handover.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
             return
         self.parts.traffic.count(message.get_type())
+        if is_autopilot(message):
+            self.contact.heartbeat(now, armed=is_armed(message))
         for sample in self.handover.take(message):
             self.parts.observed.feed(sample, now)
 

@@ -98,6 +98,8 @@ class Proposals:
         self.settings = settings
         self.approval = approval
         self.forbidden = ""
+        self.doubt = ""
+        """Why what was learned since the start is not to be believed, until it is reset."""
         self.current: dict[int, Proposal] = {}
         self.counters: Counter[str] = Counter()
         self.writing: int | None = None
@@ -257,6 +259,7 @@ class Proposals:
         for imu in self._standing:
             self._lift(imu)
         self._standing.clear()
+        self.doubt = ""
         self.current = {}
 
     def _lift(self, imu: int) -> None:
@@ -309,6 +312,8 @@ class Proposals:
         found: dict[str, str] = {}
         if self.forbidden:
             found["advise_only"] = self.forbidden
+        if self.doubt:
+            found["doubtful"] = self.doubt
         if self._imus and imu not in self._imus:
             found["not_selected"] = f"IMU {imu} is not among [push] imus"
         if standing.refused:

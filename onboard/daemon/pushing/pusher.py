@@ -9,6 +9,7 @@ from __future__ import annotations
 import uuid
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import msgspec
 
@@ -23,13 +24,21 @@ from onboard.daemon.pushing.writer import Writer
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import PushView
 from onboard.errors import RefusedError
-from onboard.mavlink.autopilot import AutopilotRebooted, AutopilotSilent, LinkEvent
+from onboard.mavlink.autopilot import (
+    AutopilotFound,
+    AutopilotRebooted,
+    AutopilotSilent,
+    LinkEvent,
+    RivalHeard,
+    TwinHeard,
+)
+from onboard.mavlink.decode import is_armed, is_autopilot
 from onboard.mavlink.dialect import Message
 from onboard.push.course import TransactionSettings
 from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.policy import VehicleCondition
-from onboard.push.signals import LinkLost, Outcome, Reason, Rebooted, VehicleReport
+from onboard.push.signals import Cancelled, LinkLost, Outcome, Reason, Rebooted, VehicleReport
 from onboard.push.transaction import PushTransaction
 
 PATIENCE = TransactionSettings()
@@ -42,7 +51,7 @@ class Pusher:
         StateError: an open transaction in the journal has lost its plan.
     """
 
-    names = Writer.names
+    names = (*Writer.names, "HEARTBEAT")
 
     def __init__(
         self, ledger: Ledger, proposals: Proposals, witness: Witness, notices: Notices
@@ -69,6 +78,11 @@ class Pusher:
         return self._writer.busy
 
     @property
+    def has_written(self) -> bool:
+        """Whether a transaction was begun in this run."""
+        return any(self._counts[name] for name in ("pushes", "roll_backs", "resumed"))
+
+    @property
     def counters(self) -> Counter[str]:
         """What happened, by name."""
         return self._counts + self._ledger.counters
@@ -83,7 +97,11 @@ class Pusher:
         self._read_ledger()
 
     def feed(self, message: Message, now: float) -> Sequence[Message]:
-        """Take the autopilot's word on a parameter."""
+        """Take the autopilot's word on a parameter, or on whether it is armed: at once."""
+        if is_autopilot(message):
+            source = (message.get_srcSystem(), message.get_srcComponent())
+            if source == self._writer.target:
+                self._heard_armed(is_armed(message), now)
         self._ended(self._writer.hear(message, now), now)
         return self._writer.take_outbox()
 
@@ -97,8 +115,13 @@ class Pusher:
         match event:
             case AutopilotRebooted():
                 self._ended(self._writer.tell(Rebooted(), now), now)
-            case AutopilotSilent():
+            case AutopilotSilent() | AutopilotFound():
                 self._ended(self._writer.tell(LinkLost(), now), now)
+            case RivalHeard(armed=True):
+                self._heard_armed(True, now)  # noqa: FBT003 - of whomever: it may be the real one
+            case TwinHeard(earlier=True):
+                text = "another service that was there first writes to this vehicle"
+                self._ended(self._writer.tell(Cancelled(text), now), now)
             case _:
                 pass
 
@@ -193,6 +216,14 @@ class Pusher:
             last=self.last_outcome,
             judged=tuple(self._witness.judged.values()),
         )
+
+    def stop(self, sentence: str, now: float) -> None:
+        """Have a transaction under way undone."""
+        self._ended(self._writer.tell(Cancelled(sentence), now), now)
+
+    def _heard_armed(self, armed: bool, now: float) -> None:  # noqa: FBT001 - what was heard
+        report = replace(self._report, armed=armed)
+        self._ended(self._writer.tell(report, now), now)
 
     def _read_ledger(self) -> None:
         self._duties.read(busy=self.busy, in_flight_since=self._in_flight_since)

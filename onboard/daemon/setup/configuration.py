@@ -17,6 +17,7 @@ import msgspec
 from msgspec import Meta
 
 from onboard.errors import ConfigurationError
+from onboard.push.limits import LEAST_DISARMED_S
 
 Positive = Annotated[float, Meta(gt=0.0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
@@ -45,11 +46,13 @@ class LinkSettings(Section, frozen=True, kw_only=True):
     """Where the autopilot is and how to speak to it.
 
     ``endpoints`` are used side by side; a message is taken from whichever brings it first.
-    ``system_id`` 0 takes the first autopilot that is heard.
+    ``system_id`` 0 takes the first that proves to be an autopilot, ``component_id`` 0 any
+    component of it.
     """
 
     endpoints: Annotated[tuple[Text, ...], Meta(min_length=1)] = ("udpin:127.0.0.1:14550",)
     system_id: Annotated[int, Meta(ge=0, le=255)] = 0
+    component_id: Annotated[int, Meta(ge=0, le=255)] = 0
     signing_key_file: Text | None = None
     heartbeat_limit_s: Positive = 30.0
     rates: RatesSettings = RatesSettings()
@@ -60,13 +63,16 @@ class PushSettings(Section, frozen=True, kw_only=True):
 
     The bounds only ever narrow what the autopilot documents (scale 0.8 ... 1.2, offset
     3.5 m/s^2); ``sure`` is the probability of an improvement that a push needs, ``least_change``
-    by how much the force has to change, m/s^2.
+    by how much the force has to change, m/s^2.  ``disarmed_s`` covers two HEARTBEATs, which come
+    once a second: one alone says nothing of the second after it.  ``allow_loosening``: a ground
+    station may set a policy that writes more than the one in force.
     """
 
     policy: Literal["never", "landed", "in_flight"] = "landed"
     approval: bool = False
     imus: tuple[ImuNumber, ...] = ()
-    disarmed_s: NotNegative = 5.0
+    disarmed_s: Annotated[float, Meta(ge=LEAST_DISARMED_S)] = 5.0
+    allow_loosening: bool = False
     scale_min: Annotated[float, Meta(ge=0.8, lt=1.0)] = 0.8
     scale_max: Annotated[float, Meta(gt=1.0, le=1.2)] = 1.2
     offset_max: Annotated[float, Meta(gt=0.0, le=3.5)] = 3.5

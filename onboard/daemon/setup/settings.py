@@ -12,7 +12,7 @@ from onboard.daemon.setup import configuration
 from onboard.daemon.setup.recording import RollingRecorder
 from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.recorder import Recorder
-from onboard.mavlink.signing import Signing
+from onboard.mavlink.signing import Signing, SigningRecord
 from onboard.mavlink.streams import StreamRequest
 from onboard.push.policy import Mode, PolicySettings
 
@@ -72,8 +72,17 @@ def endpoints(link: configuration.LinkSettings) -> tuple[Endpoint, ...]:
     return tuple(Endpoint.parse(text) for text in link.endpoints)
 
 
-def signing(link: configuration.LinkSettings, wall_clock: Callable[[], float]) -> Signing | None:
+def signing(
+    link: configuration.LinkSettings,
+    wall_clock: Callable[[], float],
+    record: SigningRecord | None = None,
+) -> Signing | None:
     """[link] signing_key_file: the passphrase as entered in a ground station.
+
+    Args:
+        link: the section.
+        wall_clock: Unix time, s.
+        record: time stamps of an earlier run.
 
     Raises:
         ConfigurationError: the file cannot be read.
@@ -81,7 +90,7 @@ def signing(link: configuration.LinkSettings, wall_clock: Callable[[], float]) -
     if link.signing_key_file is None:
         return None
     secret = configuration.read_secret(link.signing_key_file, key="[link] signing_key_file")
-    return Signing.from_passphrase(secret, wall_clock)
+    return Signing.from_passphrase(secret, wall_clock, record)
 
 
 def recorder(

@@ -12,7 +12,7 @@ from onboard.push.policy import VehicleCondition
 
 
 def link_view(
-    link: Link, *, condition: VehicleCondition, messages: dict[str, MessageRate], signed: bool
+    link: Link, *, condition: VehicleCondition, messages: dict[str, MessageRate], signed: bool, warnings: tuple[str, ...] = ()
 ) -> LinkView:
     """Health of the link, and who is behind it."""
     autopilot = link.autopilot
@@ -44,6 +44,7 @@ def link_view(
             for connection in link.connections
         ),
         signed=signed,
+        warnings=warnings,
         system_id=autopilot.system if autopilot else None,
         component_id=autopilot.component if autopilot else None,
         autopilot=autopilot.firmware_name if autopilot else None,

@@ -44,7 +44,10 @@ class EndpointView(Record, frozen=True, kw_only=True):
 
 
 class LinkView(Record, frozen=True, kw_only=True):
-    """Health of the link and identity of the autopilot behind it."""
+    """Health of the link and identity of the autopilot behind it.
+
+    ``warnings``: what on the wire is not as it should be now, one sentence each.
+    """
 
     state: str
     endpoints: tuple[EndpointView, ...]
@@ -57,6 +60,7 @@ class LinkView(Record, frozen=True, kw_only=True):
     landed: bool | None
     messages: dict[str, MessageRate]
     counters: dict[str, int]
+    warnings: tuple[str, ...] = ()
 
 
 class TrustView(Record, frozen=True, kw_only=True):

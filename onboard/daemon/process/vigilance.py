@@ -1,0 +1,97 @@
+"""Vigilance: what on the wire is not as it should be, told when it begins and shown while it lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from onboard.daemon.process.condition import Observed
+from onboard.daemon.view.notices import Notices
+from onboard.mavlink.link import Link
+from onboard.mavlink.repetitions import Repetitions
+from onboard.mavlink.signing import Signing
+
+CLOCK_APART_S = 60.0
+"""s between the clocks of signing from which on it is said [protocol: what a new stream may lag]."""
+
+
+class Vigilance:
+    """Looks at the link and at what it brings; ``now`` is a monotonic clock, s.
+
+    Args:
+        link: what is heard, and of whom.
+        observed: the vehicle's condition.
+        signing: the key's bookkeeping, None without a key.
+        repetitions: samples with one time stamp and different content.
+        notices: where it is told.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        observed: Observed,
+        signing: Signing | None,
+        repetitions: Repetitions,
+        notices: Notices,
+    ) -> None:
+        self._link = link
+        self._observed = observed
+        self._signing = signing
+        self._repetitions = repetitions
+        self._notices = notices
+        self._told: set[str] = set()
+
+    def tell(self, now: float) -> None:
+        """Say what has begun since the last time."""
+        found = dict(self._found(now))
+        for kind, text in found.items():
+            if kind not in self._told:
+                self._notices.post(kind, text, warning=True)
+        self._told = set(found)
+
+    def warnings(self, now: float) -> tuple[str, ...]:
+        """What is so now, one sentence each."""
+        return tuple(text for _, text in self._found(now))
+
+    def _found(self, now: float) -> Iterator[tuple[str, str]]:
+        if self._signing is None and (open_ones := self._open_to_a_network()):
+            yield (
+                "unsigned_network",
+                f"{open_ones}: anybody on that network can speak as the vehicle; "
+                "give [link] signing_key_file",
+            )
+        rivals = self._link.presence.rivals(now)
+        if rivals:
+            yield "rivals", f"{rivals} more on the link speak as the vehicle; they are not believed"
+        if self._observed.contradicted(now):
+            yield (
+                "heartbeats_contradict",
+                "heartbeats say armed and disarmed at the same time: nothing is written",
+            )
+        if self._link.twins.there(now):
+            yield "twin", "another onboard service serves this vehicle; the one that came later yields"
+        if self._repetitions.doubtful(now):
+            yield (
+                "samples_contradict",
+                "samples with one time stamp say different things: both are dropped",
+            )
+        yield from self._clocks()
+
+    def _clocks(self) -> Iterator[tuple[str, str]]:
+        signing = self._signing
+        if signing is None:
+            return
+        if signing.behind_s:
+            yield (
+                "signing_behind",
+                f"signed packets lie {signing.behind_s:.0f} s behind: an old recording, or clocks "
+                "that differ; refused until they catch up",
+            )
+        if signing.ahead_s > CLOCK_APART_S:
+            yield (
+                "signing_ahead",
+                f"this computer's clock is {signing.ahead_s:.0f} s behind the vehicle's signing clock",
+            )
+
+    def _open_to_a_network(self) -> str:
+        endpoints = (connection.endpoint for connection in self._link.connections)
+        return ", ".join(str(endpoint) for endpoint in endpoints if endpoint.is_open_to_a_network)

@@ -1,0 +1,69 @@
+"""Samples with one time stamp and different content: somebody else speaks in the vehicle's voice.
+
+An autopilot stamps each sample once.  The same packet may come twice, and then it says the same.
+Where two say different things with one stamp, one of them is not the vehicle's, and nobody can tell
+which: neither is to be believed.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, Sample
+from onboard.mavlink import limits
+
+Stamped: TypeAlias = ImuSample | AttitudeSample | GpsFix
+
+
+class Repetitions:
+    """Remembers the newest sample of each stream; ``now`` is the link's clock, s."""
+
+    def __init__(self) -> None:
+        self.contradictions = 0
+        self._newest: dict[tuple[object, ...], Stamped] = {}
+        self._spoilt: dict[tuple[object, ...], float] = {}
+        self._doubtful_at = -limits.DOUBTFUL_S
+
+    def contradicts(self, sample: Sample, now: float) -> Sample | None:
+        """A sample of the same stream and stamp that says something else; None: all is well.
+
+        Once a stamp is spoilt, whatever comes with it is contradicted, by itself if need be.
+        """
+        if not isinstance(sample, ImuSample | AttitudeSample | GpsFix):
+            return None
+        key = _stream(sample)
+        before = self._newest.get(key)
+        if before is None or before.t != sample.t:
+            self._newest[key] = sample
+            return None
+        if self._spoilt.get(key) != sample.t and _content(before) == _content(sample):
+            return None
+        self._spoilt[key] = sample.t
+        self.contradictions += 1
+        self._doubtful_at = now
+        return before
+
+    def doubtful(self, now: float) -> bool:
+        """Whether that has happened of late."""
+        return now - self._doubtful_at < limits.DOUBTFUL_S
+
+
+def _stream(sample: Stamped) -> tuple[object, ...]:
+    match sample:
+        case ImuSample():
+            return (ImuSample, sample.imu, sample.source)
+        case GpsFix():
+            return (GpsFix, sample.receiver)
+        case _:
+            return (AttitudeSample,)
+
+
+def _content(sample: Stamped) -> tuple[object, ...]:
+    """What two packets of one sample have in common, NaN being like NaN."""
+    match sample:
+        case ImuSample():
+            return (sample.f_b, sample.w_b)
+        case GpsFix():  # quality is updated between fixes, position and velocity are not
+            return (sample.latitude, sample.longitude, repr((sample.v_n, sample.v_e)))
+        case _:
+            return (sample.roll, sample.pitch, sample.yaw)
