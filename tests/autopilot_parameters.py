@@ -206,6 +206,13 @@ class World:
                 self.outputs.append(output)
                 self.act(output)
 
+    def beat_due(self):
+        """When the autopilot's next HEARTBEAT is due, for subclasses that need them."""
+        return math.inf
+
+    def beat(self):
+        """For subclasses: it is due."""
+
     def act(self, output):
         """For subclasses: journal and the like."""
 
@@ -224,6 +231,7 @@ class World:
                 self.link.due(),
                 math.inf if deadline is None else deadline,
                 self.agenda[0][0] if self.agenda else math.inf,
+                self.beat_due(),
             )
             if following > until or following == math.inf:
                 self.now = max(self.now, until) if until < math.inf else self.now
@@ -233,6 +241,8 @@ class World:
         raise AssertionError("it never comes to rest")
 
     def _happen(self):
+        if self.beat_due() <= self.now:
+            self.beat()
         while self.agenda and self.agenda[0][0] <= self.now:
             self.agenda.pop(0)[1]()
         for event in self.autopilot.step(self.now):

@@ -145,6 +145,9 @@ ATTEMPTS: Final = 5
 eighteen [data]."""
 FIRST_TIMEOUT_S: Final = 0.7
 """s before the second try [tuned]."""
+REPEAT_PAUSE_S: Final = 0.25
+"""s between two writes of one parameter, whatever answers come: a good link answers in a tenth
+[tuned]."""
 TIMEOUT_GROWTH: Final = 1.5
 """Ratio of one wait to that before it [tuned]."""
 LONGEST_TIMEOUT_S: Final = 3.0

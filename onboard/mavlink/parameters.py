@@ -106,13 +106,17 @@ ParameterOutput: TypeAlias = SendAction | ParameterResult
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClientSettings:
-    """Patience of the client: reads at a time, tries of each, and how long each try waits (s)."""
+    """Patience of the client: reads at a time, tries of each, and how long each try waits (s).
+
+    ``pause_s``: the least time between two writes of one parameter.
+    """
 
     in_flight: int = limits.READS_IN_FLIGHT
     attempts: int = limits.ATTEMPTS
     first_timeout_s: float = limits.FIRST_TIMEOUT_S
     timeout_growth: float = limits.TIMEOUT_GROWTH
     longest_timeout_s: float = limits.LONGEST_TIMEOUT_S
+    pause_s: float = limits.REPEAT_PAUSE_S
 
     def timeout(self, attempt: int) -> float:
         """Seconds to wait after attempt 1, 2, ..."""
@@ -136,6 +140,7 @@ class _Exchange:
     before: float | None = None
     tries: int = 0
     sets: int = 0
+    set_at: float = 0.0
     saved: bool = False
     denied: bool = False
     seen: float | None = None
@@ -271,6 +276,10 @@ class ParameterClient:
             self._end(exchange, SetFailed(exchange.name, Failure.DENIED, value))
         elif exchange.sets >= exchange.attempts:
             self._end(exchange, SetFailed(exchange.name, Failure.NOT_TAKEN, value))
+        elif now < exchange.set_at + self._settings.pause_s:
+            # Not taken yet, or the word of somebody who talks faster than anything is written.
+            exchange.phase = _Phase.SETTING
+            exchange.deadline = exchange.set_at + self._settings.pause_s
         else:
             self._enter(exchange, _Phase.SETTING, now)
 
@@ -312,6 +321,7 @@ class ParameterClient:
     def _send(self, exchange: _Exchange, now: float) -> None:
         if exchange.phase is _Phase.SETTING and exchange.wanted is not None:
             exchange.sets += 1
+            exchange.set_at = now
             attempt = exchange.sets
             self._out.append(SendParamSet(exchange.name, exchange.wanted))
         else:

@@ -59,7 +59,7 @@ class Answers:
                     if course.forward and value != self._expected(name, value):
                         self.hear(course.client.read((name,), now), now)
                 case _:
-                    course.send(output)
+                    course.send(output, now)
 
     def _expected(self, name: str, otherwise: float) -> float:
         plan = self._course.plan

@@ -10,11 +10,13 @@ A step may ask the autopilot for something.  What the parameter client says to t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TypeAlias
 
 from onboard.errors import PushError
+from onboard.mavlink.parameter_messages import SendAction, SendParamSet
 from onboard.mavlink.parameters import ClientSettings, ParameterClient, ParameterOutput
 from onboard.push import limits
 from onboard.push.entries import (
@@ -39,12 +41,18 @@ NOTHING: Heard = ()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TransactionSettings:
-    """``settle_s`` must exceed the longest delay of the link; ``limit_s`` is for the way to new."""
+    """``settle_s`` must exceed the longest delay of the link; ``limit_s`` is for the way to new.
+
+    ``fresh_s``: so old the last word that it is disarmed may be when a new value is sent;
+    ``armed_undo_s``: so long after the first word that it is armed old values are written back.
+    """
 
     client: ClientSettings = field(default_factory=ClientSettings)
     settle_s: float = limits.SETTLE_S
     limit_s: float = limits.TRANSACTION_S
     undo_rounds: int = limits.UNDO_ROUNDS
+    fresh_s: float = limits.FRESH_S
+    armed_undo_s: float = limits.ARMED_UNDO_S
 
 
 class Course:
@@ -73,6 +81,11 @@ class Course:
         self.state = State.NEW
         self.progress = Progress()
         self.settled_at: float | None = None
+        self.fresh_until = -math.inf
+        """Until then a new value may be sent: the vehicle has just said that it is disarmed."""
+        self.undo_until: float | None = None
+        """Until then an old value may be sent, for the vehicle is armed; None: it is not."""
+        self._held: dict[str, SendParamSet] = {}
         self.journal_broken = False
         self.result = Result.INTERRUPTED
         self.reason, self.sentence = Reason.NONE, ""
@@ -100,6 +113,8 @@ class Course:
             raise PushError(f"no transition from {self.state.value} by {trigger.value}")
         previous, self.state = self.state, following
         self.settled_at = None
+        if not self.forward:
+            self._held.clear()
         match following:
             case State.COMPARING | State.VERIFYING | State.UNDO_VERIFYING:
                 return self._read_six(now)
@@ -127,14 +142,43 @@ class Course:
     def write_next(self, now: float) -> Heard:
         """Write what is next in the queue, or go on when all is written."""
         undo = self.state is State.UNDOING
-        target = self.plan.before if undo else self.plan.wanted
         if not self.progress.queue:
-            return self.go(Trigger.DONE, now)
-        name = self.progress.queue.pop(0)
+            return NOTHING if undo and self.client.busy else self.go(Trigger.DONE, now)
+        heard = self._write(self.progress.queue.pop(0), now, undo=undo)
+        # An armed vehicle gets its old values back all at once: there is no time for one by one.
+        while undo and self.undo_until is not None and self.progress.queue:
+            heard += self._write(self.progress.queue.pop(0), now, undo=True)
+        return heard
+
+    def _write(self, name: str, now: float, *, undo: bool) -> Heard:
+        value = (self.plan.before if undo else self.plan.wanted)[name]
         previous = self.progress.values[name]
         self.progress.written.add(name)
-        self.record(Writing(self.identifier, name, previous, target[name], undo))
-        return self.client.set(name, target[name], now, before=previous)
+        self.record(Writing(self.identifier, name, previous, value, undo))
+        return self.client.set(name, value, now, before=previous)
+
+    # Armed or not
+
+    def disarmed(self, now: float) -> None:
+        """The vehicle has just said so: what was held back may go."""
+        self.undo_until = None
+        self.fresh_until = now + self._settings.fresh_s
+        self._out.extend(self._held.values())
+        self._held.clear()
+
+    def armed(self, now: float) -> None:
+        """It has just said that: no new value from here on, and not much time for old ones."""
+        self.fresh_until = -math.inf
+        if self.undo_until is None:
+            self.undo_until = now + self._settings.armed_undo_s
+
+    def out_of_time(self, now: float, *, flying: bool = False) -> Heard:
+        """Leave what is not undone yet to the next time on the ground, once it is too late."""
+        if self.state not in {State.INSPECTING, State.UNDOING} or self.undo_until is None:
+            return NOTHING
+        if not flying and now < self.undo_until:
+            return NOTHING
+        return self.stuck(Reason.ARMED, "armed: the rest is undone on the ground", now)
 
     def trouble(self, reason: Reason, sentence: str, now: float) -> Heard:
         """Turn towards "old"; on that way already, or closing, it changes nothing."""
@@ -171,9 +215,15 @@ class Course:
             return self.go(Trigger.DURABLE, now)
         return NOTHING
 
-    def send(self, output: TransactionOutput) -> None:
-        """Hand out a message that the parameter client wants sent."""
-        self._out.append(output)
+    def send(self, output: SendAction, now: float) -> None:
+        """Hand out a message that the parameter client wants sent.
+
+        A new value waits for a vehicle that has just said that it is disarmed.
+        """
+        if isinstance(output, SendParamSet) and self.forward and now > self.fresh_until:
+            self._held[output.name] = output
+        else:
+            self._out.append(output)
 
     def flush(self) -> tuple[TransactionOutput, ...]:
         """All that is to be acted on, in order."""
@@ -200,6 +250,8 @@ class Course:
         self.progress.rounds += 1
         if self.progress.rounds > self._settings.undo_rounds:
             return self.stuck(Reason.REVERTED, "what is undone does not stay undone", now)
+        if self.undo_until is not None and now >= self.undo_until:
+            return self.out_of_time(now)
         return self.write_next(now)
 
     def _close(self, previous: State) -> None:

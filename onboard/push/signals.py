@@ -47,16 +47,25 @@ class JournalFailed:
 
 @dataclass(frozen=True, slots=True)
 class VehicleReport:
-    """Armed state and EKF health (:func:`onboard.push.policy.ekf_healthy`), None if unknown."""
+    """Armed, EKF health (:func:`onboard.push.policy.ekf_healthy`), landed; None if unknown."""
 
     armed: bool | None = None
     ekf_healthy: bool | None = None
+    landed: bool | None = None
 
     @classmethod
     def of(cls, condition: VehicleCondition) -> Self:
         """What a transaction and the watch after it need of a vehicle's condition."""
         flags = condition.ekf_flags
-        return cls(condition.armed, None if flags is None else ekf_healthy(flags))
+        healthy = None if flags is None else ekf_healthy(flags)
+        return cls(condition.armed, healthy, condition.landed)
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """A HEARTBEAT has come this moment; armed counts from whomever it comes."""
+
+    armed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +90,7 @@ TransactionEvent: TypeAlias = (
     | JournalWritten
     | JournalFailed
     | VehicleReport
+    | Heartbeat
     | Rebooted
     | LinkLost
     | Cancelled

@@ -42,13 +42,29 @@ to tell an old one from a new one.  So, after the last write, the transaction le
 ``settle_s`` pass before it reads all six once more and believes them.  (Until then a late
 copy of a write that was rolled back can put any mixture in force for a moment.)
 
-**Arming.**  A landed push that sees the vehicle arm goes back at once: the old values have
-flown, a half-verified set has not.  A resumed transaction whose writes had all been
-confirmed needs only reading, and is finished whether armed or not.
+**Arming.**  A landed push sends a new value only within ``fresh_s`` after a HEARTBEAT that said
+disarmed, and none after one that said armed.  Three things could then be done with a set of which
+a part is written:
+
+* *Finish it.*  The vehicle would take off with values that were in force for a second, read back
+  for the first time in the air; and values would be set after it was armed.
+* *Leave it.*  Axes do not mix: an axis is old or new, or, one at most, a new scale with an old
+  offset, which errs by more than either.  The EKF, which has learned the remaining offsets of the
+  old set for minutes, would take off with those of neither.
+* *Undo it*, which is what is done.  The old values have flown, and the EKF's offsets are still
+  theirs: it forgets in tens of seconds, and a push takes two.  The steps are small, known, and back
+  to where it was.  But only while the vehicle stands: ArduPilot keeps motors idle for 2 s after
+  arming, and ``armed_undo_s`` after the first HEARTBEAT that says armed, or as soon as it says that
+  it is in the air, nothing more is written.  What is left is then undone after the next landing, for
+  the journal stays open.  To be in time all old values are sent at once, not one by one.
+
+A resumed transaction whose writes had all been confirmed needs only reading, and is finished whether
+armed or not.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Self
 
 from onboard.errors import PushError
@@ -68,6 +84,7 @@ from onboard.push.entries import (
 from onboard.push.plan import PushPlan
 from onboard.push.signals import (
     Cancelled,
+    Heartbeat,
     JournalFailed,
     JournalWritten,
     LinkLost,
@@ -117,6 +134,8 @@ class PushTransaction:
         self._limit_at: float | None = None
         self._course = Course(plan, identifier, purpose, self._settings, support)
         self._course.progress.turned = recovery is not None and recovery.undo
+        if allow_armed:
+            self._course.fresh_until = math.inf
         self._answers = Answers(self._course, recovery)
 
     @classmethod
@@ -186,6 +205,8 @@ class PushTransaction:
         if course.state is State.FINISHED:
             return None
         deadlines = [course.client.next_deadline(), course.settled_at]
+        if course.state in {State.INSPECTING, State.UNDOING}:
+            deadlines.append(course.undo_until)
         if course.forward:
             deadlines.append(self._limit_at)
         return min((d for d in deadlines if d is not None), default=None)
@@ -195,6 +216,7 @@ class PushTransaction:
         course, answers = self._course, self._answers
         if course.state in {State.NEW, State.FINISHED}:
             return ()
+        answers.hear(course.out_of_time(now), now)
         answers.hear(course.client.tick(now), now)
         if course.settled_at is not None and now >= course.settled_at:
             course.settled_at = None
@@ -221,6 +243,8 @@ class PushTransaction:
                 heard = course.journalled(now)
             case VehicleReport():
                 heard = self._vehicle(event, now)
+            case Heartbeat(armed):
+                heard = self._heartbeat(now, armed=armed)
             case Rebooted():
                 heard = course.trouble(Reason.REBOOTED, "the autopilot rebooted in the middle", now)
             case LinkLost():
@@ -231,13 +255,27 @@ class PushTransaction:
         self._answers.hear(heard, now)
         return course.flush()
 
+    def _heartbeat(self, now: float, *, armed: bool) -> Heard:
+        """A landed push sends new values only to a vehicle that has just said it is disarmed."""
+        course = self._course
+        if self._allow_armed:
+            return NOTHING
+        if not armed:
+            course.disarmed(now)
+            return NOTHING
+        course.armed(now)
+        if course.progress.finishing:
+            return NOTHING  # it only reads
+        return course.trouble(Reason.ARMED, "the vehicle was armed in the middle", now)
+
     def _vehicle(self, report: VehicleReport, now: float) -> Heard:
         """Armed in the middle, or in flight with an EKF that became unhealthy."""
         course = self._course
         if course.progress.finishing or not report.armed:
             return NOTHING
         if not self._allow_armed:
-            return course.trouble(Reason.ARMED, "the vehicle was armed in the middle", now)
+            flying = course.out_of_time(now, flying=report.landed is False)
+            return flying or self._heartbeat(now, armed=True)
         if report.ekf_healthy is False:
             return course.trouble(Reason.EKF_UNHEALTHY, "the EKF became unhealthy", now)
         return NOTHING

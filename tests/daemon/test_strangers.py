@@ -127,10 +127,9 @@ async def test_nobody_on_the_wire_loosens_the_policy(source, document, daemon, p
         assert vehicle.sets == []
 
 
-async def armed_in_the_middle(document, daemon, port, after_sets):
-    """(new values, all values) set after the vehicle armed, and how long after, s."""
+async def armed_in_the_middle(document, daemon, port, after_sets, *, says_so_at_once):
+    """What was set after the vehicle armed: (s after arming, whether it is a new value)."""
     loop = asyncio.get_running_loop()
-    document["push"]["disarmed_s"] = 2.0
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = dict(zip(SIX, in_force(vehicle), strict=True))
         armed_at, sets = None, []
@@ -143,6 +142,8 @@ async def armed_in_the_middle(document, daemon, port, after_sets):
             sets.append((loop.time(), new))
             if len(sets) == after_sets:
                 vehicle.armed, armed_at = True, loop.time()
+                if says_so_at_once:
+                    vehicle.send(mavlink.MAVLink_heartbeat_message(2, 3, 128, 0, 4, 3))
 
         vehicle._set = set_and_note
         convinced(service, WANTED)
@@ -152,30 +153,156 @@ async def armed_in_the_middle(document, daemon, port, after_sets):
         return late, in_force(vehicle), tuple(before.values()), service.snapshot()
 
 
-@pytest.mark.parametrize("after_sets", [1, 3, 5])
-async def test_a_vehicle_that_arms_gets_no_new_value_and_its_old_ones_at_once(
+@pytest.mark.parametrize("after_sets", [1, 3, 5, 6])
+async def test_who_says_at_once_that_it_armed_gets_its_old_values_back_at_once(
     after_sets, document, daemon, port
 ):
-    late, now, old, snapshot = await armed_in_the_middle(document, daemon, port, after_sets)
-    print("after arming:", [(round(t, 2), "new" if new else "old") for t, new in late])
+    late, now, old, snapshot = await armed_in_the_middle(
+        document, daemon, port, after_sets, says_so_at_once=True
+    )
+    assert [new for _, new in late] == [False] * after_sets
+    assert late[-1][0] < 0.5
     assert now == pytest.approx(old, rel=1e-6)
-    assert max((t for t, new in late if new), default=0.0) <= 1.1  # until its next HEARTBEAT
-    assert max((t for t, _ in late), default=0.0) <= 3.0
     assert snapshot.push.state == "idle"
 
 
-async def test_of_two_services_the_later_one_writes_nothing(
-    document, daemon, port, tmp_path, unused_port
+@pytest.mark.parametrize("after_sets", [1, 3, 5])
+async def test_who_says_so_with_the_next_heartbeat_gets_no_new_value_after_it(
+    after_sets, document, daemon, port
 ):
+    late, now, old, snapshot = await armed_in_the_middle(
+        document, daemon, port, after_sets, says_so_at_once=False
+    )
+    assert all(t <= 1.1 for t, new in late if new)  # its HEARTBEAT comes within a second
+    assert all(t <= 1.1 + 2.0 for t, _ in late)
+    assert now == pytest.approx(old, rel=1e-6) or now == pytest.approx(NEW, rel=1e-6)
+    assert snapshot.push.state == "idle"
+
+
+async def test_heartbeats_that_contradict_each_other_stop_a_push_and_are_shown(
+    document, daemon, port
+):
+    """Somebody forges the vehicle's own address, so that only what he says gives him away."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        old = in_force(vehicle)
+        taken = vehicle._set
+
+        def set_and_contradict(message):
+            taken(message)
+            if len(vehicle.sets) == 2:
+                for mode in (128, 0):
+                    vehicle.send(mavlink.MAVLink_heartbeat_message(2, 3, mode, 0, 4, 3))
+
+        vehicle._set = set_and_contradict
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.last_outcome is not None)
+        assert in_force(vehicle) == pytest.approx(old, rel=1e-6)
+        sets = len(vehicle.sets)
+        await asyncio.sleep(10.0)
+        snapshot = service.snapshot()
+        assert len(vehicle.sets) == sets
+        assert any("armed and disarmed" in warning for warning in snapshot.link.warnings)
+        assert "heartbeats_contradict" in snapshot.push.proposals[0].held_back
+
+
+async def test_a_rival_that_says_armed_is_believed_as_far_as_that(
+    document, daemon, port, stranger
+):
+    """Whichever of the two is the vehicle: one of them is armed."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.parts.parameters.complete)
+        async with repeated(lambda: stranger.beat(armed=True), 1.0):
+            await asyncio.sleep(2.0)
+            convinced(service, WANTED)
+            await asyncio.sleep(20.0)
+            snapshot = service.snapshot()
+        assert vehicle.sets == []
+        assert snapshot.link.counters["foreign"] > 10
+        assert any("speak as the vehicle" in warning for warning in snapshot.link.warnings)
+
+
+async def test_what_is_for_the_vehicle_goes_to_the_vehicle_alone(document, daemon, port, stranger):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.parts.parameters.complete)
+        async with repeated(stranger.beat, 1.0):
+            await asyncio.sleep(3.0)
+            convinced(service, WANTED)
+            await until(lambda: in_force(vehicle) == pytest.approx(NEW, rel=1e-6))
+        kinds = {message.get_type() for message in stranger.heard()}
+        assert "HEARTBEAT" in kinds
+        assert not kinds & {"PARAM_SET", "PARAM_REQUEST_READ", "COMMAND_LONG"}
+
+
+async def test_samples_of_a_stranger_are_not_the_vehicles(document, daemon, port, stranger):
+    """With the vehicle's own time stamps, and sent first."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.parts.parameters.complete)
+        heard = []
+        taken = service.handover.take
+        service.handover.take = lambda message: heard.append(message) or taken(message)
+
+        def forge():
+            ms = int(vehicle.boot_ms + 1e3 * vehicle._period)
+            false = mavlink.MAVLink_raw_imu_message(ms * 1000, 500, 0, -1000, 0, 0, 0, 0, 0, 0)
+            stranger.say(false)
+
+        async with repeated(forge, vehicle._period):
+            await asyncio.sleep(10.0)
+        assert {m.xacc for m in heard if m.get_type() == "RAW_IMU"} == {0}
+
+
+async def test_two_samples_of_one_stamp_are_both_dropped_and_shown(document, daemon, port):
+    """From the vehicle's own address: nobody can tell which is true."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.parts.parameters.complete)
+        convinced(service, WANTED)
+        ms = int(vehicle.boot_ms) + 1
+        kept = service.handover._samples
+        for xacc in (500, 0, 500):
+            vehicle.send(
+                mavlink.MAVLink_raw_imu_message(ms * 1000, xacc, 0, -1000, 0, 0, 0, 0, 0, 0)
+            )
+        vehicle.armed = True
+        await until(lambda: service.snapshot().counters.get("samples_contradict"))
+        kept = [s for s in service.handover._samples if getattr(s, "t", None) == ms * 1e-3]
+        assert not [s for s in kept if type(s).__name__ == "ImuSample"]
+        await asyncio.sleep(2.0)
+        snapshot = service.snapshot()
+        assert any("one time stamp" in warning for warning in snapshot.link.warnings)
+        assert "doubtful" in snapshot.push.proposals[0].held_back
+
+
+class Routed(Vehicle):
+    """Serves two ports, and hands on what is for everybody, as ArduPilot does."""
+
+    def __init__(self, port, other):
+        super().__init__(port)
+        self._ports = [("127.0.0.1", port), ("127.0.0.1", other)]
+
+    def send(self, message):
+        packet = message.pack(self._mav)
+        for address in self._ports:
+            self._transport.sendto(packet, address)
+
+    def datagram_received(self, data, address):
+        for other in self._ports:
+            if other != address and mavlink.MAVLink(None).decode(bytearray(data)).get_msgId() == 0:
+                self._transport.sendto(data, other)
+        super().datagram_received(data, address)
+
+
+async def test_of_two_services_the_later_one_writes_nothing(document, daemon, port, tmp_path):
+    with Stranger(0) as probe:
+        other = probe._socket.getsockname()[1]
     second = document | {
-        "link": {"endpoints": [f"udpin:127.0.0.1:{unused_port}"]},
+        "link": {"endpoints": [f"udpin:127.0.0.1:{other}"]},
         "state": {"directory": str(tmp_path / "second")},
     }
-    async with daemon(document) as first, Vehicle(port) as vehicle:
+    async with daemon(document) as first, Routed(port, other) as vehicle:
         vehicle.armed = True
         await until(lambda: first.parts.parameters.complete)
-        await asyncio.sleep(5.0)
-        async with daemon(second) as later, Vehicle.again(vehicle, unused_port):
+        await asyncio.sleep(6.0)
+        async with daemon(second) as later:
             await until(lambda: later.parts.parameters.complete)
             await asyncio.sleep(3.0)
             convinced(first, WANTED)
@@ -185,4 +312,6 @@ async def test_of_two_services_the_later_one_writes_nothing(
             await asyncio.sleep(10.0)
             assert len(vehicle.sets) == 6
             assert later.snapshot().push.can_roll_back == ()
-            assert "other service" in later.snapshot().mode_reason
+            assert "was there first" in later.snapshot().mode_reason
+        await asyncio.sleep(15.0)
+        assert first.snapshot().mode == "active"

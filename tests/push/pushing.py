@@ -1,11 +1,13 @@
 """A push in virtual time: autopilot, link, journal on disk and a process that can be killed."""
 
+import math
+
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.errors import StateError
 from onboard.push.entries import Closed, Planned, Result, Undoing, Writing, audit
 from onboard.push.journal import Journal
 from onboard.push.plan import Baseline, Change, PushPlan, Vehicle
-from onboard.push.signals import Finished, JournalFailed, JournalWritten, Record
+from onboard.push.signals import Finished, Heartbeat, JournalFailed, JournalWritten, Record
 from onboard.push.transaction import PushTransaction
 from tests.autopilot_parameters import Autopilot, Weather, World, accelerometer_parameters, float32
 
@@ -47,6 +49,8 @@ class PushWorld(World):
         self.journal = Journal(path)
         self.journal_broken_after = None
         self.eager = False
+        self.armed = False
+        self._next_beat = 0.1
         self.outcomes = []
 
     def handle(self, outputs):
@@ -88,6 +92,18 @@ class PushWorld(World):
         self.steps += 1
         if self.life is not None and self.steps > self.life:
             raise CrashError
+
+    def beat_due(self):
+        return math.inf if self.client is None else max(self._next_beat, self.now)
+
+    def beat(self):
+        self._next_beat = max(self._next_beat, self.now) + 1.0
+        if self.now >= self.autopilot.silent_until:
+            self.link.send(Heartbeat(self.armed), "us", self.now)
+
+    def arm(self):
+        """It arms, and says so with its next HEARTBEAT."""
+        self.armed = True
 
     def push(self, **kwargs):
         kwargs.setdefault("system_id", 1)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import uuid
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import msgspec
 
@@ -38,7 +37,7 @@ from onboard.push.course import TransactionSettings
 from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.policy import VehicleCondition
-from onboard.push.signals import Cancelled, LinkLost, Outcome, Reason, Rebooted, VehicleReport
+from onboard.push.signals import Cancelled, Heartbeat, LinkLost, Outcome, Reason, Rebooted, VehicleReport
 from onboard.push.transaction import PushTransaction
 
 PATIENCE = TransactionSettings()
@@ -222,8 +221,7 @@ class Pusher:
         self._ended(self._writer.tell(Cancelled(sentence), now), now)
 
     def _heard_armed(self, armed: bool, now: float) -> None:  # noqa: FBT001 - what was heard
-        report = replace(self._report, armed=armed)
-        self._ended(self._writer.tell(report, now), now)
+        self._ended(self._writer.tell(Heartbeat(armed), now), now)
 
     def _read_ledger(self) -> None:
         self._duties.read(busy=self.busy, in_flight_since=self._in_flight_since)
