@@ -63,5 +63,8 @@ CLEAR_EVIDENCE: Final = 9.0
 """Twice a difference of log-likelihoods: three standard deviations for one number."""
 SAME: Final = 1e-6
 """No unit and m/s^2: parameters are float32, which has seven digits."""
+ROUNDED: Final = 1e-4
+"""No unit and m/s^2: a value this near to what was written is what the autopilot made of it.  As a
+calibration it is nothing: a hundredth of the least change that is worth a push."""
 UNCHANGED: Final = 1.2e-7
 """Below FLT_EPSILON ArduPilot takes two floats for equal and may not store the difference."""

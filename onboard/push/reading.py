@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from onboard.push import limits
 from onboard.push.plan import PushPlan, offset_is_zero
 
 
@@ -30,9 +31,15 @@ class Reading:
 
     @property
     def foreign(self) -> frozenset[str]:
-        """Names whose value is neither old nor new: somebody else's, not ours to touch."""
+        """Names whose value is neither old nor new: somebody else's, not ours to touch.
+
+        What an autopilot has rounded when it took it from us is ours.
+        """
         return frozenset(
-            c.name for c in self.plan.changes if self.values[c.name] not in {c.before, c.wanted}
+            c.name
+            for c in self.plan.changes
+            if self.values[c.name] != c.before
+            and abs(self.values[c.name] - c.wanted) > limits.ROUNDED
         )
 
     @property
