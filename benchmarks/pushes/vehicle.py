@@ -141,9 +141,7 @@ class Autopilot:
 
     def _later(self, delay: float, what: Any) -> None:
         boots = self.boots
-        self._agenda.at(
-            self._agenda.now + delay, lambda: what() if boots == self.boots else None
-        )
+        self._agenda.at(self._agenda.now + delay, lambda: what() if boots == self.boots else None)
 
     def _read(self, name: str) -> None:
         self._reads -= 1

@@ -248,9 +248,7 @@ class Link:
             if frame.message is not None:
                 self._audience.hear(now, frame.message_id, frame.message)
 
-    def _is_believed(
-        self, source: Source, way: Way, peer: Peer, frame: Frame, now: float
-    ) -> bool:
+    def _is_believed(self, source: Source, way: Way, peer: Peer, frame: Frame, now: float) -> bool:
         """Take note of a packet; whether it is to be handed on."""
         if source == self._own:
             self.echoed += 1
@@ -326,7 +324,9 @@ class Link:
     def _tick(self, now: float) -> None:
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
-            self.send(_our_heartbeat(self.twins.signature(now)))  # over UDP it also tells the peer where we are
+            self.send(
+                _our_heartbeat(self.twins.signature(now))
+            )  # over UDP it also tells the peer where we are
         for connection in self.connections:
             connection.check(now)
         silent = self.presence.check(now)

@@ -74,24 +74,22 @@ async def test_one_who_was_there_first_and_is_silent_about_flight_gives_way(
     document, daemon, port, stranger
 ):
     document["push"]["disarmed_s"] = 2.0
-    async with daemon(document) as service:
-        async with repeated(lambda: stranger.beat(system=77), 1.0):
-            await until(lambda: service.link.autopilot is not None)
-            async with Vehicle(port) as vehicle:
-                convinced(service, WANTED)
-                await until(lambda: service.link.autopilot.system == 1)
-                await until(lambda: in_force(vehicle) == pytest.approx(NEW, rel=1e-6))
+    async with daemon(document) as service, repeated(lambda: stranger.beat(system=77), 1.0):
+        await until(lambda: service.link.autopilot is not None)
+        async with Vehicle(port) as vehicle:
+            convinced(service, WANTED)
+            await until(lambda: service.link.autopilot.system == 1)
+            await until(lambda: in_force(vehicle) == pytest.approx(NEW, rel=1e-6))
 
 
 async def test_another_component_of_the_system_does_not_lock_the_autopilot_out(
     document, daemon, port, stranger
 ):
     document["link"]["system_id"] = 1
-    async with daemon(document) as service:
-        async with repeated(lambda: stranger.beat(component=50), 1.0):
-            await until(lambda: service.link.autopilot is not None)
-            async with Vehicle(port):
-                await until(lambda: service.link.autopilot.component == 1)
+    async with daemon(document) as service, repeated(lambda: stranger.beat(component=50), 1.0):
+        await until(lambda: service.link.autopilot is not None)
+        async with Vehicle(port):
+            await until(lambda: service.link.autopilot.component == 1)
 
 
 async def test_eight_who_say_nothing_do_not_keep_the_vehicle_out(document, daemon, port):
@@ -205,9 +203,7 @@ async def test_heartbeats_that_contradict_each_other_stop_a_push_and_are_shown(
         assert "heartbeats_contradict" in snapshot.push.proposals[0].held_back
 
 
-async def test_a_rival_that_says_armed_is_believed_as_far_as_that(
-    document, daemon, port, stranger
-):
+async def test_a_rival_that_says_armed_is_believed_as_far_as_that(document, daemon, port, stranger):
     """Whichever of the two is the vehicle: one of them is armed."""
     async with daemon(document) as service, Vehicle(port) as vehicle:
         await until(lambda: service.parts.parameters.complete)

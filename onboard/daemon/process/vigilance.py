@@ -68,7 +68,10 @@ class Vigilance:
                 "heartbeats say armed and disarmed at the same time: nothing is written",
             )
         if self._link.twins.there(now):
-            yield "twin", "another onboard service serves this vehicle; the one that came later yields"
+            yield (
+                "twin",
+                "another onboard service serves this vehicle; the one that came later yields",
+            )
         if self._repetitions.doubtful(now):
             yield (
                 "samples_contradict",

@@ -37,7 +37,15 @@ from onboard.push.course import TransactionSettings
 from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.policy import VehicleCondition
-from onboard.push.signals import Cancelled, Heartbeat, LinkLost, Outcome, Reason, Rebooted, VehicleReport
+from onboard.push.signals import (
+    Cancelled,
+    Heartbeat,
+    LinkLost,
+    Outcome,
+    Reason,
+    Rebooted,
+    VehicleReport,
+)
 from onboard.push.transaction import PushTransaction
 
 PATIENCE = TransactionSettings()

@@ -12,7 +12,12 @@ from onboard.push.policy import VehicleCondition
 
 
 def link_view(
-    link: Link, *, condition: VehicleCondition, messages: dict[str, MessageRate], signed: bool, warnings: tuple[str, ...] = ()
+    link: Link,
+    *,
+    condition: VehicleCondition,
+    messages: dict[str, MessageRate],
+    signed: bool,
+    warnings: tuple[str, ...] = (),
 ) -> LinkView:
     """Health of the link, and who is behind it."""
     autopilot = link.autopilot
