@@ -1,10 +1,10 @@
-# make setup | demo | test | simulate | check | bench | clean.   Needs Python 3.11+, pip and make.
+# make setup | demo | test | simulate | landings | check | bench | clean.   Needs Python 3.11+, pip and make.
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: setup demo test simulate check bench format clean
+.PHONY: setup demo test simulate landings check bench format clean
 
 setup: $(STAMP)
 
@@ -22,7 +22,11 @@ demo: $(STAMP)
 test: $(STAMP)
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
+# Pushes under faults: 100,000 histories, each from its seed; ARGS="--seed 7" plays that one alone.
 simulate: $(STAMP)
+	$(BIN)/python -m benchmarks.pushes $(ARGS)
+
+landings: $(STAMP)
 	$(BIN)/python -m benchmarks.landings $(ARGS)
 
 check: $(STAMP)

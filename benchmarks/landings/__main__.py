@@ -1,4 +1,4 @@
-"""``make simulate``: landings with all that may happen around them, and what was written.
+"""``make landings``: landings with all that may happen around them, and what was written.
 
 ``python -m benchmarks.landings --seed 7 --landings 20`` plays restarts of the daemon, reboots of
 the autopilot, other boards of the same model, bench calibrations and meddling ground stations at

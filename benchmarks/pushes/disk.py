@@ -8,7 +8,6 @@ import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from onboard.push import journal
 
@@ -57,9 +56,9 @@ class Disk:
         if self._is_last():
             raise KilledError
 
-    def open(self, *args: Any) -> int:
+    def open(self, path: Path, flags: int, mode: int = 0o777) -> int:
         """As the system does it; who is killed leaves it to the system to close."""
-        fd = os.open(*args)
+        fd = os.open(path, flags, mode)
         self._open.add(fd)
         return fd
 
@@ -87,7 +86,7 @@ class _Os:
     def __init__(self, disk: Disk) -> None:
         self.fsync, self.open, self.close = disk.fsync, disk.open, disk.close
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         return getattr(os, name)
 
 

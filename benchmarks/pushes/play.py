@@ -366,7 +366,7 @@ class History:
             self._broken(f"{why}, but (is, should be): {wrong}")
 
     def _audit(self) -> None:
-        """After a boot of the autopilot, as the service does it: is what was written still there?"""
+        """After a boot of the autopilot, as the service does it: is it still there?"""
         if self._journal is None:
             return
         self.autopilot.reboot(0.0)

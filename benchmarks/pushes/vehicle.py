@@ -7,11 +7,11 @@ import itertools
 import math
 import random
 import struct
-from typing import Any
+from collections.abc import Callable
+from typing import TypeAlias
 
 from benchmarks.pushes.faults import Weather
 from onboard.mavlink.parameter_messages import (
-    SendAction,
     SendParamRead,
     SendParamSet,
     TextReceived,
@@ -19,6 +19,7 @@ from onboard.mavlink.parameter_messages import (
 )
 from onboard.push.signals import Heartbeat
 
+Deliver: TypeAlias = Callable[[object], None]
 REPLY_S = 0.005
 QUEUE = 20
 
@@ -33,10 +34,10 @@ class Agenda:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self._due: list[tuple[float, int, Any]] = []
+        self._due: list[tuple[float, int, Callable[[], object]]] = []
         self._number = itertools.count()
 
-    def at(self, when: float, what: Any) -> None:
+    def at(self, when: float, what: Callable[[], object]) -> None:
         """Have ``what()`` called at that time."""
         heapq.heappush(self._due, (max(when, self.now), next(self._number), what))
 
@@ -58,7 +59,7 @@ class Link:
         self.weather = weather
         self._agenda, self._rng = agenda, rng
 
-    def carry(self, packet: object, deliver: Any) -> None:
+    def carry(self, packet: object, deliver: Deliver) -> None:
         """Deliver a packet, or not, or twice."""
         weather, rng = self.weather, self._rng
         if self.cut:
@@ -78,7 +79,9 @@ class Autopilot:
     ``hear`` is called with each event that reaches the other side.
     """
 
-    def __init__(self, parameters: dict[str, float], agenda: Agenda, link: Link, hear: Any) -> None:
+    def __init__(
+        self, parameters: dict[str, float], agenda: Agenda, link: Link, hear: Deliver
+    ) -> None:
         self.ram = {name: float32(value) for name, value in parameters.items()}
         self.stored = dict(self.ram)
         self.denied: set[str] = set()
@@ -100,7 +103,7 @@ class Autopilot:
         self._places: set[str] = set()
         agenda.at(0.3, self._beat)
 
-    def receive(self, action: SendAction) -> None:
+    def receive(self, action: object) -> None:
         """A packet has come."""
         if self._agenda.now < self.silent_until:
             return
@@ -139,7 +142,7 @@ class Autopilot:
         self.beat_now()
         self._agenda.at(self._agenda.now + 1.0, self._beat)
 
-    def _later(self, delay: float, what: Any) -> None:
+    def _later(self, delay: float, what: Callable[[], object]) -> None:
         boots = self.boots
         self._agenda.at(self._agenda.now + delay, lambda: what() if boots == self.boots else None)
 

@@ -102,6 +102,11 @@ class Claims:
         self._claims[source, way] = claim
         return claim
 
+    def least_tried(self, now: float) -> Claim | None:
+        """Of those that were heard these seconds, the one whose turn is the longest ago."""
+        live = (c for c in self._claims.values() if now - c.heard <= limits.TWIN_S)
+        return min(live, key=lambda c: -1.0 if c.tried is None else c.tried, default=None)
+
     def keep(self, pinned: Claim) -> None:
         """The vehicle's own claim is not given up."""
         self._claims[pinned.source, pinned.way] = pinned

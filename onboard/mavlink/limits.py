@@ -34,7 +34,7 @@ PEERS_KNOWN: Final = 32
 NEWCOMERS_HZ: Final = 100.0
 """1/s; new addresses that are looked at while the table is full: each costs 40 us [cost]."""
 PEER_BYTES_S: Final = 100e3
-"""bytes/s of one UDP address that is not the vehicle's: ten times what a fast link brings [cost]."""
+"""bytes/s of one UDP address that is not the vehicle's: ten times a fast link's [cost]."""
 VEHICLE_BYTES_S: Final = 2e6
 """bytes/s of the vehicle's address: more than a core can take in [cost]."""
 PEER_SILENCE_S: Final = 30.0
@@ -71,8 +71,8 @@ FAILOVER_S: Final = 1.5
 """s of silence on the endpoint in use after which another one that hears the autopilot takes over:
 one HEARTBEAT missed [data]."""
 PROOF_S: Final = 5.0
-"""s that somebody who calls himself an autopilot has to show time stamps that advance: its rates are
-asked for at once, and an answer takes a second or two on a poor link [tuned]."""
+"""s that somebody who calls himself an autopilot has to show time stamps that advance: its rates
+are asked for at once, and an answer takes a second or two on a poor link [tuned]."""
 PROOF_STAMPS: Final = 3
 """Time stamps that advance make a stream; a HEARTBEAT alone is easily said [tuned]."""
 CLOCK_AGREES_S: Final = 2.0

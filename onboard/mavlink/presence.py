@@ -1,9 +1,9 @@
 """Who the vehicle is: one source on one way, found, proven, silent, back again, or given up.
 
-**One vehicle is one (system, component, endpoint, address).**  The first HEARTBEAT of an autopilot is
-taken up, for without asking it for messages nothing can be proven; it is *pinned* once it has shown
-a stream whose time advances.  What speaks as the vehicle on another way is counted and not handed
-on.  The pin moves in four cases, and never while it is held (a push is under way):
+**One vehicle is one (system, component, endpoint, address).**  The first HEARTBEAT of an autopilot
+is taken up, for without asking it for messages nothing can be proven; it is *pinned* once it has
+shown a stream whose time advances.  What speaks as the vehicle on another way is counted and not
+handed on.  The pin moves in four cases, and never while it is held (a push is under way):
 
 * the one taken up has proven nothing, and another has, or has not been tried yet;
 * it has been silent for a moment, and another way leads to the same boot clock (a second
@@ -122,9 +122,8 @@ class Presence:
             claim = claim or self._claims.make(source, way, message, now)
             if claim is not None:
                 claim.note_heartbeat(message, armed=armed, now=now)
-        if claim is not None:
-            if boot is not None:
-                claim.note_stamp(boot, now)
+        if claim is not None and boot is not None:
+            claim.note_stamp(boot, now)
         heard = self._judge(source, way, claim, beats=beats, now=now)
         if claim is not None:
             claim.heard = now
@@ -186,7 +185,7 @@ class Presence:
             same_system = claim.source[0] == pinned.source[0]
             return same_system and claim.source[1] == AUTOPILOT1 != pinned.source[1]
         waited = now - (pinned.tried or 0.0)
-        turn = claim.tried is None or claim.tried < (pinned.tried or 0.0)
+        turn = claim is self._claims.least_tried(now)
         return not pinned.proven and beats and waited > limits.PROOF_S and turn
 
     def _take(self, claim: Claim, now: float) -> Events:

@@ -7,9 +7,9 @@ one minute behind.
 
 Three things go beyond the specification:
 
-* **Restarts.**  What was accepted and what was sent last outlives the service (:meth:`Signing.kept`),
-  so that neither an old packet is believed again nor a time stamp used twice, with or without a
-  clock that knows the date.
+* **Restarts.**  What was accepted and what was sent last outlives the service
+  (:meth:`Signing.kept`), so that neither an old packet is believed again nor a time stamp used
+  twice, with or without a clock that knows the date.
 * **Several ways.**  One packet can come by two endpoints.  Each way keeps its own record
   (:class:`WaySigning`), and only what is *acted on* counts for all: a copy that comes first on the
   way that stands by does not make the one in use a repetition.
@@ -74,7 +74,7 @@ class Signing:
             raise ValueError(f"a signing key has 32 bytes, this one has {len(key)}")
         self.key = key
         self.behind_s = 0.0
-        """How far the genuine packet that was refused last lies behind, s; 0 once one is accepted."""
+        """How far the genuine packet refused last lies behind, s; 0 once one is accepted."""
         self.ahead_s = 0.0
         """How far the newest accepted packet lies ahead of our own clock, s."""
         self._wall_clock = wall_clock

@@ -55,11 +55,11 @@ a part is written:
   theirs: it forgets in tens of seconds, and a push takes two.  The steps are small, known, and back
   to where it was.  But only while the vehicle stands: ArduPilot keeps motors idle for 2 s after
   arming, and ``armed_undo_s`` after the first HEARTBEAT that says armed, or as soon as it says that
-  it is in the air, nothing more is written.  What is left is then undone after the next landing, for
-  the journal stays open.  To be in time all old values are sent at once, not one by one.
+  it is in the air, nothing more is written.  What is left is undone after the next landing, for the
+  journal stays open.  To be in time all old values are sent at once, not one by one.
 
-A resumed transaction whose writes had all been confirmed needs only reading, and is finished whether
-armed or not.
+A resumed transaction whose writes had all been confirmed needs only reading, and is finished
+whether armed or not.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Others on the same wire as the vehicle: sockets that send whatever they like, as whomever they like."""
+"""Others on the same wire as the vehicle: sockets that speak as whomever they like."""
 
 import socket
 

@@ -68,12 +68,12 @@ async def test_a_board_that_does_not_say_which_it_is_waits_for_a_flight(
                 vehicle.reboot()
                 await until(lambda: service.counters["autopilot_rebooted"] == 1)
                 await settled(service)
-                assert held_back(service).keys() == {"unconfirmed"}
+                await until(lambda: held_back(service).keys() == {"unconfirmed"})
                 assert vehicle.sets == []
                 return
         async with daemon(document) as again:
             await settled(again)
-            assert held_back(again).keys() == {"unconfirmed"}
+            await until(lambda: held_back(again).keys() == {"unconfirmed"})
             assert vehicle.sets == []
 
 

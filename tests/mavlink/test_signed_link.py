@@ -32,7 +32,7 @@ def air(monkeypatch):
 
 
 class SignedVehicle:
-    """Its clock is ``ahead`` of ours, s; like ArduPilot it takes over newer stamps that it hears."""
+    """Its clock is ``ahead`` of ours, s."""
 
     def __init__(self, ahead=0.0, link_id=0):
         loop = asyncio.get_running_loop()
@@ -41,11 +41,6 @@ class SignedVehicle:
 
     def says(self, message):
         return self.codec.encode(message)
-
-    def hears(self, frame):
-        self.signing._timestamp = max(
-            self.signing._timestamp, int.from_bytes(frame[-12:-6], "little")
-        )
 
 
 @asynccontextmanager

@@ -40,6 +40,10 @@ def test_a_broken_rule_is_told_with_its_history(tmp_path, monkeypatch):
         "onboard.push.transaction.PushTransaction._heartbeat",
         lambda self, now, armed: self._course.disarmed(now) or (),
     )
-    with pytest.raises(BrokenRuleError, match=r"seed \d+(.|\n)*RULE: a new value"):
+
+    def play_many():
         for seed in range(400):
             History(draw(seed), tmp_path).play()
+
+    with pytest.raises(BrokenRuleError, match=r"seed \d+(.|\n)*RULE: a new value"):
+        play_many()

@@ -158,7 +158,7 @@ class Outlets:
         name = POLICIES[int(value)]
         now = self._service.snapshot().push.policy
         if POLICIES.index(name) > POLICIES.index(now) and not self._may_loosen:
-            raise RefusedError(f"{now} is stricter; [push] allow_loosening")
+            raise RefusedError(f"{now} stays (allow_loosening)")
         self._service.set_policy(Mode(name))
         self._notices.post("parameter_done", f"push policy is now {name.replace('_', ' ')}")
 

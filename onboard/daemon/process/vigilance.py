@@ -1,4 +1,4 @@
-"""Vigilance: what on the wire is not as it should be, told when it begins and shown while it lasts."""
+"""Vigilance: what on the wire is not as it should be, told once and shown while it lasts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
 
 CLOCK_APART_S = 60.0
-"""s between the clocks of signing from which on it is said [protocol: what a new stream may lag]."""
+"""s between the clocks of signing from which on it is said [protocol: a new stream's lag]."""
+UNSIGNED = (
+    "anybody on that network can speak as the vehicle; sign the link ([link] signing_key_file)"
+)
 
 
 class Vigilance:
@@ -54,11 +57,7 @@ class Vigilance:
 
     def _found(self, now: float) -> Iterator[tuple[str, str]]:
         if self._signing is None and (open_ones := self._open_to_a_network()):
-            yield (
-                "unsigned_network",
-                f"{open_ones}: anybody on that network can speak as the vehicle; "
-                "give [link] signing_key_file",
-            )
+            yield "unsigned_network", f"{open_ones}: {UNSIGNED}"
         rivals = self._link.presence.rivals(now)
         if rivals:
             yield "rivals", f"{rivals} more on the link speak as the vehicle; they are not believed"
@@ -84,16 +83,11 @@ class Vigilance:
         if signing is None:
             return
         if signing.behind_s:
-            yield (
-                "signing_behind",
-                f"signed packets lie {signing.behind_s:.0f} s behind: an old recording, or clocks "
-                "that differ; refused until they catch up",
-            )
+            lag = f"signed packets lie {signing.behind_s:.0f} s behind"
+            yield "signing_behind", f"{lag}: a repetition, or clocks that differ; not believed"
         if signing.ahead_s > CLOCK_APART_S:
-            yield (
-                "signing_ahead",
-                f"this computer's clock is {signing.ahead_s:.0f} s behind the vehicle's signing clock",
-            )
+            lag = f"this computer's clock lies {signing.ahead_s:.0f} s behind"
+            yield "signing_ahead", f"{lag} the signing's: theirs is used"
 
     def _open_to_a_network(self) -> str:
         endpoints = (connection.endpoint for connection in self._link.connections)

@@ -14,6 +14,7 @@ export function showLink(link) {
     ...link.endpoints.map((e) => [e.endpoint, e.reason ? `${e.state}: ${e.reason}` : e.state]),
     ["Frames", `${frames.toLocaleString("en")}, lost ${fixed(share, 1)} %, damaged ${damaged}`],
     ["Signed", link.signed ? "yes" : "no"],
+    ...(link.warnings ?? []).map((text) => ["Warning", text]),
     ...(reboots ? [["Reboots", String(reboots)]] : []),
   ];
   const rates = Object.entries(link.messages)
@@ -21,7 +22,7 @@ export function showLink(link) {
     .filter(([, rate, wanted]) => rate > 0 || wanted !== null)
     .sort((a, b) => Number(b[2] !== null) - Number(a[2] !== null) || (a[0] < b[0] ? -1 : 1));
   renew(byId("link-body"), [facts, rates], () => [
-    h("dl", { class: "facts" }, ...facts.flatMap(([name, text]) => [h("dt", { text: name }), h("dd", { text })])),
+    h("dl", { class: "facts" }, ...facts.flatMap(([name, text]) => [h("dt", { text: name }), h("dd", { class: name === "Warning" ? "warn" : null, text })])),
     ...(rates.length ? [ratesTable(rates)] : []),
   ]);
 }

@@ -1,0 +1,88 @@
+"""Addresses on a listening socket: by merit, with a ration each."""
+
+from onboard.mavlink.codec import Codec
+from onboard.mavlink.limits import PEER_BYTES_S, PEER_LIMIT, PEERS_KNOWN
+from onboard.mavlink.peers import Merit, Peers
+from onboard.mavlink.twins import Twins
+from tests.mavlink.mavlink_peer import attitude, heartbeat
+
+SENDER = Codec(system=1, component=1)
+
+
+def table():
+    return Peers(Codec, addressed=True)
+
+
+def test_rubbish_gives_way_to_whoever_speaks_mavlink():
+    peers = table()
+    for number in range(PEERS_KNOWN):
+        peers.feed(("noise", number), b"x", 1.0)
+    assert peers.answered(1.0) == []
+    _, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 2.0)
+    assert len(frames) == 1
+    assert peers.answered(2.0) == [("vehicle", 1)]
+    assert len(list(peers)) == PEERS_KNOWN
+
+
+def test_claims_that_prove_nothing_wear_off():
+    peers = table()
+    for number in range(PEERS_KNOWN):
+        peer, _ = peers.feed(("claim", number), SENDER.encode(heartbeat()), 0.0)
+        peer.rise(Merit.CLAIMS, 0.0)
+    peer, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 1.0)
+    assert frames == []
+    peer, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 40.0)
+    assert len(frames) == 1
+
+
+def test_the_vehicle_never_gives_way():
+    peers = table()
+    vehicle, _ = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 0.0)
+    vehicle.rise(Merit.VEHICLE, 0.0)
+    for number in range(500):
+        peer, _ = peers.feed(("claim", number), SENDER.encode(heartbeat()), 100.0 + number)
+        peer.rise(Merit.CLAIMS, 100.0 + number)
+    assert peers.get(("vehicle", 1)) is vehicle
+    assert ("vehicle", 1) not in peers.answered(599.0)  # silent for ten minutes
+    peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 599.0)
+    assert peers.answered(599.0)[0] == ("vehicle", 1)
+    assert len(peers.answered(599.0)) <= PEER_LIMIT
+
+
+def test_a_flood_is_rationed_and_the_others_are_not():
+    peers = table()
+    frame = SENDER.encode(attitude(1))
+    looked_at = 0
+    for _ in range(50_000):  # in one second
+        looked_at += len(peers.feed(("flood", 1), frame, 1.0)[1])
+    assert looked_at <= PEER_BYTES_S / len(frame)
+    assert peers.refused == 50_000 - looked_at
+    assert len(peers.feed(("vehicle", 1), frame, 1.0)[1]) == 1
+
+
+def test_halves_of_packets_from_two_addresses_are_kept_apart():
+    peers = table()
+    one, two = SENDER.encode(attitude(1)), SENDER.encode(attitude(2))
+    peers.feed(("a", 1), one[:9], 0.0)
+    peers.feed(("b", 1), two[:11], 0.0)
+    assert peers.feed(("a", 1), one[9:], 0.0)[1][0].message.time_boot_ms == 1
+    assert peers.feed(("b", 1), two[11:], 0.0)[1][0].message.time_boot_ms == 2
+
+
+def test_of_two_services_each_knows_which_was_there_first():
+    now = 0.0
+    for gap in (0.0, 2.0, 3.0, 10.0, 1e7):
+        now = 0.0
+        first = Twins(lambda: now, number=7)
+        now = gap
+        second = Twins(lambda: now, number=9)
+        now += 5.0
+        a, b = first.signature(now), second.signature(now)
+        first.hear(b, now)
+        second.hear(a, now)
+        assert first.first(now) != second.first(now)
+        assert first.first(now) or gap <= 3.0
+        assert first.there(now)
+        assert not first.there(now + 20.0)
+        assert second.first(now + 20.0)
+        assert first.hear(a, now) is None  # its own, given back by a router

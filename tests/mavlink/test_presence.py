@@ -1,0 +1,162 @@
+"""Who the vehicle is: pinned by proof, moved only where nothing can be lost by it."""
+
+import pytest
+
+from onboard.mavlink.autopilot import (
+    AutopilotFound,
+    AutopilotReturned,
+    AutopilotState,
+    RivalHeard,
+)
+from onboard.mavlink.limits import CLAIMS_KNOWN, FAILOVER_S, HEARTBEAT_TIMEOUT_S, PROOF_S
+from onboard.mavlink.presence import Presence, Whose
+from tests.mavlink.mavlink_peer import heartbeat, received
+
+VEHICLE = (1, 1)
+HERE, THERE, OTHER_ENDPOINT = (0, ("a", 1)), (0, ("b", 2)), (1, None)
+BEAT, ARMED = received(heartbeat()), received(heartbeat(base_mode=128))
+
+
+class Wire:
+    """A presence, and a clock that goes on."""
+
+    def __init__(self, *, committed=False, held=False, **kwargs):
+        self.presence = Presence(kwargs.get("system"), kwargs.get("component"))
+        self.presence.committed = lambda: self.committed
+        self.presence.held = lambda: self.held
+        self.committed, self.held = committed, held
+        self.now = 0.0
+        self.events = []
+
+    def hear(self, way, source=VEHICLE, message=None, boot=None):
+        heard = self.presence.hear(source, way, message, boot, self.now)
+        self.events += heard.events
+        return heard.whose
+
+    def second(self, *ways, source=VEHICLE, offset=100.0, beats=True):
+        """What a vehicle says in a second, by each of these ways."""
+        for tenth in range(10):
+            for way in ways:
+                if beats and tenth == 0:
+                    self.hear(way, source, BEAT)
+                self.hear(way, source, boot=self.now + offset)
+            self.now += 0.1
+            self.presence.check(self.now)
+
+    def silence(self, seconds):
+        for _ in range(round(seconds / 0.1)):
+            self.now += 0.1
+            self.presence.check(self.now)
+
+
+def test_what_speaks_in_its_name_elsewhere_is_counted_and_not_heard():
+    wire = Wire()
+    wire.second(HERE)
+    assert wire.presence.proven
+    assert wire.hear(THERE, message=BEAT) is Whose.FOREIGN
+    assert wire.hear(THERE, boot=3.0) is Whose.FOREIGN
+    assert wire.hear(OTHER_ENDPOINT, message=ARMED) is Whose.STANDBY
+    assert (wire.presence.foreign, wire.presence.standby) == (2, 1)
+    assert wire.presence.way == HERE
+    assert [e for e in wire.events if isinstance(e, RivalHeard)] == [
+        RivalHeard(armed=False, same_clock=False),
+        RivalHeard(armed=True, same_clock=False),
+    ]
+    assert wire.presence.rivals(wire.now) == 2
+
+
+def test_two_ways_with_one_clock_are_no_rivals():
+    wire = Wire()
+    for _ in range(3):
+        wire.second(HERE, OTHER_ENDPOINT)
+    assert wire.presence.rivals(wire.now) == 0
+    assert wire.presence.standby > 0
+
+
+@pytest.mark.parametrize(("offset", "taken"), [(100.0, True), (60.0, False)])
+def test_a_silent_way_is_followed_by_another_with_the_same_clock_only(offset, taken):
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    wire.silence(FAILOVER_S + 0.1)
+    wire.second(THERE, offset=offset)
+    assert (wire.presence.way == THERE) is taken
+    assert AutopilotReturned() not in wire.events
+
+
+def test_in_a_push_it_stays_where_it_is():
+    wire = Wire(held=True)
+    wire.second(HERE)
+    wire.silence(FAILOVER_S + 0.1)
+    wire.second(THERE, OTHER_ENDPOINT)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    wire.second(THERE, OTHER_ENDPOINT)
+    assert wire.presence.way == HERE
+    wire.held = False
+    wire.second(THERE)
+    assert wire.presence.way == THERE
+
+
+def test_one_that_is_lost_is_back_by_another_way_and_that_is_told():
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    assert wire.presence.state is AutopilotState.SILENT
+    wire.second(THERE, offset=1.0)  # it has rebooted
+    assert wire.presence.way == THERE
+    assert wire.events[-1] == AutopilotReturned()
+
+
+def test_who_only_beats_gives_way_to_who_has_a_stream_unless_something_was_learned():
+    for committed, system in ((False, 1), (True, 77)):
+        wire = Wire(committed=committed)
+        wire.hear(HERE, (77, 1), BEAT)
+        assert isinstance(wire.events[-1], AutopilotFound)
+        wire.second(THERE)
+        assert wire.presence.source == (system, 1)
+
+
+def test_among_those_that_only_beat_each_has_its_turn():
+    wire = Wire()
+    tried = set()
+    for _ in range(int(4 * PROOF_S)):
+        for number, way in enumerate((HERE, THERE, OTHER_ENDPOINT), start=10):
+            wire.hear(way, (number, 1), BEAT)
+        tried.add(wire.presence.source)
+        wire.now += 1.0
+    assert tried == {(10, 1), (11, 1), (12, 1)}
+
+
+def test_the_autopilots_own_component_is_preferred_where_both_have_streams():
+    wire = Wire()
+    wire.second(HERE, source=(1, 50))
+    assert wire.presence.source == (1, 50)
+    wire.second(THERE, source=(1, 1))
+    assert wire.presence.source == (1, 1)
+
+
+@pytest.mark.parametrize(("system", "component"), [(1, 50), (1, None), (None, 50)])
+def test_what_is_configured_decides(system, component):
+    wire = Wire(system=system, component=component)
+    wire.second(HERE, source=(7, 1))
+    wire.second(THERE, source=(1, 50))
+    assert wire.presence.source == (1, 50)
+
+
+def test_a_lost_name_that_somebody_took_is_given_back_to_who_has_a_stream():
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    wire.hear(THERE, message=BEAT)
+    assert wire.presence.way == THERE
+    wire.second(HERE, offset=1.0)
+    assert wire.presence.way == HERE
+
+
+def test_any_number_of_claims_takes_a_bounded_place_and_never_the_vehicles():
+    wire = Wire()
+    wire.second(HERE)
+    for number in range(500):
+        wire.hear((0, ("x", number)), (number % 250 + 2, 1), BEAT)
+    assert len(list(wire.presence._claims)) <= CLAIMS_KNOWN + 1
+    assert wire.hear(HERE, message=BEAT) is Whose.VEHICLE
+    assert wire.presence.way == HERE
