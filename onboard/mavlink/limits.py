@@ -75,6 +75,9 @@ PROOF_S: Final = 5.0
 are asked for at once, and an answer takes a second or two on a poor link [tuned]."""
 PROOF_STAMPS: Final = 3
 """Time stamps that advance make a stream; a HEARTBEAT alone is easily said [tuned]."""
+GIVEN_UP_S: Final = 15.0
+"""s of silence after which the vehicle's name is also given to one that has shown no stream: one
+that rebooted with its router, or nobody [tuned: what makes a stream's line dead]."""
 CLOCK_AGREES_S: Final = 2.0
 """s between the boot clocks of two ways to one vehicle: the longest delay of a link [data]."""
 CLAIMS_KNOWN: Final = 32

@@ -173,8 +173,10 @@ class Presence:
             return now - pinned.heard > limits.FAILOVER_S
         lost = self.state is AutopilotState.SILENT
         same = claim.source == pinned.source
-        if same and (lost or (claim.proven and not pinned.proven)):
+        if same and claim.proven and (lost or not pinned.proven):
             return beats
+        if same and lost:  # perhaps it was not asked for anything yet, or somebody only beats
+            return beats and now - pinned.beat > limits.GIVEN_UP_S
         if self.committed():
             return False
         if not pinned.proven and claim.proven:

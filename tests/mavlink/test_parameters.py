@@ -148,13 +148,23 @@ class TestSet:
     def test_denied_whose_text_was_lost_still_fails(self):
         client = ParameterClient()
         out = list(client.set(NAME, 1.1, 0.0))
-        for _ in range(50):
+        for tenth in range(50):
             if any(isinstance(o, SetFailed) for o in out):
                 break
-            out += client.feed(ValueReceived(NAME, 1.0), 0.1)
+            out += client.feed(ValueReceived(NAME, 1.0), 0.1 * tenth)
+            out += client.tick(0.1 * tenth)
         assert out[-1] == SetFailed(NAME, Failure.NOT_TAKEN, 1.0)
         sets = [o for o in out if isinstance(o, SendParamSet)]
         assert len(sets) == ClientSettings().attempts
+
+    def test_values_that_come_faster_than_it_asks_do_not_make_it_write_again(self):
+        """A flood of the old value, from whoever can forge the vehicle's address."""
+        client = ParameterClient()
+        out = list(client.set(NAME, 1.1, 0.0, before=1.0))
+        for hundredth in range(20):
+            for _ in range(100):
+                out += client.feed(ValueReceived(NAME, 1.0), 0.01 * hundredth)
+        assert len([o for o in out if isinstance(o, SendParamSet)]) == 1
 
     def test_parameter_error_ends_it(self):
         client = ParameterClient()

@@ -70,13 +70,9 @@ def test_halves_of_packets_from_two_addresses_are_kept_apart():
 
 
 def test_of_two_services_each_knows_which_was_there_first():
-    now = 0.0
     for gap in (0.0, 2.0, 3.0, 10.0, 1e7):
-        now = 0.0
-        first = Twins(lambda: now, number=7)
-        now = gap
-        second = Twins(lambda: now, number=9)
-        now += 5.0
+        first, second = Twins(lambda: 0.0, number=7), Twins(lambda gap=gap: gap, number=9)
+        now = gap + 5.0
         a, b = first.signature(now), second.signature(now)
         first.hear(b, now)
         second.hear(a, now)

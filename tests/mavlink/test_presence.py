@@ -8,7 +8,13 @@ from onboard.mavlink.autopilot import (
     AutopilotState,
     RivalHeard,
 )
-from onboard.mavlink.limits import CLAIMS_KNOWN, FAILOVER_S, HEARTBEAT_TIMEOUT_S, PROOF_S
+from onboard.mavlink.limits import (
+    CLAIMS_KNOWN,
+    FAILOVER_S,
+    GIVEN_UP_S,
+    HEARTBEAT_TIMEOUT_S,
+    PROOF_S,
+)
 from onboard.mavlink.presence import Presence, Whose
 from tests.mavlink.mavlink_peer import heartbeat, received
 
@@ -102,6 +108,7 @@ def test_one_that_is_lost_is_back_by_another_way_and_that_is_told():
     wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
     assert wire.presence.state is AutopilotState.SILENT
     wire.second(THERE, offset=1.0)  # it has rebooted
+    wire.second(THERE, offset=1.0)
     assert wire.presence.way == THERE
     assert wire.events[-1] == AutopilotReturned()
 
@@ -146,6 +153,9 @@ def test_a_lost_name_that_somebody_took_is_given_back_to_who_has_a_stream():
     wire = Wire(committed=True)
     wire.second(HERE)
     wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    wire.hear(THERE, message=BEAT)
+    assert wire.presence.way == HERE  # it has shown no stream
+    wire.silence(GIVEN_UP_S)
     wire.hear(THERE, message=BEAT)
     assert wire.presence.way == THERE
     wire.second(HERE, offset=1.0)

@@ -159,7 +159,7 @@ class Service:
         learned = self.handover.learned
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
-        known = parts.parameters.complete and self.handover.identified
+        known = parts.parameters.complete and self.handover.identified and self.link.presence.proven
         if learned is not None and (known or parts.pusher.busy):
             parts.pusher.consider(
                 now,
