@@ -163,7 +163,7 @@ class Autopilot:
     def _value(self, name: str) -> ValueReceived:
         value = self.ram[name]
         if self.wrong_echo and self._rng.random() < self.wrong_echo:
-            value = float32(value + self._rng.choice((1e-7, -0.25, 3.0)))
+            value = float32(value + self._rng.choice((1e-7, self._rng.uniform(-1.0, 1.0))))
         return ValueReceived(name, value)
 
     def _say(self, event: object) -> None:

@@ -141,6 +141,11 @@ class Answers:
 
     def _read_on_the_way_back(self, reading: Reading, now: float) -> Heard:
         course, progress = self._course, self._course.progress
+        foreign = {name: reading.values[name] for name in reading.foreign}
+        if foreign and foreign != progress.foreign:
+            # One answer may be wrong: what is left to somebody else was read alike twice.
+            progress.foreign = foreign
+            return course.read_six(now)
         progress.left = reading.left
         if self._can_finish(reading):
             return course.go(Trigger.ALL_NEW, now)

@@ -117,7 +117,7 @@ class Course:
             self._held.clear()
         match following:
             case State.COMPARING | State.VERIFYING | State.UNDO_VERIFYING:
-                return self._read_six(now)
+                return self.read_six(now)
             case State.RECORDING:
                 self.record(Planned(self.identifier, self.plan, self.purpose, self._support))
             case State.WRITING:
@@ -130,7 +130,7 @@ class Course:
             case State.INSPECTING:
                 if previous is not State.NEW:
                     self._turn()
-                return self._read_six(now)
+                return self.read_six(now)
             case State.UNDOING:
                 return self._undo(now)
             case State.CLOSING:
@@ -232,7 +232,8 @@ class Course:
 
     # On entering a state
 
-    def _read_six(self, now: float) -> Heard:
+    def read_six(self, now: float) -> Heard:
+        """Ask for the six and the accelerometer's identifier."""
         self.client.cancel()
         names = (*self.plan.names, self.plan.device_id_name)
         self.progress.awaiting = set(names)

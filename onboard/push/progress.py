@@ -17,6 +17,8 @@ class Progress:
     """Still to be written in this state, in a safe order."""
     written: set[str] = field(default_factory=set)
     """Sent at least once: from then on the new value is expected, not the old one."""
+    foreign: dict[str, float] = field(default_factory=dict)
+    """Values that were neither old nor new when the six were last read on the way back."""
     left: frozenset[str] = frozenset()
     """Somebody else's: a roll-back leaves them as they are."""
     turned: bool = False
