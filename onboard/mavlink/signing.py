@@ -47,6 +47,17 @@ class SigningRecord:
     timestamp: int = 0
     streams: Mapping[str, int] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Refuse what is no record.
+
+        Raises:
+            ValueError: a stream that has no three bytes, or a time stamp that does not fit.
+        """
+        if any(len(bytes.fromhex(name)) != 3 for name in self.streams):
+            raise ValueError("a stream has three bytes")
+        if not all(0 <= t <= LATEST for t in (self.timestamp, *self.streams.values())):
+            raise ValueError("a time stamp has 48 bits")
+
 
 class Signing:
     """One shared key and the time-stamp bookkeeping of all links that use it.
@@ -157,8 +168,8 @@ class Signing:
                 nothing that was used then may be used again.
         """
         margin = int(margin_s * TICKS_PER_S)
-        streams = {stream.hex(): t + margin for stream, t in self._acted_on.items()}
-        return SigningRecord(self._timestamp + margin, streams)
+        streams = {s.hex(): min(t + margin, LATEST) for s, t in self._acted_on.items()}
+        return SigningRecord(min(self._timestamp + margin, LATEST), streams)
 
     def _now(self) -> int:
         return max(0, int((self._wall_clock() - EPOCH_UNIX_S) * TICKS_PER_S))

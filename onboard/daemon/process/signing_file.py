@@ -10,6 +10,8 @@ import msgspec
 
 from onboard.mavlink.signing import SigningRecord
 
+LONGEST = 1 << 16
+"""bytes; 256 streams take 8000."""
 logger = logging.getLogger(__name__)
 
 
@@ -23,10 +25,12 @@ class SigningFile:
     def load(self) -> SigningRecord:
         """What an earlier run has left; nothing, if there is none or it cannot be used."""
         try:
-            return msgspec.json.decode(self._path.read_bytes(), type=SigningRecord)
+            with self._path.open("rb") as file:
+                data = file.read(LONGEST)
+            return msgspec.json.decode(data, type=SigningRecord)
         except FileNotFoundError:
             return SigningRecord()
-        except (OSError, ValueError, RecursionError) as error:
+        except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
             logger.warning("%s: %s; signed packets of before may be believed", self._path, error)
             return SigningRecord()
 
