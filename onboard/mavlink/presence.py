@@ -91,7 +91,10 @@ class Presence:
         return self._pinned is not None and self._pinned.proven
 
     def rivals(self, now: float) -> int:
-        """How many others claim to be this vehicle, with another clock or none, these seconds."""
+        """How many others claim to be this vehicle, with another clock, these seconds.
+
+        One without a clock is none where it comes by another endpoint: nobody has asked there.
+        """
         pinned = self._pinned
         if pinned is None:
             return 0
@@ -100,6 +103,7 @@ class Presence:
             and claim.source == pinned.source
             and now - claim.heard <= limits.TWIN_S
             and not claim.continues(pinned, now)
+            and (claim.boot is not None or claim.way[0] == pinned.way[0])
             for claim in self._claims
         )
 
@@ -176,7 +180,8 @@ class Presence:
         if same and claim.proven and (lost or not pinned.proven):
             return beats
         if same and lost:  # perhaps it was not asked for anything yet, or somebody only beats
-            return beats and now - pinned.beat > limits.GIVEN_UP_S
+            configured = claim.way[0] != pinned.way[0]
+            return beats and (configured or now - pinned.beat > limits.GIVEN_UP_S)
         if self.committed():
             return False
         if not pinned.proven and claim.proven:

@@ -68,7 +68,7 @@ def test_what_speaks_in_its_name_elsewhere_is_counted_and_not_heard():
         RivalHeard(armed=False, same_clock=False),
         RivalHeard(armed=True, same_clock=False),
     ]
-    assert wire.presence.rivals(wire.now) == 2
+    assert wire.presence.rivals(wire.now) == 1  # on the other endpoint nobody has asked
 
 
 def test_two_ways_with_one_clock_are_no_rivals():
@@ -100,6 +100,16 @@ def test_in_a_push_it_stays_where_it_is():
     wire.held = False
     wire.second(THERE)
     assert wire.presence.way == THERE
+
+
+def test_an_endpoint_that_only_hears_heartbeats_takes_over_from_one_that_is_lost():
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    wire.hear(OTHER_ENDPOINT, message=BEAT)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    wire.hear(OTHER_ENDPOINT, message=BEAT)
+    assert wire.presence.way == OTHER_ENDPOINT
+    assert wire.events[-1] == AutopilotReturned()
 
 
 def test_one_that_is_lost_is_back_by_another_way_and_that_is_told():

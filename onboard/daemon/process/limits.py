@@ -25,6 +25,8 @@ CONTRADICTED_FOR_S: Final = 30.0
 SIGNING_KEPT_S: Final = 10.0
 """s between two records of the signing's time stamps; as much is added to what is recorded, so that
 nothing is used twice after a crash [cost: one small file]."""
+CLOCK_APART_S: Final = 60.0
+"""s between the clocks of signing from which on it is said [protocol: a new stream's lag]."""
 JOURNAL_SHOWN: Final = 50
 """Entries of the journal in a snapshot, the latest ones [tuned]."""
 BEHIND_WORTH_SAYING_S: Final = 5.0

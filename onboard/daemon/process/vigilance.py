@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from onboard.daemon.process import limits
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.link import Link
 from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
 
-CLOCK_APART_S = 60.0
-"""s between the clocks of signing from which on it is said [protocol: a new stream's lag]."""
 UNSIGNED = (
     "anybody on that network can speak as the vehicle; sign the link ([link] signing_key_file)"
 )
@@ -85,7 +84,7 @@ class Vigilance:
         if signing.behind_s:
             lag = f"signed packets lie {signing.behind_s:.0f} s behind"
             yield "signing_behind", f"{lag}: a repetition, or clocks that differ; not believed"
-        if signing.ahead_s > CLOCK_APART_S:
+        if signing.ahead_s > limits.CLOCK_APART_S:
             lag = f"this computer's clock lies {signing.ahead_s:.0f} s behind"
             yield "signing_ahead", f"{lag} the signing's: theirs is used"
 
