@@ -12,6 +12,7 @@ from typing import TypeAlias
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, Sample
 from onboard.mavlink import limits
 
+FIX_3D = 3
 Stamped: TypeAlias = ImuSample | AttitudeSample | GpsFix
 
 
@@ -31,6 +32,8 @@ class Repetitions:
         """
         if not isinstance(sample, ImuSample | AttitudeSample | GpsFix):
             return None
+        if isinstance(sample, GpsFix) and sample.fix_type < FIX_3D:
+            return None  # without a fix the stamp stays that of the last one
         key = _stream(sample)
         before = self._newest.get(key)
         if before is None or before.t != sample.t:
