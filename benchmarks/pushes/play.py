@@ -10,6 +10,8 @@ disk and clock are simulated.  The rules:
 3. Under ``landed`` a new value leaves only within 1.5 s after a HEARTBEAT that said disarmed, and
    none after one that said armed; an old one not later than 2 s after that.
 4. Nothing is written before the plan is on the disk, and nothing but the six.
+5. Never are all three offsets zero, which ArduPilot takes for "never calibrated", where packets
+   come once and in time, and nobody else writes.
 """
 
 from __future__ import annotations
@@ -72,6 +74,7 @@ class History:
         self.autopilot.store_delay = script.store_delay
         self.autopilot.quantum = script.quantum
         self.autopilot.wrong_echo = script.wrong_echo
+        self.autopilot.changed = self._check_offsets
         self.disk = Disk(self.rng)
         self._path = folder / f"{script.seed}.jsonl"
         self._deaths = list(script.deaths)
@@ -355,6 +358,13 @@ class History:
         late = self._armed_since is not None and now - self._armed_since > limits.ARMED_UNDO_S
         if not new and late:
             self._broken("an old value is sent long after it armed")
+
+    def _check_offsets(self) -> None:
+        weather, autopilot = self.script.weather, self.autopilot
+        punctual = not (weather.late or weather.duplication or autopilot.boots)
+        offsets = [autopilot.ram[name] for name in self.plan.names[3:]]
+        if punctual and not autopilot.touched and not any(offsets):
+            self._broken("all offsets are zero")
 
     def _check_six(self, target: dict[str, float], why: str) -> None:
         wrong = {

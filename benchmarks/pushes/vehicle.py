@@ -99,6 +99,8 @@ class Autopilot:
         """What somebody else has written."""
         self._agenda, self._link, self._hear = agenda, link, hear
         self._rng = link._rng  # noqa: SLF001 - one source of chance
+        self.changed: Callable[[], None] = _nothing
+        """Called when a value has changed."""
         self._reads = 0
         self._places: set[str] = set()
         agenda.at(0.3, self._beat)
@@ -123,6 +125,7 @@ class Autopilot:
         if self.quantum:
             value = round(value / self.quantum) * self.quantum
         self.ram[name] = float32(value)
+        self.changed()
         self._later(self.store_delay, lambda: self._store(name))
 
     def reboot(self, silence: float) -> None:
@@ -168,3 +171,7 @@ class Autopilot:
 
     def _say(self, event: object) -> None:
         self._link.carry(event, self._hear)
+
+
+def _nothing() -> None:
+    pass

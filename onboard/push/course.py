@@ -142,12 +142,21 @@ class Course:
     def write_next(self, now: float) -> Heard:
         """Write what is next in the queue, or go on when all is written."""
         undo = self.state is State.UNDOING
-        if not self.progress.queue:
-            return NOTHING if undo and self.client.busy else self.go(Trigger.DONE, now)
-        heard = self._write(self.progress.queue.pop(0), now, undo=undo)
+        queue = self.progress.queue
+        if undo and self.client.busy:
+            return NOTHING
+        if not queue:
+            return self.go(Trigger.DONE, now)
+        if not undo or self.undo_until is None:
+            return self._write(queue.pop(0), now, undo=undo)
         # An armed vehicle gets its old values back all at once: there is no time for one by one.
-        while undo and self.undo_until is not None and self.progress.queue:
-            heard += self._write(self.progress.queue.pop(0), now, undo=True)
+        # But for the axis that keeps the offsets from being zero in between: that comes before.
+        first = sum(name[-1] == queue[0][-1] for name in queue)
+        count = len(queue) if self.progress.axis_undone else first
+        self.progress.axis_undone = True
+        heard = NOTHING
+        for _ in range(count):
+            heard += self._write(queue.pop(0), now, undo=True)
         return heard
 
     def _write(self, name: str, now: float, *, undo: bool) -> Heard:
@@ -249,6 +258,7 @@ class Course:
         if not self.progress.turned:
             self._turn()
         self.progress.rounds += 1
+        self.progress.axis_undone = False
         if self.progress.rounds > self._settings.undo_rounds:
             return self.stuck(Reason.REVERTED, "what is undone does not stay undone", now)
         if self.undo_until is not None and now >= self.undo_until:

@@ -27,6 +27,8 @@ class Progress:
     """A resumed transaction that needs nothing but to be read once more."""
     undo_unsaved: bool = False
     """An old value is in force again, but the autopilot does not say that it is stored."""
+    axis_undone: bool = False
+    """The axis that comes first has been written back in this round."""
     rounds: int = 0
     """How often the old values were written back."""
 

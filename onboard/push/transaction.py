@@ -56,7 +56,8 @@ a part is written:
   to where it was.  But only while the vehicle stands: ArduPilot keeps motors idle for 2 s after
   arming, and ``armed_undo_s`` after the first HEARTBEAT that says armed, or as soon as it says that
   it is in the air, nothing more is written.  What is left is undone after the next landing, for the
-  journal stays open.  To be in time all old values are sent at once, not one by one.
+  journal stays open.  To be in time old values are sent together: first those of one
+  axis, so that never all offsets are zero, then all others.
 
 A resumed transaction whose writes had all been confirmed needs only reading, and is finished
 whether armed or not.
