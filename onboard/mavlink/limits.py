@@ -19,8 +19,15 @@ CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536
 """bytes; no datagram is longer [protocol: UDP]."""
-DATAGRAMS_PER_WAKE: Final = 128
-"""So many are read before the loop has its turn: above all that comes within a linger [data]."""
+BYTES_PER_TURN: Final = 4096
+"""bytes that are read before the loop has its turn: twice what a line of 921600 baud brings within
+a linger, and even bytes made to be slow to parse take a few milliseconds [cost]."""
+DATAGRAMS_PER_TURN: Final = 128
+"""So many are read in a turn, also of those that are empty or bring an error [data]."""
+FULL_TURN_PAUSE_S: Final = 0.001
+"""s between two turns while more waits than one of them reads [cost]."""
+SOURCES_MAX: Final = 256
+"""Senders whose packets are counted one by one: a vehicle has a dozen components [cost]."""
 WRITE_LIMIT: Final = 65536
 """bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast: 11 s of a line
 of 57600 baud [tuned]."""

@@ -91,10 +91,11 @@ async def open_transport(
 class Pace:
     """Calls ``drain`` when the descriptor is readable, but not oftener than ``linger`` allows.
 
-    ``drain`` reads all there is and says whether there was anything.
+    ``drain`` reads and hands on ``BYTES_PER_TURN`` at the most, so that a flood leaves the loop to
+    others in between; it returns how many there were.
     """
 
-    def __init__(self, descriptor: int, drain: Callable[[], bool], linger: float) -> None:
+    def __init__(self, descriptor: int, drain: Callable[[], int], linger: float) -> None:
         self._loop = asyncio.get_running_loop()
         self._descriptor = descriptor
         self._drain = drain
@@ -104,20 +105,26 @@ class Pace:
         self._loop.add_reader(descriptor, self._readable)
 
     def _readable(self) -> None:
-        self._drain()
-        if self._linger > 0.0 and not self._closed:
+        size = self._drain()
+        wait = self._wait(size)
+        if wait > 0.0 and not self._closed:
             self._loop.remove_reader(self._descriptor)
-            self._timer = self._loop.call_later(self._linger, self._again)
+            self._timer = self._loop.call_later(wait, self._again)
 
     def _again(self) -> None:
-        busy = self._drain()
+        size = self._drain()
         if self._closed:
             return
-        if busy:
-            self._timer = self._loop.call_later(self._linger, self._again)
+        wait = self._wait(size)
+        if size and wait > 0.0:
+            self._timer = self._loop.call_later(wait, self._again)
         else:
             self._timer = None
             self._loop.add_reader(self._descriptor, self._readable)
+
+    def _wait(self, size: int) -> float:
+        """Until the next turn, s: short if this one may have left something."""
+        return limits.FULL_TURN_PAUSE_S if size >= limits.BYTES_PER_TURN else self._linger
 
     def close(self) -> None:
         """Stop reading."""
@@ -148,6 +155,7 @@ class DatagramTransport:
         self._clock = clock
         self._peers: dict[tuple[object, ...], float] = {}
         self._buffer = memoryview(bytearray(limits.READ_SIZE))
+        self._waiting = bytearray()
         self._closed = False
         self._pace = Pace(sock.fileno(), self._drain, linger)
 
@@ -190,23 +198,27 @@ class DatagramTransport:
         except OSError:
             self.dropped += 1
 
-    def _drain(self) -> bool:
-        chunks: list[bytes] = []
-        for _ in range(limits.DATAGRAMS_PER_WAKE):
+    def _drain(self) -> int:
+        waiting = self._waiting
+        for _ in range(limits.DATAGRAMS_PER_TURN):
+            if len(waiting) >= limits.BYTES_PER_TURN:
+                break
             try:
                 size, peer = self._socket.recvfrom_into(self._buffer)
             except BlockingIOError:
                 break
             except OSError:
                 continue  # an ICMP error about something we sent
-            chunks.append(bytes(self._buffer[:size]))
+            waiting += self._buffer[:size]
             if self._clock is not None and (
                 peer in self._peers or len(self._peers) < limits.PEER_LIMIT
             ):
                 self._peers[peer] = self._clock()
-        if chunks:
-            self._receive(b"".join(chunks))
-        return bool(chunks)
+        turn = bytes(waiting[: limits.BYTES_PER_TURN])
+        del waiting[: limits.BYTES_PER_TURN]
+        if turn:
+            self._receive(turn)
+        return len(turn)
 
 
 class StreamTransport:
@@ -261,19 +273,19 @@ class StreamTransport:
         else:
             self._loop.remove_writer(self._descriptor)
 
-    def _drain(self) -> bool:
+    def _drain(self) -> int:
         try:
-            data = os.read(self._descriptor, limits.READ_SIZE)
+            data = os.read(self._descriptor, limits.BYTES_PER_TURN)
         except BlockingIOError:
-            return False
+            return 0
         except OSError as error:
             self._break(error.strerror or str(error))
-            return False
+            return 0
         if not data:
             self._break("closed by the other side")
-            return False
+            return 0
         self._receive(data)
-        return True
+        return len(data)
 
     def _break(self, reason: str) -> None:
         if not self._closed:
