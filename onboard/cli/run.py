@@ -71,6 +71,9 @@ def run(
     chosen = configuration.from_mapping(document, source=config or "command line")
     settings.endpoints(chosen.link)
     if check:
+        from onboard.daemon.process import checking
+
+        checking.check(chosen)
         click.echo("configuration is valid")
         return
     _log(verbose=verbose)

@@ -55,7 +55,7 @@ LARGEST = 2.0**53
 """Whole numbers below it are exact as floating-point ones."""
 NOT_NUMBERS = "anNZ"
 MOST_FORMATS = 4096
-"""Layouts of wanted records in one file: a log has 20, and again as many for each that was joined."""
+"""Layouts of wanted records in one file: a log has 20, and as many for each that was joined."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,6 +130,7 @@ def test_state_directory_follows_systemd_then_the_user(monkeypatch, tmp_path):
 def test_a_secret_is_the_first_line_of_its_file(tmp_path):
     secret = tmp_path / "token"
     secret.write_text("  open sesame \nrest\n")
+    secret.chmod(0o600)
     assert configuration.read_secret(str(secret), key="[http] token_file") == "open sesame"
     secret.write_text("\n")
     with pytest.raises(ConfigurationError, match=r"\[http\] token_file"):

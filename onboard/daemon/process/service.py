@@ -26,7 +26,8 @@ from onboard.daemon.process.interrupts import stop_signals
 from onboard.daemon.process.notify import Notifier
 from onboard.daemon.process.parts import Parts
 from onboard.daemon.process.portrait import Portrait
-from onboard.daemon.setup.configuration import Configuration, read_secret
+from onboard.daemon.setup import settings
+from onboard.daemon.setup.configuration import Configuration
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import OnboardError
 from onboard.mavlink.decode import Decoder
@@ -260,9 +261,7 @@ class Service:
 
     def _make_server(self) -> Door:
         http = self.configuration.http
-        token = http.token
-        if http.token_file is not None:
-            token = read_secret(http.token_file, key="[http] token_file")
+        token = settings.http_token(http)
         pages = (status_page, self._outlets.history.page, *self._pages)
         return Door(self, address=http.address, port=http.port, token=token, pages=pages)
 
