@@ -77,7 +77,10 @@ def run(
         click.echo("configuration is valid")
         return
     _log(verbose=verbose)
-    stopped_by = asyncio.run(_serve(chosen))
+    from onboard.daemon.process.turns import MeteredLoop
+
+    with asyncio.Runner(loop_factory=MeteredLoop) as runner:
+        stopped_by = runner.run(_serve(chosen))
     if stopped_by is signal.SIGINT:
         click.get_current_context().exit(INTERRUPTED)
 
@@ -86,7 +89,13 @@ async def _serve(configuration: Configuration) -> signal.Signals | None:
     from onboard.daemon.process.service import Service
 
     service = Service(configuration)
-    await service.run(handle_signals=True)
+    try:
+        await service.run(handle_signals=True)
+    except asyncio.CancelledError:
+        if service.stopped_by is None:
+            raise
+        # A second signal: what was under way is left as it is, for the next start.
+        logging.getLogger(__name__).warning("stopped at once, as was asked twice")
     return service.stopped_by
 
 

@@ -127,6 +127,8 @@ FIRST_TIMEOUT_S: Final = 0.7
 """s before the second try [tuned]."""
 TIMEOUT_GROWTH: Final = 1.5
 """Ratio of one wait to that before it [tuned]."""
+PARAMETERS_MAX: Final = 3000
+"""Values that are kept: more than any firmware has.  What was asked for is kept besides [cost]."""
 LONGEST_TIMEOUT_S: Final = 3.0
 """s; no wait between two tries is longer [tuned]."""
 

@@ -89,6 +89,7 @@ class Publisher:
         self._outage = Outage(limits.STABLE_S)
         self._refused = False
         self._closing = asyncio.Event()
+        self._hurried = False
         self._diagnosed = False
         self._task: asyncio.Task[None] | None = None
 
@@ -163,6 +164,7 @@ class Publisher:
             return
         await asyncio.wait((task,), timeout=limits.FAREWELL_S)
         if not task.done():
+            self._hurried = True
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 
@@ -199,6 +201,8 @@ class Publisher:
             try:
                 await self._speak(client)
             finally:
+                if self._hurried:  # the library disconnects with this patience, too
+                    client.timeout = limits.HANG_UP_S
                 # Leaving in good order keeps the broker from publishing the last will.
                 with contextlib.suppress(aiomqtt.MqttError):
                     await client.publish(
@@ -206,7 +210,7 @@ class Publisher:
                         OFFLINE,
                         qos=1,
                         retain=True,
-                        timeout=limits.FAREWELL_S,
+                        timeout=limits.HANG_UP_S if self._hurried else limits.FAREWELL_S,
                     )
 
     async def _speak(self, client: aiomqtt.Client) -> None:

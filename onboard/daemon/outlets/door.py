@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import importlib
 import socket
+from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,8 @@ class Door:
     """Listens; hands the socket to a :class:`~.control.ControlServer` when needed.
 
     ``pages`` add handlers to the application when it is made; one that imports what it needs only
-    when it is called keeps that out of memory until then.
+    when it is called keeps that out of memory until then.  ``counters`` get what happens to
+    connections.
     """
 
     def __init__(
@@ -37,7 +39,9 @@ class Door:
         port: int,
         token: str | None,
         pages: Iterable[Page] = (),
+        counters: Counter[str] | None = None,
     ) -> None:
+        self._counters = counters
         self._actions = actions
         self._address = address
         self._port = port
@@ -97,7 +101,7 @@ class Door:
     async def _open(self, listening: socket.socket) -> None:
         control = await asyncio.to_thread(importlib.import_module, "onboard.daemon.outlets.control")
         server: ControlServer = control.ControlServer(
-            self._actions, token=self._token, pages=self._pages
+            self._actions, token=self._token, pages=self._pages, counters=self._counters
         )
         await server.start(listening)
         self._server = server

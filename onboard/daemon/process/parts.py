@@ -13,7 +13,7 @@ from onboard.daemon.learning.store import Store
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.situation import Situation
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.parameters import ParameterWatch
+from onboard.daemon.pushing.parameters import NEEDED, ParameterWatch
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.pusher import Pusher
 from onboard.daemon.pushing.witness import Witness
@@ -141,4 +141,5 @@ def _handover(
         clock=clock,
         wall_clock=wall_clock,
         save_every_s=configuration.estimator.save_every_s,
+        needed=NEEDED,
     )
