@@ -1,4 +1,4 @@
-"""HTTP visitors that say nothing, too much or nonsense: others are served, and files are written."""
+"""HTTP visitors that say nothing, or nonsense: others are served, and files are written."""
 
 from __future__ import annotations
 

@@ -189,29 +189,35 @@ class Publisher:
             max_queued_incoming_messages=limits.COMMANDS_WAITING,
         )
         async with client:
-            if settings.commands:
-                await self._subscribe(client)
-            self._outbox.connected()
-            await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
-            self.counters["mqtt_connects"] += 1
-            self.connected = True
-            if self._outage.since is None:
-                self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
-            self._outage.works(self._clock())
             try:
-                await self._speak(client)
+                await self._talk(client)
             finally:
-                if self._hurried:  # the library disconnects with this patience, too
+                if self._closing.is_set():  # the library disconnects with this patience
                     client.timeout = limits.HANG_UP_S
-                # Leaving in good order keeps the broker from publishing the last will.
-                with contextlib.suppress(aiomqtt.MqttError):
-                    await client.publish(
-                        self._topic("availability"),
-                        OFFLINE,
-                        qos=1,
-                        retain=True,
-                        timeout=limits.HANG_UP_S if self._hurried else limits.FAREWELL_S,
-                    )
+
+    async def _talk(self, client: aiomqtt.Client) -> None:
+        """What is said from the first word to the last."""
+        if self._settings.commands:
+            await self._subscribe(client)
+        self._outbox.connected()
+        await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
+        self.counters["mqtt_connects"] += 1
+        self.connected = True
+        if self._outage.since is None:
+            self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
+        self._outage.works(self._clock())
+        try:
+            await self._speak(client)
+        finally:
+            # Leaving in good order keeps the broker from publishing the last will.
+            with contextlib.suppress(aiomqtt.MqttError):
+                await client.publish(
+                    self._topic("availability"),
+                    OFFLINE,
+                    qos=1,
+                    retain=True,
+                    timeout=limits.HANG_UP_S if self._hurried else limits.FAREWELL_S,
+                )
 
     async def _speak(self, client: aiomqtt.Client) -> None:
         """Send and listen, which also notices at once that the broker has gone."""
