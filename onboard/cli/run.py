@@ -101,9 +101,13 @@ async def _serve(configuration: Configuration) -> signal.Signals | None:
 
 def _log(*, verbose: bool) -> None:
     """To stderr; under systemd without time stamps, which the journal has itself."""
+    from onboard.daemon.setup.logs import Restrained
+
     stamp = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
         format=f"{stamp}%(levelname)s %(name)s: %(message)s",
         stream=sys.stderr,
     )
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(Restrained())
