@@ -1,10 +1,10 @@
-# make setup | demo | test | simulate | check | bench | clean.   Needs Python 3.11+, pip and make.
+# make setup | demo | test | simulate | fuzz | check | bench | clean.   Needs Python 3.11+, pip and make.
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: setup demo test simulate check bench format clean
+.PHONY: setup demo test simulate fuzz check bench format clean
 
 setup: $(STAMP)
 
@@ -24,6 +24,10 @@ test: $(STAMP)
 
 simulate: $(STAMP)
 	$(BIN)/python -m benchmarks.landings $(ARGS)
+
+# Ten minutes; ARGS="--seconds 3600 --seed 2 --only ulog http" for others.
+fuzz: $(STAMP)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz $(ARGS)
 
 check: $(STAMP)
 	$(BIN)/ruff check .

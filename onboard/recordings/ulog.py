@@ -86,10 +86,8 @@ def open_ulog(path: Path) -> Recording:
     ]
     inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
-        what = "; ".join(
-            ("a PX4 log without accelerometer data (sensor_combined)", *_damage(index))
-        )
-        raise RecordingError(f"{path}: {what}")
+        why = "".join(f"; {damage}" for damage in _damage(index))
+        raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
 
     def read() -> Iterator[Sample]:
         yield from _parameters(index)

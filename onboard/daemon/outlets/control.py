@@ -42,6 +42,10 @@ from onboard.daemon.view.actions import Actions
 from onboard.errors import OnboardError, RefusedError
 
 logger = logging.getLogger(__name__)
+library = logging.getLogger("onboard.daemon.outlets.library")
+library.setLevel(logging.CRITICAL)
+"""The library's own log has a traceback for every request that is none; faults of ours are told by
+:func:`_errors_as_json`."""
 
 
 Page = Callable[[web.Application], None]
@@ -127,6 +131,7 @@ class ControlServer:
         runner = web.AppRunner(
             self.application,
             access_log=None,
+            logger=library,
             keepalive_timeout=limits.KEEP_ALIVE_S,
             shutdown_timeout=limits.SHUTDOWN_S,
         )
