@@ -151,14 +151,13 @@ class Codec:
         """Verify one supposed frame.  None: not a frame; message id -1: refused."""
         raw = bytes(buffer[start : start + length])
         statistics = self.statistics
-        message_id = framing.message_id(raw, 0)
+        message_id, system, component, sequence, signed, _ = framing.header(raw, 0)
         known = message_id in mavlink.mavlink_map
         if known and not framing.is_valid(raw, 0, message_id):
             statistics.bad_frames += 1
             return None
         if not known and not _is_credible(buffer, start, length, following):
             return None
-        _, system, component, sequence, signed, _ = framing.header(raw, 0)
         key = (message_id, system, component, sequence)
         if not known:
             statistics.unknown += 1

@@ -30,6 +30,8 @@ _CHECKSUM = 2
 _SIGNATURE = 13
 _EXTRA = {kind: bytes((message.crc_extra,)) for kind, message in mavlink.mavlink_map.items()}
 """The byte that the sender adds to what is summed, by message number."""
+_LONGEST = {kind: message.unpacker.size for kind, message in mavlink.mavlink_map.items()}
+"""bytes of payload that MAVLink 1 can have, by message number; later fields are MAVLink 2's."""
 
 
 class Header(NamedTuple):
@@ -71,21 +73,15 @@ def message_id(data: Bytes, at: int) -> int:
 def header(data: Bytes, at: int) -> Header:
     """The header of a packet that is there as a whole."""
     if data[at] == MAGIC_V1:
-        return Header(
-            message_id=data[at + 5],
-            system=data[at + 3],
-            component=data[at + 4],
-            sequence=data[at + 2],
-            signed=False,
-            payload=at + _HEADER_V1,
-        )
+        kind, system, component, sequence = data[at + 5], data[at + 3], data[at + 4], data[at + 2]
+        return Header(kind, system, component, sequence, signed=False, payload=at + _HEADER_V1)
     return Header(
-        message_id=int.from_bytes(data[at + 7 : at + _HEADER_V2], "little"),
-        system=data[at + 5],
-        component=data[at + 6],
-        sequence=data[at + 4],
-        signed=bool(data[at + 2] & _SIGNED),
-        payload=at + _HEADER_V2,
+        data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16,
+        data[at + 5],
+        data[at + 6],
+        data[at + 4],
+        bool(data[at + 2] & _SIGNED),
+        at + _HEADER_V2,
     )
 
 
@@ -95,7 +91,7 @@ def is_valid(data: Bytes, at: int, kind: int) -> bool:
     False for a message that the dialect does not have: its checksum cannot be computed.
     """
     extra = _EXTRA.get(kind)
-    if extra is None:
+    if extra is None or (data[at] == MAGIC_V1 and data[at + 1] > _LONGEST[kind]):
         return False
     end = at + (_HEADER_V1 if data[at] == MAGIC_V1 else _HEADER_V2) + data[at + 1]
     crc = mavlink.x25crc(bytes(data[at + 1 : end]) + extra).crc

@@ -19,9 +19,9 @@ CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536
 """bytes; no datagram is longer [protocol: UDP]."""
-BYTES_PER_TURN: Final = 4096
-"""bytes that are read before the loop has its turn: twice what a line of 921600 baud brings within
-a linger, and even bytes made to be slow to parse take a few milliseconds [cost]."""
+BYTES_PER_TURN: Final = 2048
+"""bytes that are read before the loop has its turn: what a line of 921600 baud brings within a
+linger; bytes made to be slow to parse take some milliseconds [cost]."""
 DATAGRAMS_PER_TURN: Final = 128
 """So many are read in a turn, also of those that are empty or bring an error [data]."""
 FULL_TURN_PAUSE_S: Final = 0.001

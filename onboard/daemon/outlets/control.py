@@ -270,6 +270,8 @@ async def _errors_as_json(request: web.Request, handler: Handler) -> web.StreamR
         return _error(409, str(error))
     except OnboardError as error:
         return _error(500, str(error))
+    except ConnectionError:
+        raise  # whoever asked has gone before the answer: the library lets it rest
     except Exception:
         logger.exception("request %s %s failed", request.method, request.path)
         return _error(500, "internal error; the service's log has it")
