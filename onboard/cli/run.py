@@ -69,6 +69,8 @@ def run(
         if value:
             document[section] = {**document.get(section, {}), key: value}
     chosen = configuration.from_mapping(document, source=config or "command line")
+    if config is not None:
+        configuration.refuse_open_token(Path(config), chosen)
     settings.endpoints(chosen.link)
     if check:
         from onboard.daemon.process import checking

@@ -85,6 +85,16 @@ def test_a_secret_that_others_may_read_or_change_is_refused(tmp_path, mode):
         assert read_secret(str(secret), key="[http] token_file") == "open sesame"
 
 
+def test_a_configuration_with_a_token_is_a_secret_itself(tmp_path, capsys):
+    file = tmp_path / "vehicle.toml"
+    file.write_text('[http]\ntoken = "open sesame"\n')
+    file.chmod(0o644)
+    assert onboard(["run", "--config", str(file), "--check"]) == 2
+    assert "everybody may read the [http] token" in capsys.readouterr().err
+    file.chmod(0o600)
+    assert onboard(["run", "--config", str(file), "--check"]) == 0
+
+
 @pytest.mark.parametrize("content", [b"", b"\n", b"\xff\xfe", b"\x00" * 9])
 def test_a_secret_that_is_none_is_told(tmp_path, content):
     secret = tmp_path / "token"

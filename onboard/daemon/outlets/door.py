@@ -9,16 +9,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib
+import logging
 import socket
 from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from onboard.daemon.outlets import limits
 from onboard.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from onboard.daemon.outlets.control import ControlServer, Page
     from onboard.daemon.view.actions import Actions
+
+logger = logging.getLogger(__name__)
 
 ANY_ADDRESS = frozenset({"0.0.0.0", "::"})  # noqa: S104 - compared with, not bound to
 
@@ -99,6 +103,14 @@ class Door:
             self._opening = asyncio.create_task(self._open(self._socket), name="open the door")
 
     async def _open(self, listening: socket.socket) -> None:
+        try:
+            await self._serve(listening)
+        except OSError as error:  # no descriptor left, say: the next who knocks tries again
+            logger.warning("the page cannot be served yet: %s", error.strerror or error)
+            await asyncio.sleep(limits.ACCEPT_RETRY_S)
+            asyncio.get_running_loop().add_reader(listening, self._knock)
+
+    async def _serve(self, listening: socket.socket) -> None:
         control = await asyncio.to_thread(importlib.import_module, "onboard.daemon.outlets.control")
         server: ControlServer = control.ControlServer(
             self._actions, token=self._token, pages=self._pages, counters=self._counters

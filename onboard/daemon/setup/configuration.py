@@ -287,6 +287,19 @@ def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:
     return chosen
 
 
+def refuse_open_token(path: Path, chosen: Configuration) -> None:
+    """Refuse a file that has a token in it and that everybody may read.
+
+    Raises:
+        ConfigurationError: it has, and they may.
+    """
+    if chosen.http.token is not None and path.stat().st_mode & stat.S_IRWXO:
+        raise ConfigurationError(
+            f"{path}: everybody may read the [http] token in it; chmod 600 it, or keep the token in "
+            "a token_file of its own"
+        )
+
+
 def read_secret(path: str, *, key: str) -> str:
     """First line of a secret's own file, which nobody but its owner and group may read.
 
