@@ -295,8 +295,8 @@ def refuse_open_token(path: Path, chosen: Configuration) -> None:
     """
     if chosen.http.token is not None and path.stat().st_mode & stat.S_IRWXO:
         raise ConfigurationError(
-            f"{path}: everybody may read the [http] token in it; chmod 600 it, or keep the token in "
-            "a token_file of its own"
+            f"{path}: everybody may read the [http] token in it; chmod 600 it, or keep the token "
+            "in a token_file of its own"
         )
 
 
