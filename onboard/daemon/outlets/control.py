@@ -162,13 +162,13 @@ class ControlServer:
         """Refuse foreign pages, foreign host names and, for changes, a wrong token."""
         if self._acceptor is not None:
             self._acceptor.asked(request.transport)
+        if not all(_is_text(value) for _, value in request.raw_headers):
+            raise web.HTTPBadRequest(text="a header is not UTF-8")
         origin = request.headers.get("Origin")
         if origin is not None and _place(origin) != request.host:
-            raise web.HTTPForbidden(text=f"requests from {_shown(origin)} are not accepted")
+            raise web.HTTPForbidden(text=f"requests from {origin} are not accepted")
         if self._token is None and not _names_loopback(request.host):
-            raise web.HTTPForbidden(
-                text=f"host {_shown(request.host)} is not this machine's loopback"
-            )
+            raise web.HTTPForbidden(text=f"host {request.host} is not this machine's loopback")
         if request.method not in {"GET", "HEAD"}:
             if self._token is not None and not _token_matches(request, self._token):
                 raise web.HTTPUnauthorized(
@@ -189,7 +189,10 @@ class ControlServer:
         if self.live.viewers >= limits.VIEWERS_MAX:
             raise web.HTTPServiceUnavailable(text=f"{limits.VIEWERS_MAX} viewers already")
         viewer = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
-        await viewer.prepare(request)
+        try:
+            await viewer.prepare(request)
+        except ValueError:
+            raise web.HTTPBadRequest(text="not a WebSocket's handshake") from None
         if self._acceptor is not None:
             self._acceptor.asked(request.transport, stays=True)
         self.live.viewers += 1
@@ -299,9 +302,7 @@ def _json(
 
 def _token_matches(request: web.Request, token: str) -> bool:
     scheme, _, given = request.headers.get("Authorization", "").partition(" ")
-    return scheme.lower() == "bearer" and hmac.compare_digest(
-        given.encode("utf-8", "surrogateescape"), token.encode()
-    )
+    return scheme.lower() == "bearer" and hmac.compare_digest(given.encode(), token.encode())
 
 
 def _place(origin: str) -> str | None:
@@ -312,9 +313,12 @@ def _place(origin: str) -> str | None:
         return None
 
 
-def _shown(text: str) -> str:
-    """A header as it can be written; its bytes need not be UTF-8."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+def _is_text(header: bytes) -> bool:
+    try:
+        header.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _names_loopback(host: str) -> bool:
