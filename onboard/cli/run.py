@@ -58,7 +58,7 @@ def run(
     Serves until SIGTERM or Ctrl-C.  Without --config the defaults listen on UDP port 14550 of
     this machine and write only when the vehicle is disarmed.
     """
-    from onboard.daemon.setup import configuration, settings
+    from onboard.daemon.setup import configuration, secret_files, settings
 
     document = {} if config is None else configuration.read(Path(config))
     for section, key, value in (
@@ -70,7 +70,7 @@ def run(
             document[section] = {**document.get(section, {}), key: value}
     chosen = configuration.from_mapping(document, source=config or "command line")
     if config is not None:
-        configuration.refuse_open_token(Path(config), chosen)
+        secret_files.refuse_open_token(Path(config), chosen)
     settings.endpoints(chosen.link)
     if check:
         from onboard.daemon.process import checking

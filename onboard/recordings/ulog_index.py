@@ -8,7 +8,6 @@ that time and memory are bounded by the length of the file, whatever is in it.
 
 from __future__ import annotations
 
-import re
 import struct
 from array import array
 from collections.abc import Callable
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.errors import RecordingError
+from onboard.recordings.ulog_types import Layout, Types
 
 Bytes = bytes | mmap
 Records = NDArray[np.void]
@@ -28,40 +28,13 @@ MAGIC = b"ULog\x01\x12\x35"
 SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 HEADER_LENGTH = 16
 KINDS = frozenset(b"BFIMPQARDLCSO")
-LONGEST_BODY = 65535
 LONGEST_UNKNOWN = 10000
 """bytes; a message of a kind that nobody knows and that is longer is damage."""
-DEEPEST = 8
-"""Types within types: PX4 has two."""
-MOST_TYPES, MOST_FIELDS, MOST_PARAMETERS = 4096, 512, 20_000
-"""PX4 has some 300, 60 and 2000."""
+MOST_PARAMETERS = 20_000
+"""PX4 has some 2000."""
 UNFOLDED = 32
 """Elements; longer arrays are of bytes to be passed on, and are not made columns."""
-TYPES: dict[str, str] = {
-    "int8_t": "i1",
-    "uint8_t": "u1",
-    "int16_t": "<i2",
-    "uint16_t": "<u2",
-    "int32_t": "<i4",
-    "uint32_t": "<u4",
-    "int64_t": "<i8",
-    "uint64_t": "<u8",
-    "float": "<f4",
-    "double": "<f8",
-    "bool": "i1",
-    "char": "i1",
-}
-_FIELD = re.compile(r"(\w+)(?:\[(\d{1,5})\])? ([\w.]+)")
 _HEAD = struct.Struct("<HB")
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """Records of one topic: ``dtype`` without the padding at the end, that ``longest`` includes."""
-
-    dtype: np.dtype[np.void]
-    longest: int
-    timestamp: int
 
 
 @dataclass(slots=True)
@@ -93,70 +66,6 @@ class UlogIndex:
     dropped_ms: int = 0
 
 
-class _Types:
-    """What the F messages say."""
-
-    def __init__(self) -> None:
-        self._fields: dict[str, list[tuple[str, int, str]]] = {}
-        self._sizes: dict[str, int] = {}
-
-    def learn(self, body: bytes) -> bool:
-        """Take a definition; whether it is one."""
-        name, colon, rest = body.decode("ascii", "replace").partition(":")
-        texts = [text for text in rest.split(";") if text]
-        found = [_FIELD.fullmatch(text) for text in texts]
-        fields = [(m[1], int(m[2]) if m[2] else 0, m[3]) for m in found if m]
-        if name in self._fields:
-            return self._fields[name] == fields
-        if not colon or not all(found) or len(found) > MOST_FIELDS:
-            return False
-        if len(self._fields) >= MOST_TYPES:
-            return False
-        self._fields[name] = fields
-        return True
-
-    def layout(self, name: str) -> Layout | None:
-        """Layout of a topic; None if it cannot be read."""
-        places: dict[str, tuple[str, int]] = {}
-        at = end = 0
-        for kind, count, column in self._fields.get(name, ()):
-            padding = column.startswith("_padding")
-            if kind in TYPES and not padding:
-                form = f"({count},){TYPES[kind]}" if count else TYPES[kind]
-                places.setdefault(column, (form, at))
-            at += self._size(kind, 0) * max(count, 1)
-            end = end if padding else at
-            if at > LONGEST_BODY:
-                return None
-        form, stamp = places.get("timestamp", ("", 0))
-        if form != "<u8":
-            return None
-        formats, offsets = zip(*places.values(), strict=True)
-        dtype = np.dtype(
-            {
-                "names": list(places),
-                "formats": list(formats),
-                "offsets": list(offsets),
-                "itemsize": end,
-            }
-        )
-        return Layout(dtype, at, stamp)
-
-    def _size(self, kind: str, depth: int) -> int:
-        """Bytes of a type; more than any record has, if it is unknown or too deep."""
-        if kind in TYPES:
-            return np.dtype(TYPES[kind]).itemsize
-        size = self._sizes.get(kind)
-        if size is None:
-            size = LONGEST_BODY + 1
-            if kind in self._fields and depth < DEEPEST:
-                self._sizes[kind] = size  # a type within itself has no size
-                parts = [(k, max(n, 1)) for k, n, _ in self._fields[kind]]
-                size = min(sum(self._size(k, depth + 1) * n for k, n in parts), size)
-            self._sizes[kind] = size
-        return size
-
-
 class _Walk:
     """One walk over the file; the state is what it has learnt so far."""
 
@@ -164,7 +73,7 @@ class _Walk:
         self.data = data
         self.wanted = wanted
         self.index = UlogIndex()
-        self._types = _Types()
+        self._types = Types()
         self._layouts: dict[str, Layout | None] = {}
         self._topic_of: dict[int, Topic] = {}
         self._others: set[int] = set()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from onboard.cli.main import run
 from onboard.cli.service import PROGRAM, SAMPLE_PLACE, TOKEN_PLACE, UNIT_PLACE, _program
-from onboard.daemon.setup import configuration
+from onboard.daemon.setup import configuration, secret_files
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,7 +24,7 @@ def test_it_installs_what_is_not_there_and_changes_nothing_else(tmp_path, capsys
     configuration.load(tmp_path / SAMPLE_PLACE)
     token = tmp_path / TOKEN_PLACE
     assert stat.S_IMODE(token.stat().st_mode) == 0o600
-    secret = configuration.read_secret(str(token), key="[http] token_file")
+    secret = secret_files.read_secret(str(token), key="[http] token_file")
     assert len(secret) >= 32
     assert secret not in capsys.readouterr().out
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from onboard.cli.main import run as onboard
 from onboard.daemon.setup import configuration, settings
-from onboard.daemon.setup.configuration import LONGEST_FILE, read_secret
+from onboard.daemon.setup.configuration import LONGEST_FILE
+from onboard.daemon.setup.secret_files import read_secret
 from onboard.errors import ConfigurationError, OnboardError
 
 HOSTILE = {

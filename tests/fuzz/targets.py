@@ -24,7 +24,7 @@ from onboard.daemon.outlets.control import ControlServer
 from onboard.daemon.outlets.door import bound
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.pushing.parameters import ParameterWatch
-from onboard.daemon.setup import configuration, settings
+from onboard.daemon.setup import configuration, secret_files, settings
 from onboard.daemon.view.history import History
 from onboard.daemon.view.journal_lines import journal_view
 from onboard.mavlink.codec import Codec
@@ -137,7 +137,7 @@ def secret(data: bytes) -> str:
     """A file with a token."""
     with _file(data, "token") as path:
         path.chmod(0o600)
-        return configuration.read_secret(str(path), key="[http] token_file")
+        return secret_files.read_secret(str(path), key="[http] token_file")
 
 
 def state(data: bytes) -> object:

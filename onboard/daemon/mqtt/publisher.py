@@ -22,7 +22,8 @@ from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.outbox import Outbox, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
 from onboard.daemon.mqtt.tls import tls_context
-from onboard.daemon.setup.configuration import MqttSettings, read_secret
+from onboard.daemon.setup.configuration import MqttSettings
+from onboard.daemon.setup.secret_files import read_secret
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import JournalLine, Snapshot
 from onboard.mavlink.connection import Backoff

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from onboard.daemon.setup import configuration, settings
+from onboard.daemon.setup import secret_files, settings
 from onboard.daemon.setup.configuration import Configuration
 from onboard.errors import ConfigurationError
 
@@ -27,7 +27,7 @@ def check(chosen: Configuration) -> None:
         from onboard.daemon.mqtt.tls import tls_context  # noqa: PLC0415 - few want it
 
         if chosen.mqtt.password_file is not None:
-            configuration.read_secret(chosen.mqtt.password_file, key="[mqtt] password_file")
+            secret_files.read_secret(chosen.mqtt.password_file, key="[mqtt] password_file")
         tls_context(chosen.mqtt)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import difflib
 import ipaddress
 import os
-import stat
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
@@ -25,8 +24,6 @@ LONGEST_FILE = 65536
 """bytes; the sample, which shows every key, has 3500."""
 LONGEST_LINE = 4096
 """Characters; dotted keys as long as a file take the parser minutes."""
-LONGEST_SECRET = 4096
-"""bytes."""
 Positive = Annotated[float, Meta(gt=0.0, le=LARGEST)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=LARGEST)]
 Rate = Annotated[float, Meta(ge=0.0, le=1000.0)]
@@ -285,46 +282,6 @@ def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:
         raise ConfigurationError(f"{source}: {_explain(str(error))}") from None
     _refuse_control_characters(chosen, source)
     return chosen
-
-
-def refuse_open_token(path: Path, chosen: Configuration) -> None:
-    """Refuse a file that has a token in it and that everybody may read.
-
-    Raises:
-        ConfigurationError: it has, and they may.
-    """
-    if chosen.http.token is not None and path.stat().st_mode & stat.S_IRWXO:
-        raise ConfigurationError(
-            f"{path}: everybody may read the [http] token in it; chmod 600 it, or keep the token "
-            "in a token_file of its own"
-        )
-
-
-def read_secret(path: str, *, key: str) -> str:
-    """First line of a secret's own file, which nobody but its owner and group may read.
-
-    Raises:
-        ConfigurationError: it cannot be read, is empty, or everybody may; ``key`` is named.
-    """
-    try:
-        with Path(path).expanduser().open("rb") as file:
-            mode = os.fstat(file.fileno()).st_mode
-            text = file.read(LONGEST_SECRET).decode("utf-8")
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigurationError(f"{path} ({key}): {reason}") from None
-    lines = text.splitlines()
-    if not lines or not lines[0].strip():
-        raise ConfigurationError(f"{path} ({key}): empty")
-    if not lines[0].strip().isprintable():
-        raise ConfigurationError(f"{path} ({key}): not a text file")
-    if mode & (stat.S_IRWXO | stat.S_IWGRP):
-        who = "everybody" if mode & stat.S_IRWXO else "its group"
-        raise ConfigurationError(
-            f"{path} ({key}): {who} may read or change this secret (mode "
-            f"{stat.S_IMODE(mode):04o}); chmod 600 it, and choose another one if others were here"
-        )
-    return lines[0].strip()
 
 
 def _refuse_control_characters(chosen: Configuration, source: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.limits import TrustLimits
-from onboard.daemon.setup import configuration
+from onboard.daemon.setup import configuration, secret_files
 from onboard.daemon.setup.recording import RollingRecorder
 from onboard.errors import ConfigurationError
 from onboard.mavlink.endpoint import Endpoint
@@ -85,7 +85,7 @@ def signing(link: configuration.LinkSettings, wall_clock: Callable[[], float]) -
     """
     if link.signing_key_file is None:
         return None
-    secret = configuration.read_secret(link.signing_key_file, key="[link] signing_key_file")
+    secret = secret_files.read_secret(link.signing_key_file, key="[link] signing_key_file")
     return Signing.from_passphrase(secret, wall_clock)
 
 
@@ -97,7 +97,7 @@ def http_token(http: configuration.HttpSettings) -> str | None:
     """
     if http.token_file is None:
         return http.token
-    return configuration.read_secret(http.token_file, key="[http] token_file")
+    return secret_files.read_secret(http.token_file, key="[http] token_file")
 
 
 def recorder(
