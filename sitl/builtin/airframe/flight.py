@@ -204,7 +204,8 @@ def _course(air_n: Array, at_rest: float) -> Array:
     if not len(fast):
         return np.full(len(air_n), at_rest)
     course = np.unwrap(np.arctan2(air_n[fast, 1], air_n[fast, 0]))
-    return np.interp(np.arange(len(air_n)), fast, course)
+    out: Array = np.interp(np.arange(len(air_n)), fast, course)
+    return out
 
 
 def _carried(craft: Craft, gust_n: Array) -> Array:

@@ -2,7 +2,7 @@
 
 In wind axes lift is ``q S (c_lift_0 + c_lift_a alpha)``, drag ``q S (c_drag_p + C_L^2 / (pi e
 AR))``; side force along body y ``q S (c_y_0 + c_y_b beta + c_y_deltar rudder)``; thrust along body
-x.  alpha and beta are ``atan2(w, u)`` and ``atan2(v, u)``, q is ``rho V^2 / 2`` of the true airspeed.
+x.  alpha and beta are ``atan2(w, u)`` and ``atan2(v, u)``, q is ``rho V^2 / 2`` of true airspeed.
 """
 
 from __future__ import annotations
