@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.builtin import gps
 from sitl.builtin.airframe.aircraft import Aircraft
+from sitl.builtin.airframe.differences import differences
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.effects import Effect
 from sitl.builtin.messages import Message, packed
@@ -167,6 +168,7 @@ def truth_record(spec: FlightSpec) -> dict[str, Any]:
         "net_gps_delay_s": latency - truth.gps.stamped_early,
         "gps_smoothing_window_s": gps.smoothing_window(truth),
         "effects": [effect.as_record() for effect in truth.effects],
+        **({} if truth.aircraft is None else {"vehicle_level": differences(truth.aircraft)}),
     }
 
 

@@ -7,6 +7,7 @@ it lift and side force must; the first gives the thrust, the second angle of att
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,10 @@ ROUNDS = 30
 SLOWEST = 11.0
 """Below it the wheels carry, m/s."""
 STANDING_PITCH = 0.03
+ATTACK = (-0.3, 0.4)
+"""Angles of attack that are looked at, rad."""
+WEIGHTLESS = 0.1
+"""With less load than this (g) nothing tells how it banks: it goes from before to after."""
 VOLTAGE, SAG, FULL_CURRENT = 12.6, 0.7, 50.0
 """Battery of ArduPilot's simulated plane: V, V and A at full throttle."""
 CENTRE, HALF = 1500.0, 500.0
@@ -94,12 +99,14 @@ def balanced(
         slope = np.maximum(slope, 1.0)
         step = np.clip(-new / slope, -0.2, 0.2)
         miss = new
-        alpha = alpha + step
+        alpha = np.clip(alpha + step, *ATTACK)
         if np.max(np.abs(step)) < 1e-14:
             break
     force = sized(alpha)[2]
     roll = np.arctan2(wanted[:, 2], wanted[:, 1]) - np.arctan2(force[:, 2], force[:, 1])
-    roll = (roll + np.pi) % (2.0 * np.pi) - np.pi
+    known = across > WEIGHTLESS * 9.80665 * mass
+    roll = _bridged(np.unwrap(roll[known]), known)
+    alpha = _bridged(alpha[known], known)
     alpha = STANDING_PITCH + aloft * (alpha - STANDING_PITCH)
     air_b, thrust, _ = sized(alpha)
     R = W @ rotation.about_x(aloft * roll) @ np.swapaxes(_from_wind_axes(alpha, aloft * beta), 1, 2)
@@ -161,6 +168,14 @@ def outputs(
         thrust_b=thrust_b,
         drag_b=aloft.air_b,
     )
+
+
+def _bridged(values: Array, known: np.ndarray[Any, np.dtype[np.bool_]]) -> Array:
+    """(n,) values where known, straight lines in between."""
+    if not len(values):
+        return np.zeros(len(known))
+    out: Array = np.interp(np.arange(len(known)), np.flatnonzero(known), values)
+    return out
 
 
 def _from_wind_axes(alpha: Array, beta: Array) -> Array:
