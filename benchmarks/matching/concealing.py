@@ -1,8 +1,8 @@
 """What the challenge at vehicle level conceals: airframes, winds, and sensors beside them.
 
-Every recording is drawn from its seed.  Sizes are of two levels: ``small`` need not be found, but must
-not be given a wrong name; ``large`` is to be found.  What a mission cannot show by nature is declared
-here, before any recording is made:
+Every recording is drawn from its seed.  Sizes are of two levels: ``small`` need not be found, but
+must not be given a wrong name; ``large`` is to be found.  What a mission cannot show by nature is
+declared here, before any recording is made:
 
 * the ground's cushion takes a hover close above it, which no mission has;
 * thinner air is less thrust and less drag at once, and two effects may be said of it.
@@ -33,8 +33,9 @@ SMALL = 0.2
 """A small effect is this share of a large one."""
 DURATION_S = (120.0, 200.0)
 SLOWER = 0.85
-"""What the airframe cannot fly is flown so much slower."""
-ATTEMPTS = 6
+"""What the airframe cannot fly is drawn again, and flown so much slower."""
+ATTEMPTS = 4
+AGAIN = 100_000
 STAMPED_EARLY = 0.02
 NET_DELAY = (0.0, 0.03)
 RESIDUAL_SCALE, RESIDUAL_OFFSET = 0.002, 0.03
@@ -91,7 +92,7 @@ class Secret:
         return bool(self.wanted) and self.level == "large" and not self.wanted & set(UNSHOWN)
 
     def spec(self, attempt: int = 0) -> FlightSpec:
-        """The flight with everything drawn; a later attempt flies slower."""
+        """The flight with everything drawn; a later attempt flies another mission, slower."""
         rng = np.random.default_rng([self.seed, 983])
         duration = float(rng.uniform(*DURATION_S))
         imu = ImuTruth(
@@ -114,7 +115,7 @@ class Secret:
                 aircraft = _concealed(name, aircraft, rng, share, duration)
         return FlightSpec(
             vehicle=self.vehicle,
-            seed=self.seed,
+            seed=self.seed + AGAIN * attempt,
             duration=duration,
             imus=(imu,),
             gps=GpsTruth(delay=delay, stamped_early=STAMPED_EARLY),

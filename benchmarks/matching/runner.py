@@ -1,8 +1,8 @@
 """The sealed challenge: airframes concealed, answers locked away before anything is asked.
 
-The generator (``sitl/builtin/airframe``) solves rigid-body dynamics at 1 kHz and shares no code with
-what looks for the effects.  Each recording is a .tlog as a ground station writes it.  Each answer is
-hashed, and the hash printed, before ``onboard match`` is started.
+The generator (``sitl/builtin/airframe``) solves rigid-body dynamics at 1 kHz and shares no code
+with what looks for the effects.  Each recording is a .tlog as a ground station writes it.  Each
+answer is hashed, and the hash printed, before ``onboard match`` is started.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from sitl.builtin.airframe.frame import Airframe
 from sitl.builtin.messages import packed
 from sitl.recording import Flight, run, truth_record
 
-MOST_SATURATED = 1e-3
+MOST_SATURATED = 5e-3
 """Share of a flight in which motors may be at their limits; more would be flown slower."""
 
 

@@ -89,9 +89,9 @@ HEAD = (
 )
 LEGEND = """\
 small, large: how many of them are said by all their names; small ones need not be found.  false:
-recordings of which something else is said as well.  unknowns: within 10 % or 3 sigma.  covered: truth
-within 1.96 sigma.  median: relative error.  lateral force: median error on flight that was not used,
-before and after, m/s^2."""
+recordings of which something else is said as well.  unknowns: within 10 % or 3 sigma.  covered:
+truth within 1.96 sigma.  median: relative error.  lateral force: median error on flight that was
+not used, before and after, m/s^2."""
 
 
 def _named(outcomes: Sequence[Outcome]) -> str:

@@ -24,7 +24,7 @@ PROFILE_HEIGHT = 60.0
 """Above it the wind is what it is told to be, m; SIM_WIND_T_ALT's default."""
 SQUARE_ROOT = 0.5
 """Exponent of ArduPilot's default profile, SIM_WIND_T 0."""
-GUST_SMOOTHING_S = (0.06, 0.04, 0.03, 0.02)
+GUST_SMOOTHING_S = (0.1, 0.07, 0.05, 0.03)
 """A vehicle feels the mean over its own size: keeps what a gust does to its attitude finite."""
 EDGE_S = (0.4, 0.25, 0.15)
 
