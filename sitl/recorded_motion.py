@@ -16,7 +16,7 @@ from pymavlink.DFReader import DFReader_binary
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.builtin import rotation
-from sitl.builtin.airframe.motion import Motion
+from sitl.builtin.airframe.motion import Motion, bank_of
 from sitl.builtin.smoothing import DT, Array, smooth
 from sitl.builtin.trajectory import Environment, Start, whole_samples
 from sitl.builtin.world import Vehicle
@@ -24,8 +24,6 @@ from sitl.errors import SitlError
 
 SMOOTHING_S = (0.2, 0.14, 0.1, 0.06)
 """Takes the steps out of 5 to 10 samples a second."""
-MOST_SLIP = 0.25
-"""More is no sideslip but a wind that was given wrong, rad."""
 STANDING_S = 5.0
 """Time on the ground before lift-off and after touch-down."""
 FLYING: dict[Vehicle, float] = {"copter": 0.5, "plane": 12.0}
@@ -58,7 +56,7 @@ def recorded_motion(path: str | Path, wind: tuple[float, float] = (0.0, 0.0)) ->
 
     Args:
         path: .tlog or DataFlash.
-        wind: towards north and east, m/s: what a plane's recorded nose slips against.
+        wind: towards north and east, m/s: what a plane banks in.
 
     Raises:
         SitlError: the recording has no velocity, no attitude or no flight.
@@ -99,16 +97,13 @@ def _motion(rows: _Rows, name: str, wind: tuple[float, float]) -> Motion:
     roll, pitch, heading = (
         _smooth_at(t, attitude[:, 0], np.unwrap(attitude[:, i])) for i in (1, 2, 3)
     )
-    slip = np.zeros(n)
+    bank = np.zeros(n)
     if rows.plane:
-        u_b = rotation.rotate_back(
-            rotation.from_euler(roll, pitch, heading), v_n - np.array([*wind, 0.0])
-        )
-        slip = np.arctan2(u_b[:, 1], np.maximum(u_b[:, 0], FLYING["plane"]))
-        slip = np.clip(slip, -MOST_SLIP, MOST_SLIP) * _smooth_in(~landed)
+        R_nb = rotation.from_euler(roll, pitch, heading)
+        bank = np.unwrap(bank_of(R_nb, v_n - np.array([*wind, 0.0]))) * _smooth_in(~landed)
     armed = (t >= lift_off - 3.0) & (t < touch_down + 3.0)
     start = Start(yaw=float(heading[0]))
-    return Motion(v_n, heading, slip, armed, landed, start)
+    return Motion(v_n, heading, bank, armed, landed, start)
 
 
 def _sorted(rows: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:

@@ -47,7 +47,7 @@ AIRFRAME_RATES: Mapping[str, float] = {
     "VFR_HUD": 10.0,
     "BATTERY_STATUS": 5.0,
     "LOCAL_POSITION_NED": 10.0,
-    "SERVO_OUTPUT_RAW": 25.0,
+    "SERVO_OUTPUT_RAW": 50.0,
 }
 """Rates (Hz) of what tells of an airframe, in flights that have one."""
 

@@ -102,7 +102,12 @@ def by_command(recording: Path) -> Said:
     document = recording.with_suffix(".json")
     command = [sys.executable, "-m", "onboard", "match", str(recording), "--json", str(document)]
     done = subprocess.run(  # noqa: S603
-        command, capture_output=True, text=True, timeout=LONGEST_S, check=False
+        command,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+        check=False,
+        cwd=recording.parent,  # the installed command, not what lies where this was started
     )
     if done.returncode:
         raise MatchError(

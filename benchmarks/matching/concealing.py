@@ -22,6 +22,7 @@ from sitl.builtin.airframe.air import Air
 from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.airframe.frame import Airframe
 from sitl.builtin.airframe.wing import Wing
+from sitl.builtin.trajectory import Environment
 from sitl.builtin.truth import GpsTruth, ImuTruth
 from sitl.builtin.world import Vehicle
 from sitl.recording import FlightSpec
@@ -36,8 +37,12 @@ SLOWER = 0.85
 """What the airframe cannot fly is drawn again, and flown so much slower."""
 ATTEMPTS = 4
 AGAIN = 100_000
+ALTITUDE: dict[Vehicle, tuple[float, float]] = {"copter": (0.0, 1000.0), "plane": (0.0, 30.0)}
+"""Of the field, m.  ArduPilot's simulated plane takes the equivalent airspeed for the true one;
+near sea level both are the same, and its nominal plane is this one."""
 STAMPED_EARLY = 0.02
-NET_DELAY = (0.0, 0.03)
+NET_DELAY = (0.09, 0.11)
+"""Of every receiver, s: about what ArduPilot's simulated one has, so that none is an effect."""
 RESIDUAL_SCALE, RESIDUAL_OFFSET = 0.002, 0.03
 """Every accelerometer is a little wrong after its calibration: 1 and m/s^2, standard deviations."""
 
@@ -120,6 +125,7 @@ class Secret:
             imus=(imu,),
             gps=GpsTruth(delay=delay, stamped_early=STAMPED_EARLY),
             effects=tuple(extra),
+            environment=Environment(altitude=float(rng.uniform(*ALTITUDE[self.vehicle]))),
             aircraft=aircraft,
         )
 
@@ -170,7 +176,7 @@ def _air(name: str, aircraft: Aircraft, rng: Rng, share: float, duration: float)
                 air, exponent=0.5 if rng.random() < 0.6 else float(rng.uniform(0.2, 0.6))
             )
         case "turbulence":
-            sigma = float(rng.uniform(0.4, 0.8) if plane else rng.uniform(0.6, 1.2))
+            sigma = float(rng.uniform(0.3, 0.6) if plane else rng.uniform(0.6, 1.2))
             time = float(rng.uniform(1.0, 3.0))
             return replace(air, turbulence=share * sigma, turbulence_time=time)
         case "air_density":

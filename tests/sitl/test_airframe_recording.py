@@ -43,7 +43,7 @@ def test_outputs_are_sent_as_they_are(flight):
     inside, rows = rows_of(flight, [m.time_usec * 1e-6 for m in messages])
     sent = np.array([[getattr(messages[i], f"servo{k}_raw") for k in (1, 2, 3, 4)] for i in inside])
     true = flight.pieces[-1].trajectory.outputs.pwm[rows]
-    assert len(inside) > 800
+    assert len(inside) > 1600
     assert np.abs(sent - true).max() < 3.0  # half a microsecond, and a millisecond of change
     assert sent.max() > 1500
 

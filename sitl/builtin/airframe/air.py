@@ -26,6 +26,8 @@ SQUARE_ROOT = 0.5
 """Exponent of ArduPilot's default profile, SIM_WIND_T 0."""
 GUST_SMOOTHING_S = (0.1, 0.07, 0.05, 0.03)
 """A vehicle feels the mean over its own size: keeps what a gust does to its attitude finite."""
+UPWARDS = 0.5
+"""Near the ground air moves less up and down than to and fro."""
 EDGE_S = (0.4, 0.25, 0.15)
 
 
@@ -46,7 +48,7 @@ class Air:
         exponent: of the profile ``(h / 60 m)^exponent`` below 60 m; 0 is uniform, and 0.5 is
             SIM_WIND_T 0.
         change_north, change_east: by how much the wind grows each second, m/s^2.
-        turbulence: standard deviation of each axis, m/s.
+        turbulence: standard deviation of each horizontal axis, m/s; half of it upwards.
         turbulence_time: correlation time of a first-order process, s.
         gust_north, gust_east: a gust on top between ``gust_start`` and ``gust_end`` (s since
             the start of the flight), m/s.
@@ -102,9 +104,10 @@ class Air:
         """Turbulence and gust, (n, 3) NED, m/s, smooth at the scale of a vehicle."""
         out = np.zeros((n, 3))
         if self.turbulence:
-            for axis in range(3):
+            for axis, share in enumerate((1.0, 1.0, UPWARDS)):
                 rng = np.random.default_rng([self.seed, 71, axis])
-                out[:, axis] = turbulence(rng, n, self.turbulence, self.turbulence_time)
+                sigma = share * self.turbulence
+                out[:, axis] = turbulence(rng, n, sigma, self.turbulence_time)
         if self.gust_north or self.gust_east:
             t = np.arange(n) * DT
             inside = ((t >= self.gust_start) & (t < self.gust_end)).astype(np.float64)

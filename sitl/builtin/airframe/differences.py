@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from sitl.builtin.airframe.air import profile
 from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.airframe.frame import Airframe
 from sitl.builtin.airframe.wing import Wing
 from sitl.builtin.trajectory import Trajectory
 
 SAME = 1e-6
+ENDS = 4000
+"""Samples after lift-off and before touch-down: a vehicle on the ground feels no wind."""
 
 
 def differences(
@@ -23,7 +26,7 @@ def differences(
     """Unknowns of each effect that is there, by the effect's name.
 
     ``rotor_drag`` in 1/s; ``body_drag`` as ``areaCd / mass``, m^2/kg; ``wind`` in m/s towards north
-    and east, as flown through on average where a flight is given; ``thrust_scale`` as full thrust
+    and east, at the flight's mean height where a flight is given; ``thrust_scale`` as full thrust
     over mass against the nominal; ``thrust_tilt`` forwards and to the right, rad; ``voltage_sag``
     as the share of the voltage's law that holds, which is 1 or 0.
 
@@ -46,8 +49,13 @@ def _of_the_air(aircraft: Aircraft, flight: Trajectory | None) -> dict[str, dict
     out: dict[str, dict[str, float]] = {}
     north, east = air.north, air.east
     if flight is not None and flight.outputs is not None:
-        in_air = ~flight.landed
-        north, east = (float(x) for x in flight.outputs.wind_n[in_air, :2].mean(axis=0))
+        flying = np.flatnonzero(~flight.landed)
+        inside = slice(flying[0] + ENDS, flying[-1] - ENDS)
+        height = -flight.p_n[inside, 2]
+        share = profile(height, air.exponent)
+        at_mean = profile(np.mean(height, keepdims=True), air.exponent)[0] / np.mean(share)
+        mean = at_mean * flight.outputs.wind_n[inside, :2].mean(axis=0)
+        north, east = float(mean[0]), float(mean[1])
     if air.north or air.east:
         out["wind"] = {"north": north, "east": east}
         if air.exponent:

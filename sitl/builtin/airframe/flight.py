@@ -27,8 +27,6 @@ Craft: TypeAlias = Airframe | Wing
 HOLDING = 1.0
 """How fast the autopilot brings back what a gust has carried away, rad/s."""
 MEMORY_S = 12.0
-WEATHERVANING = 1.0
-"""Most of what a gust across a plane may carry it along, 1/s."""
 SPIN_UP_S = 1.0
 CRUISE = 20.0
 CONFIGURED_EXPO = 0.65
@@ -50,7 +48,7 @@ def flown(motion: Motion, craft: Craft, air: Air, environment: Environment) -> T
     fade = 2.0 if isinstance(craft, Airframe) else 3.0
     aloft = envelope(n, begin + 0.5, end - 0.5, fade)
     unsteady = aloft[:, None] * air.unsteady(n)
-    away = integral(_carried(craft, unsteady))
+    away = integral(_carried(craft, unsteady, motion.yaw))
     # It touches down where it was told to.
     away *= envelope(n, begin + 1.0, end - 1.0, 4.0)[:, None]
     v_n = motion.v_n + derivative(away)
@@ -166,7 +164,7 @@ def _plane(
         wing,
         f_n,
         air_n,
-        motion.slip,
+        motion.bank,
         course=_course(air_n, motion.start.yaw),
         aloft=aloft,
         mass=mass,
@@ -208,24 +206,33 @@ def _course(air_n: Array, at_rest: float) -> Array:
     return out
 
 
-def _carried(craft: Craft, gust_n: Array) -> Array:
-    """(n, 3) velocity that gusts give: ``v' = k (w - v) - 2 h v - h^2 x`` in each axis."""
+def _carried(craft: Craft, gust_n: Array, course: Array) -> Array:
+    """(n, 3) velocity that gusts give: ``v' = k (w - v) - 2 h v - h^2 x`` in each axis.
+
+    k is what the air holds on to: drag, side force along and across the course, lift upwards.
+    """
     if not gust_n.any():
         return np.zeros_like(gust_n)
     if isinstance(craft, Airframe):
-        gains = (copter_force.linear_drag(craft, 6.0),) * 3
-    else:
-        pressure = 0.5 * SEA_LEVEL_DENSITY * CRUISE * craft.s / craft.mass
-        side = pressure * (-craft.c_y_b + 2.0 * craft.c_drag_p) / 2.0
-        # Lift would take it along within 0.05 s; but it turns its nose into a gust before.
-        lift = pressure * craft.c_lift_a
-        gains = (min(side, WEATHERVANING), min(side, WEATHERVANING), min(lift, WEATHERVANING))
+        gain = copter_force.linear_drag(craft, 6.0)
+        return np.column_stack([_held(gain, gust_n[:, i]) for i in range(3)])
+    pressure = 0.5 * SEA_LEVEL_DENSITY * CRUISE * craft.s / craft.mass
+    drag, side = 2.0 * pressure * craft.c_drag_p, -pressure * craft.c_y_b
+    ahead = np.column_stack([np.cos(course), np.sin(course)])
+    right = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     out = np.empty_like(gust_n)
-    t = np.arange(round(MEMORY_S * RATE)) * DT
-    for axis, gain in enumerate(gains):
-        half = 0.5 * gain + HOLDING
-        root = np.sqrt(half**2 - HOLDING**2)
-        fast, slow = half + root, half - root
-        response = gain * (fast * np.exp(-fast * t) - slow * np.exp(-slow * t)) / (fast - slow)
-        out[:, axis] = convolved(gust_n[:, axis], DT * response)
+    out[:, :2] = 0.0
+    for way, gain in ((ahead, drag), (right, side)):
+        out[:, :2] += way * _held(gain, np.sum(way * gust_n[:, :2], axis=1))[:, None]
+    out[:, 2] = _held(pressure * craft.c_lift_a, gust_n[:, 2])
     return out
+
+
+def _held(gain: float, gust: Array) -> Array:
+    """(n,) velocity along one axis, m/s; ``gain`` in 1/s."""
+    t = np.arange(round(MEMORY_S * RATE), dtype=np.float64) * DT
+    half = 0.5 * gain + HOLDING
+    root = np.sqrt(half**2 - HOLDING**2)
+    fast, slow = half + root, half - root
+    response = gain * (fast * np.exp(-fast * t) - slow * np.exp(-slow * t)) / (fast - slow)
+    return convolved(gust, DT * response)

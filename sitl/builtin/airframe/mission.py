@@ -140,7 +140,7 @@ def _flown(plan: _Plan, seed: int, duration: float, touch_down: float, start: St
     return Motion(
         v_n=v_n,
         yaw=smooth(staircase(n, plan.yaw_times, plan.yaw), YAW_S),
-        slip=np.zeros(n),
+        bank=np.zeros(n),
         armed=(t >= LIFT_OFF - 2.0) & (t < touch_down + 2.0),
         landed=(t < LIFT_OFF) | (t >= touch_down),
         start=start,

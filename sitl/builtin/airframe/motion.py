@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sitl.builtin import rotation
+from sitl.builtin.airframe.wing_force import SLOWEST, climb_angle, from_wind_axes
 from sitl.builtin.smoothing import DT, Array
 from sitl.builtin.trajectory import Start, Trajectory
 
@@ -21,7 +22,7 @@ class Motion:
     Attributes:
         v_n: (n, 3) velocity over ground, NED, m/s.
         yaw: (n,) heading of a multicopter, course of a plane, rad.
-        slip: (n,) sideslip of a plane, rad; a multicopter has none.
+        bank: (n,) of a plane about its air velocity, rad; a multicopter is told none.
         armed: (n,) whether motors may turn.
         landed: (n,) whether it stands.
         start: place and heading at the first row.
@@ -29,7 +30,7 @@ class Motion:
 
     v_n: Array
     yaw: Array
-    slip: Array
+    bank: Array
     armed: Flags
     landed: Flags
     start: Start
@@ -50,10 +51,21 @@ class Motion:
     @classmethod
     def of_plane(cls, trajectory: Trajectory, wind_n: Array, start: Start) -> Motion:
         """Of a flight as :mod:`sitl.builtin.plane` makes it, in a wind of (n, 3) m/s."""
-        u_b = rotation.rotate_back(trajectory.R_nb, trajectory.v_n - wind_n)
-        flying = ~trajectory.landed & (u_b[:, 0] > 8.0)
-        slip = np.where(flying, np.arctan2(u_b[:, 1], np.maximum(u_b[:, 0], 8.0)), 0.0)
+        bank = bank_of(trajectory.R_nb, trajectory.v_n - wind_n)
         course = np.arctan2(trajectory.R_nb[:, 1, 0], trajectory.R_nb[:, 0, 0])
         return cls(
-            trajectory.v_n, np.unwrap(course), slip, trajectory.armed, trajectory.landed, start
+            trajectory.v_n, np.unwrap(course), bank, trajectory.armed, trajectory.landed, start
         )
+
+
+def bank_of(R_nb: Array, air_n: Array) -> Array:
+    """(n,) how far a body is rolled about its velocity through the air; none where it stands."""
+    speed = np.linalg.norm(air_n, axis=1)
+    course = np.arctan2(air_n[:, 1], air_n[:, 0])
+    W = rotation.about_z(course) @ rotation.about_y(climb_angle(air_n))
+    u_b = rotation.rotate_back(R_nb, air_n)
+    ahead = np.maximum(u_b[:, 0], SLOWEST)
+    B = from_wind_axes(np.arctan2(u_b[:, 2], ahead), np.arctan2(u_b[:, 1], ahead))
+    rolled = np.swapaxes(W, 1, 2) @ R_nb @ B
+    angle = np.arctan2(rolled[:, 2, 1], rolled[:, 1, 1])
+    return np.where(speed > SLOWEST, angle, 0.0)

@@ -1,13 +1,13 @@
-"""A plane's attitude, thrust and outputs that belong to a velocity, a sideslip and a wind.
+"""A plane's attitude, thrust and outputs that belong to a velocity, a bank and a wind.
 
-Inverse dynamics: along the air velocity thrust less drag must be the specific force wanted, across
-it lift and side force must; the first gives the thrust, the second angle of attack and bank.
+Inverse dynamics: in axes of the air velocity, rolled by the bank, thrust less drag must be the
+specific force wanted ahead, side force that to the right and lift that upwards: the first gives the
+thrust, the second the sideslip, the third the angle of attack.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,13 @@ from sitl.builtin.airframe.outputs import Outputs
 from sitl.builtin.airframe.wing import Wing
 from sitl.builtin.smoothing import DT, Array, derivative
 
-ROUNDS = 30
+ROUNDS = 80
 SLOWEST = 11.0
 """Below it the wheels carry, m/s."""
 STANDING_PITCH = 0.03
 ATTACK = (-0.3, 0.4)
 """Angles of attack that are looked at, rad."""
-WEIGHTLESS = 0.1
-"""With less load than this (g) nothing tells how it banks: it goes from before to after."""
+MOST_SLIP = 0.4
 VOLTAGE, SAG, FULL_CURRENT = 12.6, 0.7, 50.0
 """Battery of ArduPilot's simulated plane: V, V and A at full throttle."""
 CENTRE, HALF = 1500.0, 500.0
@@ -47,20 +46,20 @@ def balanced(
     wing: Wing,
     f_n: Array,
     air_n: Array,
-    beta: Array,
+    bank: Array,
     *,
     course: Array,
     aloft: Array,
     mass: Array,
     density: Array,
 ) -> Aloft:
-    """Attitude and thrust at which the specific force ``f_n`` is that of thrust and air.
+    """Angles and thrust at which the specific force ``f_n`` is that of thrust and air.
 
     Args:
         wing: the plane.
         f_n: (n, 3) specific force wanted, NED, m/s^2.
         air_n: (n, 3) velocity through the air, NED, m/s.
-        beta: (n,) sideslip, rad.
+        bank: (n,) about the air velocity, rad.
         course: (n,) direction of ``air_n`` over ground, also where it stands, rad.
         aloft: (n,) 0 where the wheels carry, 1 where the wing does.
         mass: (n,) kg.
@@ -69,48 +68,67 @@ def balanced(
     true_speed = np.linalg.norm(air_n, axis=1)
     speed = np.maximum(true_speed, SLOWEST)
     pressure = 0.5 * density * speed**2
-    gamma = np.arcsin(np.clip(-air_n[:, 2] / np.maximum(true_speed, 4.0), -0.9, 0.9))
-    W = rotation.about_z(course) @ rotation.about_y(gamma)
+    gamma = climb_angle(air_n)
+    W = rotation.about_z(course) @ rotation.about_y(gamma) @ rotation.about_x(aloft * bank)
     wanted = mass[:, None] * rotation.rotate_back(W, f_n)
-    across = np.hypot(wanted[:, 1], wanted[:, 2])
-    # How fast the air velocity turns about the lift: what the yaw damping of the tail feels.
-    turning = derivative(course) * np.cos(gamma) * aloft
-    bank = np.arctan2(turning * speed, 9.80665)
-    rudder = wing.rudder_for(beta, turning * np.cos(bank), speed)
-
-    def sized(alpha: Array) -> tuple[Array, Array, Array]:
-        """Force of the air, thrust, and force in axes of the air velocity, rolled with the body."""
-        air_b = wing.force(alpha, beta, rudder, pressure)
-        B = _from_wind_axes(alpha, beta)
-        ahead = B[:, :, 0]
-        thrust = (wanted[:, 0] - np.einsum("ni,ni->n", air_b, ahead)) / ahead[:, 0]
-        force = air_b.copy()
-        force[:, 0] += thrust
-        return air_b, thrust, rotation.rotate_back(B, force)
-
-    alpha = (across / (pressure * wing.s) - wing.c_lift_0) / wing.c_lift_a
-    slope = pressure * wing.s * wing.c_lift_a
-    step = np.full_like(alpha, 1e-6)
-    miss = np.hypot(*sized(alpha - step)[2][:, 1:].T) - across
-    for _ in range(ROUNDS):  # the secant, sample by sample
-        new = np.hypot(*sized(alpha)[2][:, 1:].T) - across
-        moved = np.abs(step) > 1e-9
-        slope = np.where(moved, (new - miss) / np.where(moved, step, 1.0), slope)
-        slope = np.maximum(slope, 1.0)
-        step = np.clip(-new / slope, -0.2, 0.2)
-        miss = new
-        alpha = np.clip(alpha + step, *ATTACK)
-        if np.max(np.abs(step)) < 1e-14:
+    # How fast the air velocity turns: what the yaw damping of the tail feels.
+    yawing = derivative(course) * np.cos(gamma) * np.cos(bank) * aloft
+    lifted = pressure * wing.s
+    alpha = (-wanted[:, 2] / lifted - wing.c_lift_0) / wing.c_lift_a
+    beta = np.zeros_like(alpha)
+    for _ in range(ROUNDS):
+        air_b, rudder, thrust, force = _forces(wing, alpha, beta, yawing, speed, lifted, wanted)
+        stiff = lifted * wing.c_lift_a + np.abs(thrust)
+        turned = lifted * _side_slope(wing, rudder) + np.abs(thrust)
+        rise = (force[:, 2] - wanted[:, 2]) / stiff
+        swing = (force[:, 1] - wanted[:, 1]) / turned
+        alpha = np.clip(alpha + rise, *ATTACK)
+        beta = np.clip(beta + swing, -MOST_SLIP, MOST_SLIP)
+        if max(np.max(np.abs(rise)), np.max(np.abs(swing))) < 1e-15:
             break
-    force = sized(alpha)[2]
-    roll = np.arctan2(wanted[:, 2], wanted[:, 1]) - np.arctan2(force[:, 2], force[:, 1])
-    known = across > WEIGHTLESS * 9.80665 * mass
-    roll = _bridged(np.unwrap(roll[known]), known)
-    alpha = _bridged(alpha[known], known)
     alpha = STANDING_PITCH + aloft * (alpha - STANDING_PITCH)
-    air_b, thrust, _ = sized(alpha)
-    R = W @ rotation.about_x(aloft * roll) @ np.swapaxes(_from_wind_axes(alpha, aloft * beta), 1, 2)
+    beta = aloft * beta
+    air_b, rudder, thrust, _ = _forces(wing, alpha, beta, yawing, speed, lifted, wanted)
+    R = W @ np.swapaxes(from_wind_axes(alpha, beta), 1, 2)
     return Aloft(R, alpha, beta, rudder, speed, thrust, air_b)
+
+
+def climb_angle(air_n: Array) -> Array:
+    """(n,) angle of an air velocity above the horizon, rad; level where it stands."""
+    speed = np.maximum(np.linalg.norm(air_n, axis=1), 4.0)
+    out: Array = np.arcsin(np.clip(-air_n[:, 2] / speed, -0.9, 0.9))
+    return out
+
+
+def _side_slope(wing: Wing, rudder: Array) -> Array:
+    """(n,) how much side force a sideslip makes with the rudder that holds it, per rad."""
+    free = np.abs(rudder) < 1.0
+    slope = wing.c_y_b - free * wing.c_y_deltar * wing.c_n_b / wing.c_n_deltar
+    out: Array = np.maximum(-slope, 0.05)
+    return out
+
+
+def _forces(
+    wing: Wing,
+    alpha: Array,
+    beta: Array,
+    yawing: Array,
+    speed: Array,
+    lifted: Array,
+    wanted: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """Force of the air (body axes), rudder, thrust, and all force in axes of the air velocity.
+
+    The thrust is what makes the force along the air velocity the wanted one.
+    """
+    rudder = wing.rudder_for(beta, yawing, speed)
+    air_b = wing.force(alpha, beta, rudder, lifted / wing.s)
+    B = from_wind_axes(alpha, beta)
+    ahead = B[:, :, 0]
+    thrust = (wanted[:, 0] - np.einsum("ni,ni->n", air_b, ahead)) / ahead[:, 0]
+    force = air_b.copy()
+    force[:, 0] += thrust
+    return air_b, rudder, thrust, rotation.rotate_back(B, force)
 
 
 def outputs(
@@ -170,15 +188,7 @@ def outputs(
     )
 
 
-def _bridged(values: Array, known: np.ndarray[Any, np.dtype[np.bool_]]) -> Array:
-    """(n,) values where known, straight lines in between."""
-    if not len(values):
-        return np.zeros(len(known))
-    out: Array = np.interp(np.arange(len(known)), np.flatnonzero(known), values)
-    return out
-
-
-def _from_wind_axes(alpha: Array, beta: Array) -> Array:
+def from_wind_axes(alpha: Array, beta: Array) -> Array:
     """(n, 3, 3) body axes from axes with x along the air velocity, by ``atan2`` angles."""
     ahead = np.column_stack([np.ones_like(alpha), np.tan(beta), np.tan(alpha)])
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
