@@ -27,6 +27,7 @@ class Wing:
     """One plane; names and defaults are those of ArduPilot's coefficient files.
 
     Attributes:
+        CGOffset: from the centre of mass to where the air's force attacks, body axes, m.
         mass: kg.
         hover_throttle: at which thrust is weight.
         airspeed_ratio: ARSPD_RATIO that would be right for its airspeed sensor.
@@ -56,6 +57,7 @@ class Wing:
     c_n_p: float = 0.022
     c_n_r: float = -1.0
     c_n_deltar: float = 0.1
+    CGOffset: tuple[float, float, float] = (-0.15, 0.0, -0.05)
     mass: float = 2.0
     hover_throttle: float = 0.7
     airspeed_ratio: float = 2.0
@@ -66,7 +68,12 @@ class Wing:
     def from_dict(cls, values: Mapping[str, Any]) -> Wing:
         """Of a coefficient file's object; keys that are not known here are left out."""
         known = {f.name for f in fields(cls)}
-        return cls(**{k: float(v) for k, v in values.items() if k in known})
+        chosen: dict[str, Any] = {
+            k: float(v) for k, v in values.items() if k in known and k != "CGOffset"
+        }
+        if "CGOffset" in values:
+            chosen["CGOffset"] = tuple(float(x) for x in values["CGOffset"])
+        return cls(**chosen)
 
     @classmethod
     def load(cls, path: str | Path) -> Wing:
@@ -114,15 +121,28 @@ class Wing:
         out: Array = (pressure * self.s)[:, None] * np.column_stack([along, side, down])
         return out
 
+    @property
+    def yaw_stiffness(self) -> float:
+        """Yawing moment per rad of sideslip, with what the side force does about the mass."""
+        return self.c_n_b + self.CGOffset[0] / self.b * self.c_y_b
+
+    @property
+    def rudder_power(self) -> float:
+        """Yawing moment of the whole rudder, with what its side force does about the mass."""
+        return self.c_n_deltar + self.CGOffset[0] / self.b * self.c_y_deltar
+
     def rudder_for(self, beta: Array, yaw_rate: Array, speed: Array) -> Array:
         """(n,) rudder, -1 ... 1, at which a sideslip is steady."""
         damping = self.c_n_r * self.b * yaw_rate / (2.0 * speed)
-        return np.clip(-(self.c_n_b * beta + damping) / self.c_n_deltar, -1.0, 1.0)
+        return np.clip(-(self.yaw_stiffness * beta + damping) / self.rudder_power, -1.0, 1.0)
 
     def elevator_for(self, alpha: Array, pitch_rate: Array, speed: Array) -> Array:
         """(n,) elevator, -1 ... 1, at which an angle of attack is steady."""
+        x, _, z = self.CGOffset
+        lift, drag = self.coefficients(alpha)
         moment = self.c_m_0 + self.c_m_a * alpha
         moment = moment + self.c_m_q * self.c * pitch_rate / (2.0 * speed)
+        moment = moment + (x * lift - z * drag) / self.c  # small angles: lift is up, drag is back
         return np.clip(-moment / self.c_m_deltae, -1.0, 1.0)
 
     def aileron_for(self, beta: Array, rates: Array, speed: Array) -> Array:

@@ -103,7 +103,7 @@ def climb_angle(air_n: Array) -> Array:
 def _side_slope(wing: Wing, rudder: Array) -> Array:
     """(n,) how much side force a sideslip makes with the rudder that holds it, per rad."""
     free = np.abs(rudder) < 1.0
-    slope = wing.c_y_b - free * wing.c_y_deltar * wing.c_n_b / wing.c_n_deltar
+    slope = wing.c_y_b - free * wing.c_y_deltar * wing.yaw_stiffness / wing.rudder_power
     out: Array = np.maximum(-slope, 0.05)
     return out
 
