@@ -155,11 +155,7 @@ def _messages(data: bytes) -> Iterator[Any]:
 
 def _of_dataflash(path: Path) -> _Rows:
     rows = _Rows()
-    log = DFReader_binary(str(path))
-    while True:
-        message = log.recv_match(type=["XKF1", "ATT", "MSG", "ORGN"])
-        if message is None:
-            return rows
+    for message in dataflash(path, ("XKF1", "ATT", "MSG", "ORGN")):
         match message.get_type():
             case "XKF1" if message.C == 0:
                 t = message.TimeUS * 1e-6
@@ -171,3 +167,14 @@ def _of_dataflash(path: Path) -> _Rows:
                 rows.plane = True
             case "ORGN" if rows.home is None and message.Lat:
                 rows.home = (message.Lat, message.Lng, message.Alt)
+    return rows
+
+
+def dataflash(path: str | Path, kinds: Sequence[str]) -> Iterator[Any]:
+    """Messages of some kinds of a DataFlash log, in order."""
+    log = DFReader_binary(str(path))
+    try:
+        while (message := log.recv_match(type=list(kinds))) is not None:
+            yield message
+    finally:
+        log.close()
