@@ -85,6 +85,11 @@ class Said:
     held_out: tuple[float, float] = (math.nan, math.nan)
     details: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def clean(self) -> bool:
+        """Nothing differs, it says."""
+        return self.verdict == "clean"
+
 
 Asked = Callable[[Path], Said]
 

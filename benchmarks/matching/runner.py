@@ -132,7 +132,7 @@ def main(arguments: list[str] | None = None) -> None:
     for o in challenged(secrets, chosen.processes, by_command):
         outcomes.append(o)
         missed = o.secret.testable and not o.identified
-        if chosen.all or o.false or missed or o.said is None:
+        if chosen.all or o.false or missed or o.overlooked or o.said is None:
             print(describe(o), flush=True)
         if chosen.save:
             chosen.save.write_bytes(pickle.dumps(outcomes))

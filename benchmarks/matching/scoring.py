@@ -62,6 +62,11 @@ class Outcome:
         return self.said is not None and self.secret.wanted <= self.found
 
     @property
+    def overlooked(self) -> bool:
+        """Something without a name is concealed, and the recording was called clean."""
+        return self.secret.kind == "outside" and self.said is not None and self.said.clean
+
+    @property
     def false(self) -> set[str]:
         """Names that were said of nothing; six numbers of the sensors are no false name."""
         return self.found - self.secret.allowed - {"accelerometer_offset", "accelerometer_scale"}
@@ -139,6 +144,9 @@ def table(outcomes: Sequence[Outcome]) -> str:
         "nothing": [o for o in outcomes if o.secret.kind == "control"],
     }
     lines += [_row(label, some) for label, some in groups.items() if some]
+    overlooked = sum(o.overlooked for o in outcomes)
+    if overlooked:
+        lines.append(f"{overlooked} of those outside the catalogue were called clean")
     failed = sum(o.said is None for o in outcomes)
     if failed:
         lines.append(f"of {failed} recordings nothing was said: the command failed")

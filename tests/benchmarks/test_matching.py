@@ -63,6 +63,14 @@ def test_a_thing_outside_the_catalogue_has_no_name_but_near_ones():
     assert "rotor_drag" not in secret.allowed
 
 
+def test_what_has_no_name_must_not_be_called_clean():
+    secret = Secret(9, "copter", "outside", ("gust",))
+    clean, wind = (Outcome(secret, "", {}, Said(v, {})) for v in ("clean", "not_explained"))
+    assert clean.overlooked
+    assert not wind.overlooked
+    assert "1 of those outside the catalogue were called clean" in table([clean, wind])
+
+
 @pytest.fixture
 def short(monkeypatch):
     monkeypatch.setattr(concealing, "DURATION_S", (55.0, 60.0))
