@@ -122,6 +122,6 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         tuple(made.indices(family)),
         family.plausible,
         family,
-        spent=int(jump),
+        places=made.trusted_s / SPACINGS[0][0] if jump else 1.0,
         jump=jump,
     )

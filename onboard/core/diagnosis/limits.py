@@ -11,22 +11,11 @@ from typing import Final
 
 # Candidates and their choice (candidates, hypotheses).
 
-MARGIN: Final = 25.0
-"""Fall of chi-square beyond BIC's own penalty: a false discovery is worse than a miss [tuned]."""
-HELD_OUT_GAIN: Final = 12.0
-"""Fall of chi-square on blocks that were not fitted [tuned]."""
-SECOND_ORDER: Final = 5e-3
-"""Share of the evidence of what was found that may be left over where the regressors, which are
-linear in it, end [tuned]."""
-SIGNIFICANT: Final = 5.0
-"""Sigmas of the surest unknown: 6e-7 come so far by chance [probability]."""
-CONTRADICTING: Final = 3.0
-"""Variance inflation from which blocks contradict each other [tuned]."""
-RECONCILED: Final = 0.35
-"""Share of that inflation below which an effect has made them agree [tuned]."""
-FAIR: Final = 10.0
-"""Fall of BIC that is enough for an effect which makes blocks agree: "very strong" on the scale of
-Kass and Raftery (1995) [probability]."""
+FALSE_ALARM: Final = 1e-3
+"""Of a flight of which nothing is missing, that something is said to be [probability]."""
+CLEARLY: Final = 10.0
+"""Difference of scores from which one hypothesis is clearly better than another: odds of 150, "very
+strong" on the scale of Kass and Raftery (1995) [probability]."""
 MATTERS_SCALE: Final = 0.005
 """Move of a scale that is worth an effect [use]."""
 MATTERS_OFFSET: Final = 0.02
@@ -37,23 +26,6 @@ MOST_EFFECTS: Final = 5
 """Effects beside each other: more are a search without end [cost]."""
 LEAST_BLOCKS: Final = 4
 """Blocks of a flight among which a jump can be looked for: two on either side [physics]."""
-RIVAL_SHARE: Final = 0.15
-"""Least share of an effect's evidence that makes another one its confounder [tuned]."""
-LEFT_BESIDE: Final = 0.5
-"""A confounder explains the same: beside the effect less than this share of its gain is left
-[tuned]."""
-USED: Final = 4.0
-"""Sigmas from which an unknown of several counts as used: 6e-5 by chance [probability]."""
-CHANCE: Final = 4.0
-"""What an unknown that is not used gains by chance, 19 times of 20 [probability]."""
-STILL: Final = 0.8
-"""Share of its least size that a timing error must keep whatever else is in the model [tuned]."""
-SUSPECT: Final = 18.0
-"""Fall of chi-square by a jump at any block's start that one flight of thirty, five minutes long,
-shows by chance [probability]."""
-AMBIGUOUS: Final = 10.0
-"""Difference of BIC within which confounders cannot be told apart (Kass and Raftery, 1995)
-[probability]."""
 
 # Jumps (jumps, selection).
 
@@ -145,18 +117,8 @@ SAME_FIX_S: Final = 0.1
 """s within which a stamp of the trust window and one of a batch are the same fix: the jitter of
 stamps [physics]."""
 
-# Physics without a name (search).
-
-SUSPICIOUS: Final = 3.0
-"""Variance inflation from which a residual is searched [tuned]."""
-FAR_BETTER: Final = 1.3
-"""Share of an effect's own evidence that a product needs to take its place [tuned]."""
-
 # What a recording lets ask for (testability).
 
 LEAST_SPREAD: Final = {"temperature": 0.5, "throttle": 0.03, "vibration": 0.05}
 """Changes of slow signals (K, 1, m/s^2) below which what follows them is not to be seen
 [tuned]."""
-MOST_UNSEEN: Final = 0.02
-"""Share of a signal's variance that its samples may miss: what changes faster averages out in an
-integral [tuned]."""

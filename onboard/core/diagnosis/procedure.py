@@ -9,7 +9,6 @@ timing and residuals.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,24 +19,22 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import (
     Choice,
     choose,
-    doubtful,
+    confounders_of,
     reconsider_nuisance,
 )
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
-from onboard.core.diagnosis.limits import CONTRADICTING, LEAST_BLOCKS, RECONCILED, SUSPECT
+from onboard.core.diagnosis.limits import CLEARLY, LEAST_BLOCKS
 from onboard.core.diagnosis.nuisance_effects import (
     Measured,
-    attitude_unknowns,
     nuisance_effects,
     nuisance_kinds,
-    reduced,
     without,
 )
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
-from onboard.core.diagnosis.testability import unseen_share
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
@@ -120,16 +117,11 @@ def _with_jump(
     if len(fitter.blocks) < LEAST_BLOCKS or not jumps:
         return None
     boundary, gain = max(jumps, key=lambda x: x[1])
-    apart = full.found().variance_inflation
-    likely = _wanders(choice) or gain > SUSPECT
-    if not likely and apart < CONTRADICTING:
+    if not _wanders(choice) and surprise(gain, 3, len(jumps)) < least():
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
     made = Examination(full, everything, t0=full.point.skew_from, start=full)
-    if likely:
-        return made.tuned(), everything
-    agrees = made.with_noise().found().variance_inflation < RECONCILED * apart
-    return (made, everything) if agrees else None
+    return made.tuned(), everything
 
 
 def _wanders(choice: Choice) -> bool:
@@ -155,17 +147,8 @@ def _chosen(
         )
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    unseen = {name: unseen_share(full.batches, name) for c in testable for name in c.needs}
-    candidates = [
-        replace(candidate_of(full, c), unseen=max((unseen[name] for name in c.needs), default=0.0))
-        for c in testable
-    ]
-    index = full.model.index
-    errors = attitude_unknowns()
-    held = without(errors, index, full.point, full.absent, told=0.0)
-    gone = {index[c] for c in errors}
-    nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
-    return choose(fitter, base, candidates, nothing, [c for c in candidates if c.columns in kept])
+    candidates = [candidate_of(full, c) for c in testable]
+    return choose(fitter, base, candidates, [c for c in candidates if c.columns in kept])
 
 
 def _second_thoughts(
@@ -215,7 +198,12 @@ def _second_thoughts(
 
 
 def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
-    """Other effects beside which one of timing would be too small to mention."""
-    column = choice.fitter.model.index[nuisance_kinds()[name].in_every_model[0]]
-    start, least = reduced(name, full.point, told)
-    return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
+    """Other effects that do about as well in the place of one of timing."""
+    unknowns = nuisance_kinds()[name].in_every_model
+    index = choice.fitter.model.index
+    target = Candidate(name, tuple(index[c] for c in unknowns), ())
+    rest = [i for i in choice.free if i not in target.index]
+    held = without(unknowns, index, full.point, choice.fitter.absent, told)
+    others = [c for c in choice.candidates if c not in choice.chosen]
+    rivals = confounders_of(choice.fitter, rest, target, others, held)
+    return [r.name for r in rivals if r.delta_bic < CLEARLY]

@@ -7,12 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.hypotheses import (
-    Choice,
-    reconciles,
-)
+from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.jumps import candidate_of
-from onboard.core.diagnosis.limits import FAIR, MARGIN
+from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import moved
@@ -92,7 +89,7 @@ def _again(full: Examination, families: Sequence[Effect], final: Examination) ->
 
 
 def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
-    """Families that stay significant when all of them are in one model."""
+    """Families that still count as found when all of them are in one model."""
     fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
     kept = list(families)
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
@@ -101,14 +98,14 @@ def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
         # What a needless jump makes of the offsets must not weaken what is said for the others.
         fitter.variance_inflation = fitter.variance_inflation_of(free)
         with_all = fitter.fit(free, held_out=False)
-        worst, least = None, np.inf
+        worst, lowest = None, np.inf
         for family in kept:
             c = candidate_of(made, family)
             rest = [i for i in free if i not in c.index]
-            bic = c.bic(fitter, fitter.fit(rest, held_out=False), with_all)
-            if bic < least and not (bic > FAIR and reconciles(fitter, rest, c.index)):
-                worst, least = family, bic
-        if least >= MARGIN:
+            score = c.score(fitter, fitter.fit(rest, held_out=False), with_all)
+            if score < lowest:
+                worst, lowest = family, score
+        if lowest >= least():
             break
         kept = [f for f in kept if f is not worst]
     return kept
