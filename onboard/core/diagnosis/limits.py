@@ -16,6 +16,10 @@ FALSE_ALARM: Final = 1e-3
 CLEARLY: Final = 10.0
 """Difference of scores from which one hypothesis is clearly better than another: odds of 150, "very
 strong" on the scale of Kass and Raftery (1995) [probability]."""
+LOST: Final = 0.1
+"""Share of its evidence that an effect loses if the signal that it follows is measured and sampled
+with an error of a third of its size: a product must explain as much more to take its place
+[physics]."""
 MATTERS_SCALE: Final = 0.005
 """Move of a scale that is worth an effect [use]."""
 MATTERS_OFFSET: Final = 0.02
@@ -53,16 +57,6 @@ NOISE_ROUNDS: Final = 4
 WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
 """Moves of delay (s), squared window (s^2), attitude delay (s) and heading (rad) that are worth
 another pass [cost]."""
-CONSISTENT: Final = 1.25
-"""Variance inflation up to which blocks of a flight agree [tuned]."""
-LESS_BELIEVED: Final = 3.0
-"""Factor on the attitude's noise at each step of doubt [tuned]."""
-STILL_INCONSISTENT: Final = 0.7
-"""Share of the inflation that a step of doubt must take away to be kept [tuned]."""
-HARDLY_BELIEVED: Final = 0.1
-"""Noise of an attitude that is hardly believed, rad [tuned]."""
-AGREE: Final = 1.5
-"""Sigmas within which two answers are the same [tuned]."""
 
 # Clipping (clipping, cleared, screening).
 

@@ -65,7 +65,6 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
     full, testable = clear.full, clear.testable
-    full.doubting_attitude()
     choice = _chosen(full, testable)
     jumped = _with_jump(full, testable, choice)
     if jumped is not None:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from onboard.core.diagnosis.candidates import Candidate, accepted
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.jumps import candidate_of
-from onboard.core.diagnosis.limits import CLEARLY
+from onboard.core.diagnosis.limits import CLEARLY, LOST
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.estimate.limits import CONTRADICTION
+from onboard.core.estimate.solution import by_chance
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.empirical import products
 
@@ -30,7 +32,8 @@ def searched(
         variance_inflation: factor by which evidence is weakened.
     """
     named = [f for f in families if f.onset is None]
-    if not named and final.found().variance_inflation < CONTRADICTION:
+    contradicting = final.found().variance_inflation > by_chance(np.array(len(final.all_blocks)))
+    if not named and not contradicting:
         return list(families)
     terms = products(final.batches, Origin(final.point.skew_from))
     made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
@@ -49,11 +52,11 @@ def searched(
         before = fitter.fit(rest)
         mine = own.score(fitter, before, fitter.fit([*rest, *own.index], held_out=False))
         best = _best(fitter, rest, offered)
-        if best is not None and best[0] > mine + CLEARLY:
+        if best is not None and best[0] > mine * (1.0 + LOST) + CLEARLY:
             kept = [f for f in kept if f is not family]
             if best[1] not in kept:
                 kept.append(best[1])
-    if final.found().variance_inflation >= CONTRADICTION and kept == list(families):
+    if contradicting and kept == list(families):
         best = _best(fitter, base + made.indices_of(kept), offered)
         if best is not None:
             kept.append(best[1])

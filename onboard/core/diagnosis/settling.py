@@ -21,19 +21,19 @@ def settled(
     full: Examination, choice: Choice, families: list[Effect], *, named_only: bool
 ) -> tuple[Examination, list[Effect]]:
     """The model that was chosen, until nothing in it is needless and nothing is left to find."""
-    final = _final(full, choice, families).doubting_attitude()
+    final = _final(full, choice, families)
     jumped = any(f.onset is not None for f in families)
     # Sizes that were chosen about nothing are not yet those that a jump, or a shape, leaves.
     if (jumped and any(f.in_proportion for f in families)) or any(f.shaped for f in families):
         found = final.found().theta
         families = _about_sizes([(f, found[final.indices(f)]) for f in families])
-        final = _again(full, families, final).with_rows().doubting_attitude()
+        final = _again(full, families, final).with_rows()
     # A jump may have passed for something slower, or the other way round.
     final, families = _pruned(full, families, final)
     inflation = choice.fitter.variance_inflation
     wider = families if named_only else searched(final, families, inflation)
     if wider != families:
-        final = _again(full, wider, final).with_noise().doubting_attitude()
+        final = _again(full, wider, final).with_noise()
         final, families = _pruned(full, wider, final)
     return final, families
 
@@ -45,7 +45,7 @@ def _pruned(
     kept = _needed(final, families)
     if len(kept) == len(families):
         return final, families
-    return _again(full, kept, final).with_rows().doubting_attitude(), kept
+    return _again(full, kept, final).with_rows(), kept
 
 
 def families_of(choice: Choice) -> list[Effect]:
