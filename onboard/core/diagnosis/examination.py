@@ -14,12 +14,12 @@ import numpy as np
 
 from onboard.core.diagnosis.limits import (
     NEIGHBOURS,
-    NOISE_ROUNDS,
     SAMPLE_S,
     WORTH_A_PASS,
 )
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochTrace, PassResult
@@ -73,12 +73,12 @@ class Examination(Engine):
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
-        self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        self.refine()
         return self
 
     def tuned(self) -> Examination:
         """Find noise and timing; no sums."""
-        self.tune(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        self.tune(ROUNDS, NOISE_ROUNDS)
         return self
 
     def begin(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
-from onboard.core.diagnosis.limits import ONSET_S
+from onboard.core.diagnosis.limits import SPACINGS_S
 from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
 from onboard.core.diagnosis.score import least
@@ -86,7 +86,10 @@ class Findings:
             for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
         }
         if f.onset is not None:
-            quantities = {"time": Quantity(f.onset - final.origin.t0, ONSET_S, "s"), **quantities}
+            quantities = {
+                "time": Quantity(f.onset - final.origin.t0, SPACINGS_S[-1], "s"),
+                **quantities,
+            }
         values = {k: q.value for k, q in quantities.items()}
         held = final.engine.absent
         made = self._record(f.effect, quantities, index, held, f.cured(values))

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from onboard.core.diagnosis.candidates import Candidate, accepted
-from onboard.core.diagnosis.limits import CLEARLY, LEAST_BLOCKS, MOST_EFFECTS
+from onboard.core.diagnosis.limits import CLEARLY, MOST_EFFECTS
 from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.selection import Fitter
+from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
 from onboard.core.physics.finding import Confounder
@@ -148,7 +149,7 @@ def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | 
     """The jump that would help most beside some columns, if there is none yet; sums with it."""
     fitter = choice.fitter
     located = any(c.jump for c in choice.candidates)
-    if located or len(fitter.blocks) < LEAST_BLOCKS:
+    if located or len(fitter.blocks) < FEWEST_BLOCKS:
         return None, fitter
     jumps = fitter.jumps(list(beside))
     if not jumps:

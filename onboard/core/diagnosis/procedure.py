@@ -23,7 +23,7 @@ from onboard.core.diagnosis.hypotheses import (
     reconsider_nuisance,
 )
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
-from onboard.core.diagnosis.limits import CLEARLY, LEAST_BLOCKS
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.nuisance_effects import (
     Measured,
     nuisance_effects,
@@ -38,6 +38,7 @@ from onboard.core.diagnosis.settling import families_of, settled
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import fix_clock
+from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, NuisanceFit, Origin
@@ -113,7 +114,7 @@ def _with_jump(
     steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
     fitter = Fitter(full.all_blocks, full.model, 1.0, full.absent)
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
-    if len(fitter.blocks) < LEAST_BLOCKS or not jumps:
+    if len(fitter.blocks) < FEWEST_BLOCKS or not jumps:
         return None
     boundary, gain = max(jumps, key=lambda x: x[1])
     if not _wanders(choice) and surprise(gain, 3, len(jumps)) < least():
@@ -138,7 +139,7 @@ def _chosen(
     fitter = Fitter(full.all_blocks, full.model, solution.variance_inflation, full.absent)
     located = any(c.onset is not None for c in testable)
     jumps = [] if located else fitter.jumps(list(range(full.model.size)))
-    if jumps and len(fitter.blocks) >= LEAST_BLOCKS:
+    if jumps and len(fitter.blocks) >= FEWEST_BLOCKS:
         # Blocks that contradict each other because of a jump are no reason to doubt the jump.
         wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
         fitter.variance_inflation = min(
