@@ -39,8 +39,8 @@ class Candidate:
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
-    """Whether an effect is no chance, is believable and matters."""
-    if c.score(fitter, before, after) < least():
+    """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
+    if c.score(fitter, before, after) < least() or fitter.held_gain(before, after) <= 0.0:
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if np.any(np.abs(value) > np.array(c.plausible)):

@@ -53,14 +53,15 @@ class Findings:
         return replace(made, confounders=self._nuisance_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
-        """Whether timing or a constant attitude error is no chance.
+        """Whether timing or a constant attitude error is no chance, and holds on data not fitted.
 
         With the antenna's place free, or with the antenna where it was told to be: a few
         centimetres of it could do instead on some flights, which is said besides.
         """
         final = self._final
         among = (final.all, final.with_configured_antenna())
-        return any(final.score(name, columns) >= least() for columns in among)
+        every = (final.evidence(name, columns) for columns in among)
+        return any(score >= least() and held > 0.0 for score, held in every)
 
     def _nuisance_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""

@@ -1,8 +1,8 @@
 """Which effects to accept: forward and backward steps by one score, on sums alone.
 
-An effect is taken when what it explains is no chance, when its size is believable, and when it
-matters.  A jump of the offsets competes like the rest: at the starts of blocks as long as its
-moment is not known.
+An effect is taken when what it explains is no chance, when it predicts flight that was not fitted,
+when its size is believable, and when it matters.  A jump of the offsets competes like the rest: at
+the starts of blocks as long as its moment is not known.
 """
 
 from __future__ import annotations

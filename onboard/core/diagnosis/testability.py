@@ -37,4 +37,6 @@ def testable_of(
 
 def _changes(batches: Sequence[Batch], name: str) -> bool:
     values = np.concatenate([np.atleast_2d(c.segment.slow[name][1].T) for c in batches], axis=1)
-    return bool(np.any(np.ptp(values, axis=1) > 0.0))
+    # Of a wild sample or two, no change is made.
+    low, high = np.percentile(values, (2, 98), axis=1)
+    return bool(np.any(high > low))
