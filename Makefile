@@ -1,16 +1,19 @@
-# make setup | demo | test | simulate | landings | check | bench | clean.   Needs Python 3.11+, pip and make.
+# make setup | demo | test | simulate | landings | fuzz | check | bench | clean.   Needs Python 3.11+, pip and make.
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+PIP    := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: setup demo test simulate landings check bench format clean
+.PHONY: setup demo test simulate landings fuzz check bench format clean
 
 setup: $(STAMP)
 
 $(STAMP): pyproject.toml requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements.lock --editable '.[dev]'
+	$(PIP) install --require-hashes --requirement requirements.lock
+	$(PIP) install --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip check
 	touch $@
 
 demo: $(STAMP)
@@ -28,6 +31,10 @@ simulate: $(STAMP)
 
 landings: $(STAMP)
 	$(BIN)/python -m benchmarks.landings $(ARGS)
+
+# Ten minutes; ARGS="--seconds 3600 --seed 2 --only ulog http" for others.
+fuzz: $(STAMP)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz $(ARGS)
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -16,6 +16,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.builtin import gps
+from sitl.builtin.airframe.aircraft import Aircraft
+from sitl.builtin.airframe.differences import differences
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.effects import Effect
 from sitl.builtin.messages import Message, packed
@@ -41,6 +43,14 @@ DEFAULT_RATES: Mapping[str, float] = {
     "SYSTEM_TIME": 1.0,
 }
 
+AIRFRAME_RATES: Mapping[str, float] = {
+    "VFR_HUD": 10.0,
+    "BATTERY_STATUS": 5.0,
+    "LOCAL_POSITION_NED": 10.0,
+    "SERVO_OUTPUT_RAW": 50.0,
+}
+"""Rates (Hz) of what tells of an airframe, in flights that have one."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSpec:
@@ -49,7 +59,8 @@ class FlightSpec:
     ``duration`` counts from power-on to the end of the recording (s).  ``parameters`` are the
     autopilot's that differ from its defaults.  ``rates`` (Hz) replace the default message
     rates one by one; 0 leaves a message out.  SCALED_IMU2/3 come at RAW_IMU's rate where
-    there are such IMUs.
+    there are such IMUs.  ``aircraft`` gives the vehicle an airframe with physics of its own,
+    and its outputs to the recording.
     """
 
     vehicle: Vehicle = "copter"
@@ -67,6 +78,7 @@ class FlightSpec:
     loop_rate: int = 400
     dull: bool = False
     start_unix_us: int = START_UNIX_US
+    aircraft: Aircraft | None = None
 
     @property
     def truth(self) -> Truth:
@@ -80,6 +92,7 @@ class FlightSpec:
             attitude_errors=self.attitude_errors,
             orientation=self.orientation,
             seed=self.seed,
+            aircraft=self.aircraft,
         )
 
 
@@ -155,12 +168,14 @@ def truth_record(spec: FlightSpec) -> dict[str, Any]:
         "net_gps_delay_s": latency - truth.gps.stamped_early,
         "gps_smoothing_window_s": gps.smoothing_window(truth),
         "effects": [effect.as_record() for effect in truth.effects],
+        **({} if truth.aircraft is None else {"vehicle_level": differences(truth.aircraft)}),
     }
 
 
 def _names(spec: FlightSpec) -> Iterator[str]:
-    yield from DEFAULT_RATES
-    yield from (name for name in spec.rates if name not in DEFAULT_RATES)
+    defaults = _defaults(spec)
+    yield from defaults
+    yield from (name for name in spec.rates if name not in defaults)
     for imu in range(2, len(spec.truth.imus) + 1):
         if f"SCALED_IMU{imu}" not in spec.rates:
             yield f"SCALED_IMU{imu}"
@@ -169,6 +184,11 @@ def _names(spec: FlightSpec) -> Iterator[str]:
 def _rate(spec: FlightSpec, name: str) -> float:
     if name in spec.rates:
         return spec.rates[name]
-    if name in DEFAULT_RATES:
-        return DEFAULT_RATES[name]
+    defaults = _defaults(spec)
+    if name in defaults:
+        return defaults[name]
     return spec.rates.get("RAW_IMU", DEFAULT_RATES["RAW_IMU"])
+
+
+def _defaults(spec: FlightSpec) -> Mapping[str, float]:
+    return DEFAULT_RATES if spec.aircraft is None else {**DEFAULT_RATES, **AIRFRAME_RATES}

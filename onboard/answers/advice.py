@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from onboard.answers.answer import Answer
 from onboard.answers.conditions import conditions
-from onboard.core.diagnosis.limits import AMBIGUOUS
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
@@ -163,7 +163,7 @@ def _against(
     """
     if diagnosis.verdict is not Verdict.EXPLAINED:
         return "what was found does not explain all of the residual"
-    confounders = {r.name for r in effect.confounders if r.delta_bic < AMBIGUOUS}
+    confounders = {r.name for r in effect.confounders if r.delta_bic < CLEARLY}
     confounders |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
     if confounders := confounders - {effect.name}:
         return f"not told apart from {', '.join(sorted(confounders))}"

@@ -47,6 +47,7 @@ VERBS: dict[str, Verb] = {
         "onboard.cli.explain", "explain", "Find the physics that a recording has left out."
     ),
     "fleet": Verb("onboard.cli.fleet", "fleet", "Calibrate from every recording in folders."),
+    "service": Verb("onboard.cli.service", "service", "The systemd unit: show it, install it."),
     "sim": Verb("onboard.cli.sim", "sim", "The simulated autopilot alone, for any ground station."),
 }
 

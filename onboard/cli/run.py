@@ -58,7 +58,7 @@ def run(
     Serves until SIGTERM or Ctrl-C.  Without --config the defaults listen on UDP port 14550 of
     this machine and write only when the vehicle is disarmed.
     """
-    from onboard.daemon.setup import configuration, settings
+    from onboard.daemon.setup import configuration, secret_files, settings
 
     document = {} if config is None else configuration.read(Path(config))
     for section, key, value in (
@@ -69,12 +69,20 @@ def run(
         if value:
             document[section] = {**document.get(section, {}), key: value}
     chosen = configuration.from_mapping(document, source=config or "command line")
+    if config is not None:
+        secret_files.refuse_open_token(Path(config), chosen)
     settings.endpoints(chosen.link)
     if check:
+        from onboard.daemon.process import checking
+
+        checking.check(chosen)
         click.echo("configuration is valid")
         return
     _log(verbose=verbose)
-    stopped_by = asyncio.run(_serve(chosen))
+    from onboard.daemon.process.turns import MeteredLoop
+
+    with asyncio.Runner(loop_factory=MeteredLoop) as runner:
+        stopped_by = runner.run(_serve(chosen))
     if stopped_by is signal.SIGINT:
         click.get_current_context().exit(INTERRUPTED)
 
@@ -83,15 +91,25 @@ async def _serve(configuration: Configuration) -> signal.Signals | None:
     from onboard.daemon.process.service import Service
 
     service = Service(configuration)
-    await service.run(handle_signals=True)
+    try:
+        await service.run(handle_signals=True)
+    except asyncio.CancelledError:
+        if service.stopped_by is None:
+            raise
+        # A second signal: what was under way is left as it is, for the next start.
+        logging.getLogger(__name__).warning("stopped at once, as was asked twice")
     return service.stopped_by
 
 
 def _log(*, verbose: bool) -> None:
     """To stderr; under systemd without time stamps, which the journal has itself."""
+    from onboard.daemon.setup.logs import Restrained
+
     stamp = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
         format=f"{stamp}%(levelname)s %(name)s: %(message)s",
         stream=sys.stderr,
     )
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(Restrained())

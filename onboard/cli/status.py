@@ -97,16 +97,16 @@ def _reason(status: int, answer: bytes) -> str:
 
 def _client(url: str | None, config: str | None, token_file: str | None) -> Client:
     """Where the daemon listens: --url, else what its configuration says."""
-    from onboard.daemon.setup import configuration
+    from onboard.daemon.setup import configuration, secret_files
 
     settings = configuration.Configuration()
     if config is not None:
         settings = configuration.load(Path(config))
     token = os.environ.get("ONBOARD_TOKEN") or settings.http.token
     if token_file is not None:
-        token = configuration.read_secret(token_file, key="--token-file")
+        token = secret_files.read_secret(token_file, key="--token-file")
     elif token is None and settings.http.token_file is not None:
-        token = configuration.read_secret(settings.http.token_file, key="[http] token_file")
+        token = secret_files.read_secret(settings.http.token_file, key="[http] token_file")
     host = settings.http.address
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - replaced, not bound
     bracketed = f"[{host}]" if ":" in host else host

@@ -126,20 +126,17 @@ class Codec:
         buffer += data
         end = len(buffer)
         frames: list[Frame] = []
+        following = framing.NextValid(buffer)
         position = 0
         while end - position >= framing.SHORTEST:
             length = framing.packet_length(buffer, position)
-            if length == 0:
-                start = framing.next_magic(buffer, position + 1)
-                statistics.bad_bytes += start - position
-                position = start
-                continue
             if position + length > end:
                 break
-            frame = self._open(buffer, position, length)
+            frame = self._open(buffer, position, length, following) if length else None
             if frame is None:
-                statistics.bad_bytes += 1
-                position += 1
+                start = framing.next_start(buffer, position + 1)
+                statistics.bad_bytes += start - position
+                position = start
                 continue
             position += length
             if frame.message_id >= 0:
@@ -148,20 +145,23 @@ class Codec:
         del buffer[:position]
         return frames
 
-    def _open(self, buffer: bytearray, start: int, length: int) -> Frame | None:
+    def _open(
+        self, buffer: bytearray, start: int, length: int, following: framing.NextValid
+    ) -> Frame | None:
         """Verify one supposed frame.  None: not a frame; message id -1: refused."""
         raw = bytes(buffer[start : start + length])
         statistics = self.statistics
         message_id, system, component, sequence, signed, _ = framing.header(raw, 0)
-        key = (message_id, system, component, sequence)
-        if message_id not in mavlink.mavlink_map:
-            if not _is_credible(buffer, start, length):
-                return None
-            statistics.unknown += 1
-            return Frame(raw, *key, None)
-        if not framing.is_valid(raw, 0, message_id):
+        known = message_id in mavlink.mavlink_map
+        if known and not framing.is_valid(raw, 0, message_id):
             statistics.bad_frames += 1
             return None
+        if not known and not _is_credible(buffer, start, length, following):
+            return None
+        key = (message_id, system, component, sequence)
+        if not known:
+            statistics.unknown += 1
+            return Frame(raw, *key, None)
         signing = self._signing
         if signing is not None and not (
             signing.verify(raw) if signed else signing.accepts_unsigned(message_id)
@@ -184,11 +184,13 @@ class Codec:
         key = (frame.system, frame.component)
         source = statistics.sources.get(key)
         if source is None:
+            if len(statistics.sources) >= limits.SOURCES_MAX:
+                return
             source = statistics.sources[key] = SourceStatistics()
         source.count(frame.sequence)
 
 
-def _is_credible(buffer: bytearray, start: int, length: int) -> bool:
+def _is_credible(buffer: bytearray, start: int, length: int, following: framing.NextValid) -> bool:
     """Whether a message that the dialect lacks, hence of unknown checksum, really is a frame.
 
     It is taken for one when another frame or the end of what has come follows it, and no
@@ -197,4 +199,4 @@ def _is_credible(buffer: bytearray, start: int, length: int) -> bool:
     end = start + length
     if end < len(buffer) and buffer[end] not in framing.MAGICS:
         return False
-    return framing.next_valid(buffer, start + 1, end) == end
+    return following.after(start + 1) >= end

@@ -22,11 +22,16 @@ MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 MAGICS = (MAGIC_V1, MAGIC_V2)
 SHORTEST = 8
 """A MAVLink 1 packet without payload."""
-_MAGIC = re.compile(rb"[\xfd\xfe]")
+_START = re.compile(rb"\xfe|\xfd(?:.[\x00\x01]|.?\Z)", re.DOTALL)
+"""What may begin a packet: of MAVLink 2 only with flags that are known, or that have not come."""
 _SIGNED = 0x01
 _HEADER_V1, _HEADER_V2 = 6, 10
 _CHECKSUM = 2
 _SIGNATURE = 13
+_EXTRA = {kind: bytes((message.crc_extra,)) for kind, message in mavlink.mavlink_map.items()}
+"""The byte that the sender adds to what is summed, by message number."""
+_LONGEST = {kind: message.unpacker.size for kind, message in mavlink.mavlink_map.items()}
+"""bytes of payload that MAVLink 1 can have, by message number; later fields are MAVLink 2's."""
 
 
 class Header(NamedTuple):
@@ -46,15 +51,15 @@ def packet_length(data: Bytes, at: int) -> int:
     A flag that we do not know changes the layout in an unknown way (that is what the first flag
     byte is for), so that nothing can be said of such a packet.
     """
-    head = data[at : at + 3]
-    if len(head) < 3:
+    if at + 3 > len(data):
         return 0
-    if head[0] == MAGIC_V2:
-        flags = head[2]
-        if flags & ~_SIGNED:
+    magic = data[at]
+    if magic == MAGIC_V2:
+        flags = data[at + 2]
+        if flags > _SIGNED:
             return 0
-        return head[1] + _HEADER_V2 + _CHECKSUM + (_SIGNATURE if flags else 0)
-    return head[1] + _HEADER_V1 + _CHECKSUM if head[0] == MAGIC_V1 else 0
+        return data[at + 1] + _HEADER_V2 + _CHECKSUM + (_SIGNATURE if flags else 0)
+    return data[at + 1] + _HEADER_V1 + _CHECKSUM if magic == MAGIC_V1 else 0
 
 
 def message_id(data: Bytes, at: int) -> int:
@@ -68,21 +73,15 @@ def message_id(data: Bytes, at: int) -> int:
 def header(data: Bytes, at: int) -> Header:
     """The header of a packet that is there as a whole."""
     if data[at] == MAGIC_V1:
-        return Header(
-            message_id=data[at + 5],
-            system=data[at + 3],
-            component=data[at + 4],
-            sequence=data[at + 2],
-            signed=False,
-            payload=at + _HEADER_V1,
-        )
+        kind, system, component, sequence = data[at + 5], data[at + 3], data[at + 4], data[at + 2]
+        return Header(kind, system, component, sequence, signed=False, payload=at + _HEADER_V1)
     return Header(
-        message_id=int.from_bytes(data[at + 7 : at + _HEADER_V2], "little"),
-        system=data[at + 5],
-        component=data[at + 6],
-        sequence=data[at + 4],
-        signed=bool(data[at + 2] & _SIGNED),
-        payload=at + _HEADER_V2,
+        data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16,
+        data[at + 5],
+        data[at + 6],
+        data[at + 4],
+        bool(data[at + 2] & _SIGNED),
+        at + _HEADER_V2,
     )
 
 
@@ -91,17 +90,17 @@ def is_valid(data: Bytes, at: int, kind: int) -> bool:
 
     False for a message that the dialect does not have: its checksum cannot be computed.
     """
-    message = mavlink.mavlink_map.get(kind)
-    if message is None:
+    extra = _EXTRA.get(kind)
+    if extra is None or (data[at] == MAGIC_V1 and data[at + 1] > _LONGEST[kind]):
         return False
     end = at + (_HEADER_V1 if data[at] == MAGIC_V1 else _HEADER_V2) + data[at + 1]
-    crc = mavlink.x25crc(data[at + 1 : end] + bytes((message.crc_extra,))).crc
+    crc = mavlink.x25crc(bytes(data[at + 1 : end]) + extra).crc
     return bool(crc == int.from_bytes(data[end : end + _CHECKSUM], "little"))
 
 
-def next_magic(data: Bytes, start: int) -> int:
+def next_start(data: Bytes, start: int) -> int:
     """Place of the next byte that may begin a packet, or the end of the data."""
-    found = _MAGIC.search(data, start)
+    found = _START.search(data, start)
     return len(data) if found is None else found.start()
 
 
@@ -111,10 +110,27 @@ def next_valid(data: Bytes, start: int, stop: int | None = None) -> int:
     ``stop`` (the end of the data, if not given) if there is none.
     """
     stop = len(data) if stop is None else stop
-    at = next_magic(data, start)
+    at = next_start(data, start)
     while at < stop:
         length = packet_length(data, at)
         if length and at + length <= len(data) and is_valid(data, at, message_id(data, at)):
             return at
-        at = next_magic(data, at + 1)
+        at = next_start(data, at + 1)
     return stop
+
+
+class NextValid:
+    """Where the next valid packet begins, for starts that only grow: no place is checked twice.
+
+    ``data`` must not change while this is in use.
+    """
+
+    def __init__(self, data: Bytes) -> None:
+        self._data = data
+        self._found = -1
+
+    def after(self, start: int) -> int:
+        """Place of the first whole packet with a right checksum from ``start`` on, or the end."""
+        if self._found < start:
+            self._found = next_valid(self._data, start)
+        return self._found

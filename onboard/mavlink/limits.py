@@ -19,11 +19,15 @@ CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536
 """bytes; no datagram is longer [protocol: UDP]."""
-DATAGRAMS_PER_WAKE: Final = 1024
-"""So many are read before the loop has its turn, 3 us each; a socket holds about 300 small ones, so
-that a flood is drained and not left to push the vehicle's out [cost]."""
-BUSY_DATAGRAMS: Final = 128
-"""More than that at once, and the socket is read again without the pause of a linger [data]."""
+BYTES_PER_TURN: Final = 2048
+"""bytes that are read before the loop has its turn: what a line of 921600 baud brings within a
+linger; bytes made to be slow to parse take some milliseconds [cost]."""
+DATAGRAMS_PER_TURN: Final = 128
+"""So many are read in a turn, also of those that are empty or bring an error [data]."""
+FULL_TURN_PAUSE_S: Final = 0.001
+"""s between two turns while more waits than one of them reads [cost]."""
+SOURCES_MAX: Final = 256
+"""Senders whose packets are counted one by one: a vehicle has a dozen components [cost]."""
 WRITE_LIMIT: Final = 65536
 """bytes that may wait for a stalled peer; more is dropped, for telemetry ages fast: 11 s of a line
 of 57600 baud [tuned]."""
@@ -153,6 +157,8 @@ REPEAT_PAUSE_S: Final = 0.25
 [tuned]."""
 TIMEOUT_GROWTH: Final = 1.5
 """Ratio of one wait to that before it [tuned]."""
+PARAMETERS_MAX: Final = 3000
+"""Values that are kept: more than any firmware has.  What was asked for is kept besides [cost]."""
 LONGEST_TIMEOUT_S: Final = 3.0
 """s; no wait between two tries is longer [tuned]."""
 

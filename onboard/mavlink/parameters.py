@@ -243,8 +243,10 @@ class ParameterClient:
 
     def _value(self, name: str, value: float, now: float) -> None:
         previous = self._cache.get(name)
-        self._cache[name] = value
         exchange = self._exchanges.get(name)
+        if previous is None and exchange is None and len(self._cache) >= limits.PARAMETERS_MAX:
+            return  # no firmware has as many: somebody makes names up
+        self._cache[name] = value
         if exchange is None or exchange.deadline is None:
             if previous != value:
                 self._out.append(ValueChanged(name, previous, value))

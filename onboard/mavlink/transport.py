@@ -14,6 +14,7 @@ import contextlib
 import errno
 import os
 import socket
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -95,41 +96,40 @@ async def open_transport(
 class Pace:
     """Calls ``drain`` when the descriptor is readable, but not oftener than ``linger`` allows.
 
-    ``drain`` reads what there is and says how much that was; more than ``busy`` is read on at the
-    loop's next turn, so that a flood cannot fill the socket while it is left alone.
+    ``drain`` reads and hands on ``BYTES_PER_TURN`` at the most, so that a flood leaves the loop to
+    others in between; it returns how many there were.
     """
 
-    def __init__(
-        self, descriptor: int, drain: Callable[[], int], linger: float, *, busy: int = 1 << 30
-    ) -> None:
+    def __init__(self, descriptor: int, drain: Callable[[], int], linger: float) -> None:
         self._loop = asyncio.get_running_loop()
         self._descriptor = descriptor
         self._drain = drain
         self._linger = linger
-        self._busy = busy
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
         self._loop.add_reader(descriptor, self._readable)
 
     def _readable(self) -> None:
-        read = self._drain()
-        if self._linger > 0.0 and not self._closed:
+        size = self._drain()
+        wait = self._wait(size)
+        if wait > 0.0 and not self._closed:
             self._loop.remove_reader(self._descriptor)
-            self._wait(read)
-
-    def _wait(self, read: int) -> None:
-        pause = self._linger if read <= self._busy else 0.0
-        self._timer = self._loop.call_later(pause, self._again)
+            self._timer = self._loop.call_later(wait, self._again)
 
     def _again(self) -> None:
-        read = self._drain()
+        size = self._drain()
         if self._closed:
             return
-        if read:
-            self._wait(read)
+        wait = self._wait(size)
+        if size and wait > 0.0:
+            self._timer = self._loop.call_later(wait, self._again)
         else:
             self._timer = None
             self._loop.add_reader(self._descriptor, self._readable)
+
+    def _wait(self, size: int) -> float:
+        """Until the next turn, s: short if this one may have left something."""
+        return limits.FULL_TURN_PAUSE_S if size >= limits.BYTES_PER_TURN else self._linger
 
     def close(self) -> None:
         """Stop reading."""
@@ -155,8 +155,10 @@ class DatagramTransport:
         self._receive = receive
         self._listening = listening
         self._buffer = memoryview(bytearray(limits.READ_SIZE))
+        self._waiting: deque[tuple[Address | None, bytearray]] = deque()
+        self._waiting_size = 0
         self._closed = False
-        self._pace = Pace(sock.fileno(), self._drain, linger, busy=limits.BUSY_DATAGRAMS)
+        self._pace = Pace(sock.fileno(), self._drain, linger)
 
     @property
     def port(self) -> int:
@@ -190,29 +192,36 @@ class DatagramTransport:
             self.dropped += 1
 
     def _drain(self) -> int:
-        """Read what waits; hand it on in order, what came from one address in a row together."""
-        chunks: list[bytes] = []
-        source: Address | None = None
-        read = 0
-        for _ in range(limits.DATAGRAMS_PER_WAKE):
+        """Read what waits and hand on a turn of it, each address's bytes by themselves."""
+        self._read()
+        left = limits.BYTES_PER_TURN
+        while left and self._waiting and not self._closed:
+            source, data = self._waiting[0]
+            turn = bytes(data[:left])
+            del data[:left]
+            if not data:
+                self._waiting.popleft()
+            left -= len(turn)
+            self._waiting_size -= len(turn)
+            self._receive(turn, source)
+        return limits.BYTES_PER_TURN - left
+
+    def _read(self) -> None:
+        for _ in range(limits.DATAGRAMS_PER_TURN):
+            if self._waiting_size >= limits.BYTES_PER_TURN:
+                return
             try:
                 size, address = self._socket.recvfrom_into(self._buffer)
             except BlockingIOError:
-                break
+                return
             except OSError:
                 continue  # an ICMP error about something we sent
-            read += 1
-            sender = address if self._listening else None
-            if chunks and sender != source:
-                self._receive(b"".join(chunks), source)
-                chunks.clear()
-                if self._closed:
-                    return read
-            source = sender
-            chunks.append(bytes(self._buffer[:size]))
-        if chunks:
-            self._receive(b"".join(chunks), source)
-        return read
+            source = address if self._listening else None
+            if size and self._waiting and self._waiting[-1][0] == source:
+                self._waiting[-1][1].extend(self._buffer[:size])
+            elif size:
+                self._waiting.append((source, bytearray(self._buffer[:size])))
+            self._waiting_size += size
 
 
 class StreamTransport:
@@ -269,7 +278,7 @@ class StreamTransport:
 
     def _drain(self) -> int:
         try:
-            data = os.read(self._descriptor, limits.READ_SIZE)
+            data = os.read(self._descriptor, limits.BYTES_PER_TURN)
         except BlockingIOError:
             return 0
         except OSError as error:

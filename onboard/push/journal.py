@@ -45,6 +45,10 @@ from onboard.push.entries import (
 )
 
 SCHEMA = 1
+LARGEST = 64_000_000
+"""bytes; compaction keeps the file near a megabyte."""
+LONGEST_LINE = 1_000_000
+"""bytes; the longest entry has a few thousand."""
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -82,12 +86,17 @@ class Journal:
         self.damaged = 0
         self._size = 0
         self._torn = False
+        self._fd = -1
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = self._open()
             self._load()
         except OSError as error:
+            self.close()
             raise StateError(f"{path}: {error.strerror}") from error
+        except BaseException:
+            self.close()
+            raise
         if self._size > self._limit:
             self._compact()
 
@@ -222,12 +231,17 @@ class Journal:
         return fd
 
     def _load(self) -> None:
+        if os.fstat(self._fd).st_size > LARGEST:
+            raise StateError(f"{self._path}: larger than a journal can become; look at it")
         data = self._path.read_bytes()
         whole, _, torn = data.rpartition(b"\n")
         self._size = len(data) - len(torn)
         self._torn = bool(torn)
         for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
             try:
+                if len(line) > LONGEST_LINE:
+                    self.damaged += 1
+                    continue
                 record = msgspec.json.decode(line, type=Line)
                 if record.schema > SCHEMA:
                     raise StateError(f"{self._path}: line {number} is of a newer version")
@@ -235,7 +249,8 @@ class Journal:
                     self.damaged += 1
                     continue
                 self._lines.append((record.at, self._decoder.decode(record.entry)))
-            except (msgspec.DecodeError, UnicodeDecodeError, PushError):
+            except (msgspec.DecodeError, ValueError, RecursionError, PushError):
+                # ValueError: text that is not UTF-8, a number with too many digits.
                 self.damaged += 1
 
     def _line(self, entry: Entry, at: float) -> bytes:

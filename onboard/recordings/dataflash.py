@@ -49,7 +49,8 @@ def open_dataflash(path: Path) -> Recording:
             f"{path}: a DataFlash log without inertial records (IMU) that have a time"
         )
     t = _times(index, imu_slots)
-    context = context_of(index, float(t[0]))
+    with np.errstate(all="ignore"):  # damaged bytes make any number
+        context = context_of(index, float(t[0]))
 
     def read() -> Iterator[Sample]:
         return _samples(index, usable, context)
@@ -138,7 +139,9 @@ def _convert_block(
         form = index.formats[slot]
         batch = Batch(form, records[slot], t[rows + 1])
         for convert in CONVERTERS[form.name]:
-            for row, sample in zip(rows.tolist(), convert(batch, context), strict=True):
+            with np.errstate(all="ignore"):  # damaged bytes make any number
+                samples = convert(batch, context)
+            for row, sample in zip(rows.tolist(), samples, strict=True):
                 if sample is not None:
                     placed[row].append(sample)
     return placed, float(t[-1])

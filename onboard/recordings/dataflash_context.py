@@ -67,7 +67,7 @@ def context_of(index: DataflashIndex, first_time: float) -> Context:
 def receiver_of(form: Format, records: Records) -> list[int]:
     """(n,) number of the GPS receiver, from 1."""
     if form.has("I"):
-        return [int(i) + 1 for i in records["I"]]
+        return [i + 1 for i in form.integers(records, "I")]
     return [2 if form.name.endswith("2") else 1] * len(records)
 
 
@@ -113,7 +113,7 @@ def _vertical_speed(index: DataflashIndex) -> dict[int, bool]:
     for form, records in index.all_of("GPA"):
         if form.has("VV"):
             receivers = np.array(receiver_of(form, records))
-            have = set(receivers[records["VV"] != 0].tolist())
+            have = set(receivers[form.numbers(records, "VV") != 0.0].tolist())
             denied |= set(receivers.tolist()) - have
     measured: dict[int, bool] = {}
     for name in GPS_NAMES:
@@ -121,7 +121,7 @@ def _vertical_speed(index: DataflashIndex) -> dict[int, bool]:
             if form.has("VZ"):
                 receivers = np.array(receiver_of(form, records))
                 for receiver in np.unique(receivers).tolist():
-                    moves = bool(records["VZ"][receivers == receiver].any())
+                    moves = bool(form.numbers(records, "VZ")[receivers == receiver].any())
                     measured[receiver] = measured.get(receiver, False) or moves
     return {receiver: moves and receiver not in denied for receiver, moves in measured.items()}
 

@@ -51,6 +51,11 @@ FIELD_TYPES: dict[str, tuple[str, float]] = {
     "Q": ("<u8", 1.0),
 }
 """Format letter to numpy type and the divisor that makes the field a physical number."""
+LARGEST = 2.0**53
+"""Whole numbers below it are exact as floating-point ones."""
+NOT_NUMBERS = "anNZ"
+MOST_FORMATS = 4096
+"""Layouts of wanted records in one file: a log has 20, and as many for each that was joined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +78,25 @@ class Format:
         return self.letters[self.columns.index(column)]
 
     def numbers(self, records: Records, column: str) -> NDArray[np.float64]:
-        """(n,) a numeric field in the unit that its format letter implies."""
-        divisor = FIELD_TYPES[self.letter(column)][1]
+        """(n,) a numeric field in the unit that its format letter implies; NaN for what is text."""
+        letter = self.letter(column)
+        if letter in NOT_NUMBERS:
+            return np.full(len(records), np.nan)
+        divisor = FIELD_TYPES[letter][1]
         with np.errstate(invalid="ignore"):  # a signalling NaN, by a flipped bit
             values = records[column].astype(np.float64)
         return values if divisor == 1.0 else values / divisor
+
+    def integers(self, records: Records, column: str, default: int = 0) -> list[int]:
+        """(n,) a whole number; a default where it is none."""
+        if self.letter(column) in NOT_NUMBERS:
+            return [default] * len(records)
+        values = records[column]
+        if values.dtype.kind == "f":
+            with np.errstate(invalid="ignore"):
+                whole = np.abs(values.astype(np.float64)) < LARGEST
+            values = np.where(whole, values, default)
+        return [int(value) for value in values]
 
 
 def _text(raw: bytes) -> str:
@@ -96,12 +115,17 @@ def parse_format(record: bytes) -> Format | None:
         return Format(kind, _text(name), length, letters, columns, None)
     if len(columns) != len(letters) or len(set(columns)) != len(columns):
         return Format(kind, _text(name), length, letters, columns, None)
-    dtype = np.dtype(
-        [("header", f"V{HEADER_LENGTH}")]
-        + [(c, FIELD_TYPES[x][0]) for c, x in zip(columns, letters, strict=True)]
-    )
-    if dtype.itemsize != length:
+    sizes = [np.dtype(FIELD_TYPES[letter][0]).itemsize for letter in letters]
+    if HEADER_LENGTH + sum(sizes) != length:
         return Format(kind, _text(name), length, letters, columns, None)
+    dtype = np.dtype(
+        {
+            "names": list(columns),
+            "formats": [FIELD_TYPES[letter][0] for letter in letters],
+            "offsets": [HEADER_LENGTH + sum(sizes[:k]) for k in range(len(sizes))],
+            "itemsize": length,
+        }
+    )
     return Format(kind, _text(name), length, letters, columns, dtype)
 
 
@@ -159,7 +183,7 @@ class _Scan:
         self.lengths = [0] * 256
         self.lengths[FMT_TYPE] = FMT_LENGTH
         self.slot_of = [-1] * 256
-        self.formats: list[Format] = []
+        self.formats: dict[Format, int] = {}
         self.offsets = array("q")
         self.slots = array("H")
         self.records = 0
@@ -205,15 +229,15 @@ class _Scan:
             self.damaged_places += 1
             return
         known = self.slot_of[form.kind]
-        if known >= 0 and self.formats[known] == form:
+        if known >= 0 and self.formats.get(form) == known:
             return
         if known >= 0 and form.dtype is None:
             self.damaged_places += 1  # a readable type is not given up for a damaged FMT
             return
         self.lengths[form.kind] = form.length
-        if form.name in self.wanted and form.dtype is not None and len(self.formats) < 65535:
-            self.slot_of[form.kind] = len(self.formats)
-            self.formats.append(form)
+        wanted = form.name in self.wanted and form.dtype is not None
+        if wanted and (form in self.formats or len(self.formats) < MOST_FORMATS):
+            self.slot_of[form.kind] = self.formats.setdefault(form, len(self.formats))
         else:
             self.slot_of[form.kind] = -1
 

@@ -70,7 +70,7 @@ class Batch:
         """An integer column, or a default where the layout has none."""
         if not self.form.has(column):
             return [default] * len(self.records)
-        return [int(value) for value in self.records[column]]
+        return self.form.integers(self.records, column, default)
 
 
 Converted = Iterable[Sample | None]

@@ -1,16 +1,15 @@
-"""PX4 logs (.ulg), by pyulog: for advice only, since ArduPilot's parameters mean nothing there."""
+"""PX4 logs (.ulg): for advice only, since ArduPilot's parameters mean nothing there."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stdout
+from dataclasses import dataclass
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pyulog.core import ULog
 
 from onboard.core.inputs.samples import (
     AirData,
@@ -25,14 +24,15 @@ from onboard.core.inputs.samples import (
 )
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.ulog_index import Records, Topic, UlogIndex, columns_of, index_ulog
 
 Floats = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 Converter = Callable[[Floats, Columns, int], list[Sample]]
-Stream = tuple[Floats, list[Sample]]
-"""Times (n,), s, and the n samples of one topic."""
 
 MAGIC = b"ULog"
+BLOCK = 16384
+"""Records converted at a time: bounds the memory, whatever the length of the log."""
 ARMED = 2
 KINDS = {1: "copter", 2: "plane", 3: "rover"}
 """vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""
@@ -45,89 +45,130 @@ def is_ulog(head: bytes) -> bool:
     return head.startswith(MAGIC)
 
 
+@dataclass(frozen=True, slots=True)
+class _Stream:
+    """One use of one instance of a topic: its records, and their times (n,), s."""
+
+    convert: Converter
+    instance: int
+    records: Records
+    t: Floats
+
+    def samples(self, rows: NDArray[np.intp] | slice) -> list[Sample]:
+        """Samples of some of the records.
+
+        Raises:
+            KeyError: the topic has not the fields, or not those we know.
+        """
+        with np.errstate(all="ignore"):  # damaged bytes make any number
+            return self.convert(self.t[rows], columns_of(self.records[rows]), self.instance)
+
+
 def open_ulog(path: Path) -> Recording:
-    """Load a log.
+    """Index a log.
 
     Raises:
-        RecordingError: it cannot be parsed, or has no accelerometer.
+        RecordingError: it cannot be read, or has no accelerometer.
     """
-    topics, parameters, damage = _load(path)
+    with path.open("rb") as file:
+        data = mmap(file.fileno(), 0, access=ACCESS_READ)
+    try:
+        index = index_ulog(data, frozenset(CONVERTERS))
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    topics = _chosen(index)
+    records = {key: topic.records(data) for key, topic in topics.items() if topic.offsets}
     streams = [
         stream
-        for (name, instance), columns in topics.items()
-        for convert in CONVERTERS.get(name, ())
-        if (stream := _converted(convert, instance, columns)) is not None
+        for (name, instance), of_topic in records.items()
+        for convert in CONVERTERS[name]
+        if (stream := _stream(convert, instance, of_topic)) is not None
     ]
-    inertial = [t for t, samples in streams if samples and isinstance(samples[0], ImuSample)]
+    inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
-        raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined)")
+        why = "".join(f"; {damage}" for damage in _damage(index))
+        raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
 
     def read() -> Iterator[Sample]:
-        yield from parameters
-        t = np.concatenate([t for t, _ in streams])
-        samples = [sample for _, part in streams for sample in part]
-        for k in np.argsort(t, kind="stable").tolist():
-            yield samples[k]
+        yield from _parameters(index)
+        yield from _in_order(streams)
 
     return Recording(
         path=path,
         kind="ulog",
         autopilot="px4",
-        duration_s=elapsed_s(inertial[0]),
-        counts={f"{n}[{i}]" if i else n: len(c["timestamp"]) for (n, i), c in topics.items()},
+        duration_s=elapsed_s(inertial[0].t),
+        counts={f"{n}[{i}]" if i else n: len(r) for (n, i), r in records.items()},
         read=read,
-        damage=damage,
+        damage=_damage(index),
         notes=("a PX4 recording: the result is advice, its parameters are ArduPilot's",),
     )
 
 
-def _load(path: Path) -> tuple[dict[tuple[str, int], Columns], list[Sample], tuple[str, ...]]:
-    """Topics by name and instance, the parameters, and what was damaged."""
-    chatter = io.StringIO()  # pyulog prints its warnings
-    try:
-        with path.open("rb") as file, redirect_stdout(chatter):
-            log = ULog(file, [*CONVERTERS])
-    except Exception as error:  # noqa: BLE001 - pyulog raises anything on damaged bytes
-        why = " ".join(str(error).split()) or type(error).__name__
-        raise RecordingError(f"{path}: a ULog that cannot be parsed ({why})") from None
-    topics = {(d.name, int(d.multi_id)): d.data for d in log.data_list if "timestamp" in d.data}
+def _chosen(index: UlogIndex) -> dict[tuple[str, int], Topic]:
+    """Topics to read, sorted by name and instance: of two that tell the same, the better."""
+    topics = dict(sorted(index.topics.items()))
     if "sensor_gps" in {name for name, _ in topics}:
         # vehicle_gps_position is then a selection from, or a blend of, the receivers.
-        topics = {key: c for key, c in topics.items() if key[0] != "vehicle_gps_position"}
+        topics = {key: topic for key, topic in topics.items() if key[0] != "vehicle_gps_position"}
     if ("sensor_combined", 0) in topics:
         topics.pop(("vehicle_acceleration", 0), None)
-    parameters: list[Sample] = [
-        ParameterValue(str(name), float(value))
-        for name, value in log.initial_parameters.items()
-        if isinstance(value, int | float)
-    ]
-    parameters += [
-        ParameterValue(str(name), float(value), t / 1e6)
-        for t, name, value in log.changed_parameters
-        if isinstance(value, int | float)
-    ]
+    return topics
+
+
+def _parameters(index: UlogIndex) -> Iterator[Sample]:
+    for name, value in index.initial.items():
+        yield ParameterValue(name, value)
+    for t, name, value in index.changed:
+        yield ParameterValue(name, value, t / 1e6)
+
+
+def _damage(index: UlogIndex) -> tuple[str, ...]:
     damage = []
-    if log.file_corruption:
+    if index.damaged_places:
         damage.append("damaged: some of the log was skipped")
-    if log.dropouts:
-        lost = sum(d.duration for d in log.dropouts) / 1e3
-        damage.append(f"{len(log.dropouts)} dropouts of the logger, {lost:.1f} s in all")
-    return topics, parameters, tuple(damage)
+    if index.dropouts:
+        lost = index.dropped_ms / 1e3
+        damage.append(f"{index.dropouts} dropouts of the logger, {lost:.1f} s in all")
+    return tuple(damage)
 
 
-def _converted(convert: Converter, instance: int, columns: Columns) -> Stream | None:
-    """The samples of a topic; None where it has not the fields, or not those we know."""
+def _stream(convert: Converter, instance: int, records: Records) -> _Stream | None:
+    """Use of a topic; None where it has not the fields, or not those we know."""
+    stream = _Stream(convert, instance, records, records["timestamp"].astype(np.float64) / 1e6)
     try:
-        with np.errstate(all="ignore"):  # damaged bytes make any number
-            t = columns["timestamp"].astype(np.float64) / 1e6
-            return t, convert(t, columns, instance)
+        stream.samples(slice(0, 1))
     except KeyError:
         return None
+    return stream
+
+
+def _in_order(streams: list[_Stream]) -> Iterator[Sample]:
+    """Samples of all streams by their time."""
+    whose = np.repeat(np.arange(len(streams)), [len(s.t) for s in streams])
+    first = np.cumsum([0, *(len(s.t) for s in streams)])
+    order = np.argsort(np.concatenate([s.t for s in streams]), kind="stable")
+    for start in range(0, len(order), BLOCK):
+        block = order[start : start + BLOCK]
+        placed: list[Sample | None] = [None] * len(block)
+        for k in np.unique(whose[block]).tolist():
+            places = np.flatnonzero(whose[block] == k)
+            samples = streams[k].samples(block[places] - first[k])
+            for place, sample in zip(places.tolist(), samples, strict=True):
+                placed[place] = sample
+        yield from (sample for sample in placed if sample is not None)
 
 
 def _three(columns: Columns, name: str) -> list[tuple[float, float, float]]:
     axes = [columns[f"{name}[{i}]"].astype(np.float64).tolist() for i in range(3)]
     return list(zip(*axes, strict=True))
+
+
+def _integers(values: NDArray[Any]) -> list[int]:
+    """A field of small whole numbers, in whatever type it was logged; -1 where it is none."""
+    small = np.nan_to_num(values.astype(np.float64), nan=-1.0, posinf=-1.0, neginf=-1.0)
+    whole: list[int] = np.clip(small, -1.0, 255.0).astype(int).tolist()
+    return whole
 
 
 def _floats(columns: Columns, name: str) -> list[float]:
@@ -164,7 +205,7 @@ def gps(t: Floats, columns: Columns, instance: int) -> list[Sample]:
         lat, lon, alt = lat / 1e7, lon / 1e7, alt / 1e3
     place = np.radians(lat).tolist(), np.radians(lon).tolist(), alt.tolist()
     v_n, v_e, v_d = (_floats(columns, f"vel_{axis}_m_s") for axis in "ned")
-    fix = columns["fix_type"].tolist()
+    fix = _integers(columns["fix_type"])
 
     def positive(column: str) -> list[Any]:
         """Values of a column, None where it is absent or says that it does not know."""
@@ -209,9 +250,9 @@ def gps_integrity(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
 def vehicle_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
     """Armed, and the kind of vehicle."""
     armed = columns["arming_state"] == ARMED
-    kinds = columns.get("vehicle_type", np.zeros(len(t)))
+    kinds = _integers(columns.get("vehicle_type", np.zeros(len(t))))
     return [
-        VehicleState(at, armed=bool(a), kind=KINDS.get(int(kind), ""))
+        VehicleState(at, armed=bool(a), kind=KINDS.get(kind, ""))
         for at, a, kind in zip(t.tolist(), armed, kinds, strict=True)
     ]
 

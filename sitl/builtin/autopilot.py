@@ -177,6 +177,7 @@ class Autopilot:
             mode=self.control.mode,
             vehicle=self.vehicle,
             consumed_mah=self._consumed,
+            capacity_mah=self.parameters["BATT_CAPACITY"] if self.truth.aircraft else 0.0,
         )
 
     # -- flight ----------------------------------------------------------------------------

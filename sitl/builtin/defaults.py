@@ -56,6 +56,8 @@ def initial_parameters(vehicle: str, truth: Truth, loop_rate: int | None = None)
         out.append(Parameter(f"INS_TCAL{index + 1}_ENABLE", 0, Kind.INT8))
         out.append(Parameter("INS_USE" + ("" if index == 0 else str(index + 1)), 1, Kind.INT8))
         out += [Parameter(f"INS_POS{index + 1}_{a}", 0.0) for a in AXES]
+    if truth.aircraft is not None:
+        out += truth.aircraft.parameters()
     return out + _simulator(truth)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from sitl.builtin import effects as fx
 from sitl.builtin import rotation
+from sitl.builtin.airframe.outputs import Outputs
 from sitl.builtin.attitude import AttitudeFilter
 from sitl.builtin.gps import Fix
 from sitl.builtin.orientation import board_rotation
@@ -55,6 +56,7 @@ class Instant:
     mode: int
     vehicle: str
     consumed_mah: float
+    capacity_mah: float
 
     @property
     def milliseconds(self) -> int:
@@ -75,6 +77,11 @@ class Instant:
     def throttle(self) -> float:
         """0 ... 1."""
         return float(self.piece.trajectory.throttle[self.row])
+
+    @property
+    def outputs(self) -> Outputs | None:
+        """Actuators and battery of a vehicle with an airframe, all rows of the piece."""
+        return self.piece.trajectory.outputs
 
     @property
     def imus(self) -> int:

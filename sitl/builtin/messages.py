@@ -168,8 +168,9 @@ def vfr_hud(now: Instant) -> Message:
     v = now.velocity()
     yaw = math.degrees(float(now.attitude()[2])) % 360.0
     altitude = now.world.environment.altitude - float(now.position()[2])
+    speed = now.piece.trajectory.airspeed if now.outputs is None else now.outputs.indicated
     return mav.MAVLink_vfr_hud_message(
-        _f(now.piece.trajectory.airspeed[now.row]),
+        _f(speed[now.row]),
         _f(math.hypot(v[0], v[1])),
         int(yaw),
         int(now.throttle * 100.0),
@@ -202,18 +203,23 @@ def extended_sys_state(now: Instant) -> Message:
     return mav.MAVLink_extended_sys_state_message(0, 1 if now.landed else 2)
 
 
-def _battery(now: Instant) -> tuple[float, float]:
-    """Voltage (V) and current (A)."""
+def _battery(now: Instant) -> tuple[float, float, float, int]:
+    """Voltage (V), current (A), charge used (mAh), per cent left."""
+    if now.outputs is not None:
+        used = float(now.outputs.consumed[now.row])
+        left = max(0, int(100.0 - 100.0 * used / now.capacity_mah))
+        return float(now.outputs.voltage[now.row]), float(now.outputs.current[now.row]), used, left
     current = 0.4 + 32.0 * now.throttle
-    return 12.5 - now.consumed_mah / 4000.0 - 0.015 * current, current
+    left = max(0, int(100.0 - now.consumed_mah / 50.0))
+    voltage = 12.5 - now.consumed_mah / 4000.0 - 0.015 * current
+    return voltage, current, now.consumed_mah, left
 
 
 def sys_status(now: Instant) -> Message:
     """SYS_STATUS: sensors present and healthy, load, battery."""
     sensors = 0x1 | 0x2 | 0x4 | 0x8 | 0x20 | 0x200000
     healthy = sensors if now.fix is not None and now.fix.fix_type >= FIX_3D else sensors & ~0x20
-    voltage, current = _battery(now)
-    left = max(0, int(100.0 - now.consumed_mah / 50.0))
+    voltage, current, _, left = _battery(now)
     return mav.MAVLink_sys_status_message(
         sensors,
         sensors,
@@ -233,11 +239,10 @@ def sys_status(now: Instant) -> Message:
 
 def battery_status(now: Instant) -> Message:
     """BATTERY_STATUS of one battery."""
-    voltage, current = _battery(now)
-    left = max(0, int(100.0 - now.consumed_mah / 50.0))
+    voltage, current, used, left = _battery(now)
     cells = [int(voltage * 1000.0)] + [UNKNOWN_16] * 9
     return mav.MAVLink_battery_status_message(
-        0, 0, 0, 32767, cells, int(current * 100.0), int(now.consumed_mah), -1, left
+        0, 0, 0, 32767, cells, int(current * 100.0), int(used), -1, left
     )
 
 
@@ -250,6 +255,11 @@ def scaled_pressure(now: Instant) -> Message:
 
 def servo_output_raw(now: Instant) -> Message:
     """SERVO_OUTPUT_RAW: motors of a copter, throttle channel of a plane."""
+    if now.outputs is not None:
+        real = [round(float(x)) for x in now.outputs.pwm[now.row]]
+        return mav.MAVLink_servo_output_raw_message(
+            now.microseconds & 0xFFFFFFFF, 0, *real, *[0] * (8 - len(real))
+        )
     pwm = 1000 + int(1000.0 * now.throttle)
     outputs = [pwm] * 4 + [0] * 4 if now.vehicle == "copter" else [1500, 1500, pwm, 1500] + [0] * 4
     return mav.MAVLink_servo_output_raw_message(now.microseconds & 0xFFFFFFFF, 0, *outputs)
@@ -263,8 +273,11 @@ def system_time(now: Instant) -> Message:
 
 
 def wind(now: Instant) -> Message:
-    """WIND: where it comes from, and how hard."""
-    north, east, _ = now.world.environment.wind_n
+    """WIND: where it comes from, and how hard; of a vehicle with an airframe, as it believes."""
+    if now.outputs is not None:
+        north, east = (float(x) for x in now.outputs.told_wind[now.row])
+    else:
+        north, east, _ = now.world.environment.wind_n
     direction = math.degrees(math.atan2(-east, -north))
     return mav.MAVLink_wind_message(_f(direction), _f(math.hypot(north, east)), 0.0)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from sitl.builtin import rotation
+from sitl.builtin.airframe.outputs import Outputs
 from sitl.builtin.smoothing import DT, RATE, Array, derivative
 
 STANDARD_GRAVITY = 9.80665
@@ -44,7 +45,7 @@ class Trajectory:
     ``R_nb`` (n, 3, 3), ``w_b`` (n, 3) angular rate against inertial space, rad/s;
     ``v_n``, ``p_n`` (n, 3) velocity over ground and position from home, NED; ``f_b`` (n, 3)
     specific force of the reference point; ``throttle`` 0 ... 1; ``airspeed`` m/s;
-    ``landed`` and ``armed`` flags.
+    ``landed`` and ``armed`` flags.  ``outputs`` are those of a vehicle with an airframe.
     """
 
     R_nb: Array
@@ -57,6 +58,7 @@ class Trajectory:
     armed: np.ndarray[tuple[int], np.dtype[np.bool_]]
     landed: np.ndarray[tuple[int], np.dtype[np.bool_]]
     environment: Environment
+    outputs: Outputs | None = None
 
     @property
     def n(self) -> int:
@@ -70,8 +72,9 @@ class Trajectory:
 
     def first(self, n: int) -> Trajectory:
         """The first ``n`` samples."""
-        arrays = (f.name for f in fields(self) if f.name != "environment")
-        return replace(self, **{name: getattr(self, name)[:n] for name in arrays})
+        arrays = (f.name for f in fields(self) if f.name not in ("environment", "outputs"))
+        outputs = None if self.outputs is None else self.outputs.first(n)
+        return replace(self, outputs=outputs, **{name: getattr(self, name)[:n] for name in arrays})
 
     @property
     def end(self) -> Start:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.effects import Effect, Vector3
 from sitl.builtin.trajectory import Environment
 
@@ -89,7 +90,8 @@ class Truth:
     """Everything that is true; ``attitude_errors=False`` reports the true attitude.
 
     ``board`` is the unique id that AUTOPILOT_VERSION tells, in hex of 18 bytes at most; empty
-    for a board that tells none.
+    for a board that tells none.  ``aircraft`` gives the vehicle an airframe with physics of its
+    own; without, it flies as it is told to.
     """
 
     imus: tuple[ImuTruth, ...] = (ImuTruth(),)
@@ -101,6 +103,7 @@ class Truth:
     orientation: int = 0
     board: str = BOARD
     seed: int = 0
+    aircraft: Aircraft | None = None
 
 
 def random_imus(seed: int, count: int = 1) -> tuple[ImuTruth, ...]:

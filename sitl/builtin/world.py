@@ -120,7 +120,12 @@ class World:
     def park(self, seconds: float) -> None:
         """Stands still for a while."""
         start = self.pieces[-1].trajectory.end if self.pieces else self._start
-        self._append(parked(start, seconds, self.environment), None)
+        aircraft = self.truth.aircraft
+        if aircraft is None:
+            still = parked(start, seconds, self.environment)
+        else:
+            still = aircraft.stand(self.environment, start, seconds, self._consumed())
+        self._append(still, None)
 
     def ensure(self, t: float) -> None:
         """Makes sure that the world exists at boot time ``t``."""
@@ -179,7 +184,21 @@ class World:
         flight = CopterFlight(seed=seed, duration=duration, dull=self._dull)
         return replace(flight, drag=drag[0]) if drag else flight
 
+    def _consumed(self) -> float:
+        """Charge that the last piece has left used, mAh."""
+        outputs = self.pieces[-1].trajectory.outputs if self.pieces else None
+        return 0.0 if outputs is None else float(outputs.consumed[-1])
+
     def _fly(self, flight: PlaneFlight | CopterFlight, start: Start) -> Trajectory:
+        if self.truth.aircraft is not None:
+            return self.truth.aircraft.fly(
+                self.environment,
+                start,
+                seed=flight.seed,
+                duration=flight.duration,
+                dull=flight.dull,
+                stop_at=flight.stop_at,
+            )
         if isinstance(flight, PlaneFlight):
             return plane_trajectory(flight, self.environment, start)
         return copter_trajectory(flight, self.environment, start)

@@ -133,6 +133,7 @@ async def test_approve_and_rollback_from_the_terminal(document, daemon, port, ca
 async def test_a_wrong_token_is_told(document, daemon, capsys, tmp_path):
     document["http"]["token"] = "open"
     (tmp_path / "token").write_text("wrong\n")
+    (tmp_path / "token").chmod(0o600)
     async with daemon(document) as service:
         status, _, err = await call(
             capsys,

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from onboard.daemon.setup import configuration
+from onboard.daemon.setup import configuration, secret_files
 from onboard.daemon.setup.configuration import Configuration, HttpSettings
 from onboard.errors import ConfigurationError
 
@@ -130,7 +130,8 @@ def test_state_directory_follows_systemd_then_the_user(monkeypatch, tmp_path):
 def test_a_secret_is_the_first_line_of_its_file(tmp_path):
     secret = tmp_path / "token"
     secret.write_text("  open sesame \nrest\n")
-    assert configuration.read_secret(str(secret), key="[http] token_file") == "open sesame"
+    secret.chmod(0o600)
+    assert secret_files.read_secret(str(secret), key="[http] token_file") == "open sesame"
     secret.write_text("\n")
     with pytest.raises(ConfigurationError, match=r"\[http\] token_file"):
-        configuration.read_secret(str(secret), key="[http] token_file")
+        secret_files.read_secret(str(secret), key="[http] token_file")

@@ -238,6 +238,7 @@ async def test_user_and_password(tmp_path, publishing, password):
     table.chmod(0o600)
     secret = tmp_path / "secret"
     secret.write_text(f"{password}\n")
+    secret.chmod(0o600)
     await hashed(table)
     async with (
         Broker(tmp_path, "allow_anonymous false", f"password_file {table}") as broker,

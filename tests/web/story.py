@@ -78,7 +78,7 @@ def story(second, *, imus=2):
             Notice(at=T0 - 12.0, kind="autopilot_found", text="ArduPilot copter, system 1"),
             Notice(at=T0, kind="window_opened", text="GPS is trusted: the window is open"),
         ),
-        counters={},
+        counters={"loop_stalls": 3, "loop_stall_worst_ms": 120},
     )
 
 

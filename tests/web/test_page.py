@@ -25,6 +25,7 @@ def test_one_glance_says_what_is_trusted_known_missing_and_next(browser, served)
     assert "Fly banked turns" in browser.text("#glance-next .headline")
     assert "SCALED_IMU2" in browser.text("#link-body")
     assert "slow" in browser.text("#link-body")
+    assert "3, 120 ms at most" in browser.text("#link-body")
 
 
 def test_values_change_as_snapshots_come(browser, served):

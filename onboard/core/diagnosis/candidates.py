@@ -1,4 +1,4 @@
-"""An effect on trial: what it costs, and what makes it acceptable."""
+"""An effect on trial: its score, and what makes it acceptable besides."""
 
 from __future__ import annotations
 
@@ -6,16 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.diagnosis.limits import (
-    CHANCE,
-    HELD_OUT_GAIN,
-    MARGIN,
-    MATTERS_HELD_OUT,
-    MATTERS_OFFSET,
-    MATTERS_SCALE,
-    SIGNIFICANT,
-    USED,
-)
+from onboard.core.diagnosis.limits import MATTERS_HELD_OUT, MATTERS_OFFSET, MATTERS_SCALE
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.physics.effect import Effect
 
@@ -25,17 +17,15 @@ class Candidate:
     """Columns that stand for one effect; ``columns`` is None for a jump at a block's start.
 
     ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
-    ``spent`` are unknowns that were chosen outside the fit (a jump's moment), ``unseen`` the share
-    of the columns' own variance that happens between the samples they are made of.  ``jump`` is
-    True for a jump of the offsets at one moment.
+    ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
+    the offsets at one moment.
     """
 
     effect: str
     index: tuple[int, ...]
     plausible: tuple[float, ...]
     columns: Effect | None = None
-    spent: int = 0
-    unseen: float = 0.0
+    places: float = 1.0
     jump: bool = False
 
     @property
@@ -43,34 +33,17 @@ class Candidate:
         """Columns of the sizes, without the shapes."""
         return list(self.index[: len(self.plausible)])
 
-    def bic(self, fitter: Fitter, before: Fit, after: Fit) -> float:
-        """Fall of BIC from ``before`` to ``after``, the fit with the effect in.
-
-        An unknown that stays at nothing (one axis of three) is not a reason for the effect, and
-        pays only for what it may gain by chance.
-        """
-        index = list(self.index)
-        sigma = np.sqrt(np.diag(after.covariance)[index])
-        used = int(np.sum(np.abs(after.theta[index] - fitter.absent[index]) > USED * sigma))
-        used = max(used, 1)
-        cost = (used + self.spent) * fitter.log_rows + CHANCE * (len(index) - used)
-        return fitter.gain(before, after) - cost
+    def score(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """How surprising by chance what ``after``, the fit with the effect in, explains more."""
+        return surprise(fitter.gain(before, after), len(self.index), self.places)
 
 
-def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate, bic: float) -> bool:
-    """Whether an effect has the evidence, and is convincing besides."""
-    return bic >= MARGIN and convincing(fitter, before, after, c)
-
-
-def convincing(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
-    """Whether an effect is significant, holds on other data, is believable and matters."""
-    if fitter.held_gain(before, after) < HELD_OUT_GAIN:
+def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
+    """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
+    if c.score(fitter, before, after) < least() or fitter.held_gain(before, after) <= 0.0:
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
-    sigma = np.sqrt(np.diag(after.covariance)[c.sizes])
-    if np.max(np.abs(value) / sigma) < SIGNIFICANT:
-        return False
-    if np.any(np.abs(value) - sigma > np.array(c.plausible)):
+    if np.any(np.abs(value) > np.array(c.plausible)):
         return False
     if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
         # What is learned over the whole flight lies in between, and nearer to both.

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import ENOUGH
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
@@ -40,7 +39,7 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     batches = flight
     if rail is not None:
         batches = unclipped(batches, rail.intervals, origin.t0)
-        if sum(c.trusted_s for c in batches) < ENOUGH * sum(c.trusted_s for c in flight):
+        if sum(c.trusted_s for c in batches) < calibrator.settings.minimum_s:
             # Clipped all the time: what is left would say less than what is spoiled.
             batches = flight
     testable, absent = testable_of(catalogue(origin), batches)

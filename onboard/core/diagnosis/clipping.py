@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL, RAIL_RUN, RAIL_SAMPLES
+from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL
 from onboard.core.diagnosis.regimes import spans
+from onboard.core.diagnosis.score import least
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
@@ -62,7 +63,11 @@ def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:
 
 
 def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
-    """Accelerometer samples that stay at one extreme value: the rail of its range."""
+    """Accelerometer samples that stay at one extreme value: the rail of its range.
+
+    Even a reading that is the one before every other time stays at its extreme so often with the
+    probability of so many heads in a row.
+    """
     raw = np.concatenate([c.segment.raw_s for c in batches])
     t = np.concatenate([c.segment.t for c in batches])
     best: tuple[int, float, NDArray[np.bool_], int] | None = None
@@ -72,7 +77,8 @@ def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
             top = float(x.max())
             at = x >= top - 1e-9
             runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
-            stuck = at.sum() >= RAIL_SAMPLES and runs.max() >= RAIL_RUN and at.mean() < 0.5
+            stayed = 2.0 * np.log(2.0) * (int(at.sum()) - len(runs))
+            stuck = stayed >= least() and at.mean() < 0.5
             if stuck and top > LEAST_RAIL and (best is None or at.sum() > best[0]):
                 best = (int(at.sum()), sign * top, at, j)
     if best is None:

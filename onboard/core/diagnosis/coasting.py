@@ -16,12 +16,10 @@ import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import (
-    APART_S,
-    BEFORE_S,
     FAULT_M_S,
     FEWEST_FIXES,
     MEAN_S,
-    MOST_SCATTER,
+    SAME,
 )
 from onboard.core.diagnosis.refusals import Refused
 from onboard.core.filter.innovations import Epoch, WhitenedInnovations
@@ -30,6 +28,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
 from onboard.core.filter.whitening import WhiteningFilter
+from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 
@@ -123,7 +122,9 @@ def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[
 
 def _groups(asked: Sequence[Asked]) -> Iterator[list[Asked]]:
     """Those that follow on each other: a filter that began anew has other errors."""
-    cuts = [i + 1 for i, (a, b) in enumerate(pairwise(asked)) if not 0 < b.t - a.t < APART_S]
+    cuts = [
+        i + 1 for i, (a, b) in enumerate(pairwise(asked)) if not 0 < b.t - a.t < LONGEST_FIX_GAP_S
+    ]
     for i, j in pairwise([0, *cuts, len(asked)]):
         if j - i >= FEWEST_FIXES:
             yield list(asked[i:j])
@@ -141,7 +142,7 @@ def _bridged(
     y, S = np.array([a.innovation for a in group]), np.array([a.spread for a in group])
     back = next((x for x in traces if x.t > t[-1] and _velocity(x, theta) is not None), None)
     start = max((x.t for x in traces if x.t < t[0] and x.velocities), default=float(t[0]))
-    end = None if back is None or back.t - t[-1] > APART_S else _velocity(back, theta)
+    end = None if back is None or back.t - t[-1] > LONGEST_FIX_GAP_S else _velocity(back, theta)
     if back is None or end is None or _chi2(end, S[-1]) > GATE_VELOCITY:
         return y, S, False
     share = ((t - start) / (back.t - start))[:, None]
@@ -164,7 +165,7 @@ def _with_before(
 ) -> tuple[Array, Array]:
     """Times (n,) and innovations (n, 2) of a group and of the seconds right before it."""
     first = group[0].t
-    near = [x for x in traces if first - BEFORE_S <= x.t < first]
+    near = [x for x in traces if first - 2.0 * LONGEST_FIX_GAP_S <= x.t < first]
     before = [(x.t, v) for x in near if (v := _velocity(x, theta)) is not None]
     every = [*before, *((a.t, a.innovation) for a in group)]
     return np.array([t for t, _ in every]), np.array([v for _, v in every])
@@ -227,7 +228,7 @@ def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Arr
     while len(left) and not _small(jump[k := int(np.argmax(left))], sigma):
         beside = max(size[max(k - n, 0)], size[min(k + n, len(size) - 1)])
         left[max(k - n, 0) : k + n + 1] = 0.0
-        if beside < 0.5 * size[k]:
+        if beside < SAME * size[k]:
             out.append((k, jump[k]))
     return sorted(out, key=lambda step: step[0]), sigma
 
@@ -243,7 +244,7 @@ def _runs(t: Sequence[float], y: Array, S: Array, white: float) -> Iterator[Cont
         off = np.median(y[i:j], axis=0)
         size = float(np.linalg.norm(off))
         scatter = float(np.sqrt(np.mean(np.sum((y[i:j] - off) ** 2, axis=1))))
-        if size > FAULT_M_S and scatter < MOST_SCATTER * size:
+        if size > FAULT_M_S and scatter < SAME * size:
             drift = np.trace(S[i:j].mean(axis=0)) / 2.0 - white**2
             sigma = np.hypot(np.sqrt(max(drift, 0.0)), scatter / np.sqrt(j - i))
             yield Contradiction(t[i], t[j - 1], off, size, float(sigma))

@@ -12,7 +12,7 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.hypotheses import Choice
-from onboard.core.diagnosis.limits import AMBIGUOUS, MARGIN, SIGNIFICANT
+from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
 from onboard.core.diagnosis.nuisance_effects import (
     constant_unknowns,
     nuisance_kinds,
@@ -31,6 +31,7 @@ from onboard.core.diagnosis.records import (
 from onboard.core.diagnosis.regimes import (
     regime_residuals,
 )
+from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.selection import Fit
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
@@ -127,11 +128,12 @@ class Judge:
             + len(self.engine.indices_of(self.final.families))
         )
         series = self.final.series(before.theta, after.theta)
+        p_value = survival(max(gain, 0.0), added)
         return Mismatch(
-            detected=bool(gain > added * fitter.log_rows + MARGIN),
+            detected=p_value < FALSE_ALARM,
             whitened_rms_before=fitter.rms(before),
             whitened_rms_after=fitter.rms(after),
-            p_value=survival(max(gain, 0.0), added),
+            p_value=p_value,
             velocity_rms_before=rms(series.before),
             velocity_rms_after=rms(series.after),
             held_out_before=fitter.held_rms(before),
@@ -179,12 +181,12 @@ class Judge:
         by_name = {f.effect: f for f in self.final.families}
         out = []
         for e in effects:
-            close = [r.name for r in e.confounders if r.delta_bic < AMBIGUOUS and r.name != e.name]
+            close = [r.name for r in e.confounders if r.delta_bic < CLEARLY and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
             if (
                 e.name in nuisance_kinds()
-                and self.final.evidence(e.name, self.final.all)[0] < MARGIN
+                and self.final.evidence(e.name, self.final.all)[0] < least()
             ):
                 # It holds only with the antenna where it was told to be.
                 out += [
@@ -209,7 +211,7 @@ class Judge:
             rest = [i for i in self.choice.free if i not in index]
             fit = self.choice.fitter.fit([*rest, *index], held_out=False)
             sigma = np.sqrt(np.diag(fit.covariance)[c.sizes])
-            if np.all(sigma * SIGNIFICANT > np.array(c.plausible)):
+            if np.all(sigma * np.sqrt(least()) > np.array(c.plausible)):
                 out.append(
                     NotTestable(
                         c.effect,

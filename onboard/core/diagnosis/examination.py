@@ -13,20 +13,15 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.diagnosis.limits import (
-    AGREE,
-    CONSISTENT,
-    HARDLY_BELIEVED,
-    LESS_BELIEVED,
     NEIGHBOURS,
-    NOISE_ROUNDS,
     SAMPLE_S,
-    STILL_INCONSISTENT,
     WORTH_A_PASS,
 )
-from onboard.core.diagnosis.nuisance_effects import attitude_unknowns
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
+from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochTrace, PassResult
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -63,9 +58,6 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
-        self.doubted = any(getattr(f, "tilts_ekf", False) for f in families) and start is not None
-        if isinstance(start, Examination):
-            self.doubted = self.doubted or start.doubted
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
@@ -81,12 +73,12 @@ class Examination(Engine):
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
-        self.refine(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        self.refine()
         return self
 
     def tuned(self) -> Examination:
         """Find noise and timing; no sums."""
-        self.tune(NOISE_ROUNDS, NOISE_ROUNDS - 1)
+        self.tune(ROUNDS, NOISE_ROUNDS)
         return self
 
     def begin(self) -> None:
@@ -117,49 +109,17 @@ class Examination(Engine):
             held, blind = None, False
         return self
 
-    def doubting_attitude(self) -> Examination:
-        """Believe the recorded attitude less while blocks of the flight contradict each other.
+    def doubting(self) -> Examination:
+        """The same flight and columns with an attitude that is believed as little as may be.
 
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
-        offset in flight (temperature, a jump) tilts the recorded attitude too, for as long as the
-        EKF needs to learn it, and by more than the quiet rest of the flight lets expect.  What
-        follows from an attitude that is believed too much moves when it is believed less
-        (Hausman, Econometrica 46, 1978), which ends when it moves no longer.
+        offset in flight tilts the recorded attitude too, for as long as the EKF needs to learn it.
         """
-        while self.found().variance_inflation > CONSISTENT or self.doubted:
-            kept = self.noise, self.blocks, self.traces, self._seed, self._solution
-            before = self.found()
-            self.noise = self.noise.scaled("attitude", LESS_BELIEVED)
-            if self.noise == kept[0]:
-                break
-            self._seed = before
-            self.once((before.theta, before.covariance))
-            after = self.found()
-            worse = after.variance_inflation > max(
-                CONSISTENT, STILL_INCONSISTENT * before.variance_inflation
-            )
-            if worse or (
-                before.variance_inflation <= CONSISTENT and not self._moved(before, after)
-            ):
-                self.noise, self.blocks, self.traces, self._seed, self._solution = kept
-                break
-            self.doubted = True
-        return self
-
-    def doubting(self) -> Examination:
-        """The same flight and columns with an attitude that is hardly believed."""
         made = Examination(self, self._more, t0=self.point.skew_from, start=self)
-        made.noise = replace(self.noise, attitude=max(self.noise.attitude, HARDLY_BELIEVED))
+        made.noise = replace(self.noise, attitude=LIMITS["attitude"][1])
         made._seed = self._seed
         made.once()
         return made
-
-    def _moved(self, before: Solution, after: Solution) -> bool:
-        """Whether the accelerometer's unknowns are others than before, beyond their sigmas."""
-        attitude = set(attitude_unknowns())
-        mine = [i for i, u in enumerate(self.model.unknowns) if u.name not in attitude]
-        sigma = np.sqrt(np.diag(after.covariance))[mine]
-        return bool(np.max(np.abs(after.theta - before.theta)[mine] / sigma) > AGREE)
 
     @property
     def absent(self) -> Array:

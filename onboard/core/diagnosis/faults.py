@@ -10,20 +10,22 @@ import numpy as np
 
 from onboard.core.diagnosis.coasting import Contradiction
 from onboard.core.diagnosis.limits import (
-    BESIDE_S,
-    FAULT_S,
     FEWEST_FIXES,
     LONGEST_FAULT_S,
-    MOST_SCATTER,
-    NEIGHBOURS_S,
-    ONSET_FIXES,
+    MEAN_S,
+    OFF,
+    SAME,
 )
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import EpochTrace
+from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.physics.finding import Finding, Quantity
+
+ONSET = FEWEST_FIXES // 2 + 1
+"""Fixes that show how a fault began: most of those that it has at least."""
 
 
 def fault_effect(
@@ -63,7 +65,7 @@ def fault_effect(
     sizes = {"duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s")}
     if worst.size > 0.0:
         # A receiver that contradicts itself while the inertia is lost does not show its error.
-        spread = float(np.hypot(least / 8.0, worst.spread))
+        spread = float(np.hypot(least / OFF, worst.spread))
         sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
     t = np.unique(np.concatenate([c.fixes.t for c in batches])) - t0
     inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
@@ -88,7 +90,9 @@ def _with_contradicted(
     out = list(spells)
     for c in contradicted:
         start, end = c.start - t0, c.end - t0
-        near = [s.start <= end + BESIDE_S and s.end >= start - BESIDE_S for s in out]
+        near = [
+            s.start <= end + LONGEST_FIX_GAP_S and s.end >= start - LONGEST_FIX_GAP_S for s in out
+        ]
         beside = [s for s, is_near in zip(out, near, strict=True) if is_near]
         start = min([start, *(s.start for s in beside)])
         end = max([end, *(s.end for s in beside)])
@@ -119,7 +123,7 @@ class _Spell:
 
 
 def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
-    """Times of refused velocities, those together that no two seconds of good ones part.
+    """Times of refused velocities, those together that no gap's length of good ones parts.
 
     Nor does a run go on when the filter has taken the error for a velocity and is off by another.
     """
@@ -133,7 +137,7 @@ def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Itera
                 run = []
             run.append(t)
             taken = False
-        elif run and t - run[-1] > 2.0:
+        elif run and t - run[-1] > LONGEST_FIX_GAP_S:
             yield run
             run = []
             taken = False
@@ -145,7 +149,7 @@ def _another(now: Array | None, before: Array | None) -> bool:
     """Whether an error is far from what it was."""
     if now is None or before is None or len(now) != len(before):
         return False
-    return float(np.linalg.norm(now - before)) > 0.5 * float(np.linalg.norm(before))
+    return float(np.linalg.norm(now - before)) > SAME * float(np.linalg.norm(before))
 
 
 def _spell(
@@ -155,19 +159,19 @@ def _spell(
     off = [seen[u] for u in run if u in seen]
     mean = np.median(np.array(off), axis=0) if off else None
     after = min((u for u in seen if u > run[-1]), default=None)
-    still = after is not None and mean is not None and _along(seen[after], mean) > 0.5
+    still = after is not None and mean is not None and _along(seen[after], mean) > SAME
     # A noisy receiver errs to all sides: the mean of its errors says nothing.
     sizes = np.linalg.norm(off, axis=1) if off else np.zeros(1)
     size = float(np.median(sizes))
-    long = len(run) >= FEWEST_FIXES and run[-1] - run[0] >= FAULT_S
+    long = len(run) >= FEWEST_FIXES and run[-1] - run[0] >= MEAN_S
     # A receiver fails at once; what grows from the gate on is a filter that drifts.
-    at_once = float(np.median(sizes[:ONSET_FIXES])) > max(least, 0.5 * size)
+    at_once = float(np.median(sizes[:ONSET])) > max(least, SAME * size)
     return _Spell(
         run[0] - t0,
         run[-1] - t0,
         mean,
         size,
-        np.median(np.array(off[:ONSET_FIXES]), axis=0) if off else None,
+        np.median(np.array(off[:ONSET]), axis=0) if off else None,
         float(np.std(sizes)),
         failure=long and size > least and at_once and _steady(off, size),
         outlasted=still,
@@ -190,7 +194,7 @@ def _steady(off: Sequence[Array], size: float) -> bool:
     if not off:
         return True
     scatter = np.sqrt(np.mean(np.sum((np.array(off) - np.mean(off, axis=0)) ** 2, axis=1)))
-    return bool(scatter < MOST_SCATTER * size)
+    return bool(scatter < SAME * size)
 
 
 def _jumps(
@@ -204,7 +208,7 @@ def _jumps(
         (b - t0, refused[b] - refused[a])
         for a, b in pairwise(sorted(seen))
         if a in refused and b in refused
-        if b - a < NEIGHBOURS_S and len(refused[a]) == len(refused[b]) == 2
+        if b - a < LONGEST_FIX_GAP_S and len(refused[a]) == len(refused[b]) == 2
     ]
 
 
@@ -239,4 +243,6 @@ def _undoes(jump: Array | None, off: Array | None) -> bool:
     if jump is None or off is None or len(jump) != len(off):
         return False
     size, along = float(off @ off), -float(jump @ off)
-    return 0.5 * size < along < 2.0 * size and along > 0.5 * float(np.linalg.norm(jump)) * size**0.5
+    return (
+        SAME * size < along < size / SAME and along > SAME * float(np.linalg.norm(jump)) * size**0.5
+    )

@@ -125,12 +125,12 @@ class FinalModel:
         return self.fitter.fit(rest, held), self.fitter.fit(self.all)
 
     def evidence(self, name: str, among: Sequence[int]) -> tuple[float, float]:
-        """Fall of BIC, and of held-out chi-square, by timing or a constant attitude error."""
+        """Score, and fall of held-out chi-square, of timing or a constant attitude error."""
         columns = nuisance_kinds()[name].in_every_model
         target = Candidate(name, tuple(self.index[c] for c in columns), ())
         rest = [i for i in among if i not in target.index]
         absent, with_it = self.fitter.fit(rest, self.held(columns)), self.fitter.fit(among)
-        return target.bic(self.fitter, absent, with_it), self.fitter.held_gain(absent, with_it)
+        return target.score(self.fitter, absent, with_it), self.fitter.held_gain(absent, with_it)
 
     @staticmethod
     def share(without: Fit, with_it: Fit) -> float:

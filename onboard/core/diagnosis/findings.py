@@ -10,9 +10,10 @@ import numpy as np
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
-from onboard.core.diagnosis.limits import HELD_OUT_GAIN, MARGIN, ONSET_S
+from onboard.core.diagnosis.limits import SPACINGS_S
 from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
+from onboard.core.diagnosis.score import least
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
@@ -52,16 +53,15 @@ class Findings:
         return replace(made, confounders=self._nuisance_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
-        """Whether timing or a constant attitude error is needed, also on data not fitted.
+        """Whether timing or a constant attitude error is no chance, and holds on data not fitted.
 
         With the antenna's place free, or with the antenna where it was told to be: a few
         centimetres of it could do instead on some flights, which is said besides.
         """
         final = self._final
-        every = (
-            final.evidence(name, among) for among in (final.all, final.with_configured_antenna())
-        )
-        return any(bic >= MARGIN and held >= HELD_OUT_GAIN for bic, held in every)
+        among = (final.all, final.with_configured_antenna())
+        every = (final.evidence(name, columns) for columns in among)
+        return any(score >= least() and held > 0.0 for score, held in every)
 
     def _nuisance_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""
@@ -87,7 +87,10 @@ class Findings:
             for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
         }
         if f.onset is not None:
-            quantities = {"time": Quantity(f.onset - final.origin.t0, ONSET_S, "s"), **quantities}
+            quantities = {
+                "time": Quantity(f.onset - final.origin.t0, SPACINGS_S[-1], "s"),
+                **quantities,
+            }
         values = {k: q.value for k, q in quantities.items()}
         held = final.engine.absent
         made = self._record(f.effect, quantities, index, held, f.cured(values))

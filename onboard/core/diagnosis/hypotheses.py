@@ -1,32 +1,20 @@
-"""Which effects to accept: forward selection, with second thoughts, on sums alone.
+"""Which effects to accept: forward and backward steps by one score, on sums alone.
 
-An effect is taken when the fall of the misfit pays for its unknowns (BIC) by a wide margin, when it
-holds on blocks of the flight that were not fitted, when its size is sure and believable, and
-when it matters.  A jump of the offsets competes like the rest: at the starts of blocks as long
-as its moment is not known.
+An effect is taken when what it explains is no chance, when it predicts flight that was not fitted,
+when its size is believable, and when it matters.  A jump of the offsets competes like the rest: at
+the starts of blocks as long as its moment is not known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from onboard.core.diagnosis.candidates import Candidate, accepted, convincing
-from onboard.core.diagnosis.limits import (
-    CONTRADICTING,
-    FAIR,
-    LEAST_BLOCKS,
-    LEFT_BESIDE,
-    MARGIN,
-    MOST_EFFECTS,
-    RECONCILED,
-    RIVAL_SHARE,
-    SECOND_ORDER,
-    STILL,
-)
-from onboard.core.diagnosis.selection import Fit, Fitter
+from onboard.core.diagnosis.candidates import Candidate, accepted
+from onboard.core.diagnosis.limits import CLEARLY, MOST_EFFECTS
+from onboard.core.diagnosis.score import least
+from onboard.core.diagnosis.selection import Fitter
+from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
 from onboard.core.physics.finding import Confounder
@@ -34,35 +22,12 @@ from onboard.core.physics.finding import Confounder
 
 @dataclass(slots=True)
 class Choice:
-    """Effects that were taken, in order, and the sums in which they are columns.
-
-    ``nothing`` is a fit without the effects that ``base`` holds.
-    """
+    """Effects that were taken, in order, and the sums in which they are columns."""
 
     fitter: Fitter
     base: list[int]
     candidates: list[Candidate]
     chosen: list[Candidate]
-    nothing: Fit | None = None
-
-    def least(self, now: Fit) -> float:
-        """Evidence that is more than what was found already may have left over.
-
-        Columns are linear in it, and those that follow a signal which is sampled now and then
-        miss what that does in between.
-
-        Args:
-            now: fit of what was chosen.
-        """
-        if self.nothing is None:
-            return MARGIN
-        left = SECOND_ORDER * self.fitter.gain(self.nothing, now)
-        for c in self.chosen:
-            if c.unseen > 0.0:
-                rest = [i for i in self.free if i not in c.index]
-                without = self.fitter.fit(rest, held_out=False)
-                left += c.unseen * self.fitter.gain(without, now)
-        return max(MARGIN, left)
 
     @property
     def free(self) -> list[int]:
@@ -73,13 +38,11 @@ class Choice:
         """What else could stand in the place of a chosen effect, nearest first."""
         rest = self.base + [i for c in self.chosen if c is not target for i in c.index]
         others = [c for c in self.candidates if c not in self.chosen and c.effect != target.effect]
-        step, boundary = _best_jump(self, rest)
-        if step is None or boundary is None or target.columns is None:
-            return confounders_of(self.fitter, rest, target, others)
-        if not target.columns.tilts_ekf:
+        step, wide = _with_best_jump(self, rest)
+        if step is None or target.columns is None or not target.columns.tilts_ekf:
             return confounders_of(self.fitter, rest, target, others)
         # What wanders, on one flight, may have jumped.
-        return confounders_of(self.fitter.stepped(boundary), rest, target, [*others, step])
+        return confounders_of(wide, rest, target, [*others, step])
 
 
 def confounders_of(
@@ -89,7 +52,7 @@ def confounders_of(
     others: Sequence[Candidate],
     held: Array | None = None,
 ) -> list[Confounder]:
-    """Others that explain, instead of ``target``, a good part of what it explains.
+    """Others that would count as found instead of ``target``, and do not beside it.
 
     Args:
         fitter: has the columns of all.
@@ -100,28 +63,25 @@ def confounders_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    bic = target.bic(fitter, before, with_it)
-    out = []
+    own = target.score(fitter, before, with_it)
+    nearest: dict[str, Confounder] = {}
     for other in others:
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
-        gain = fitter.gain(before, instead)
-        other_bic = other.bic(fitter, before, instead)
-        if other_bic < max(RIVAL_SHARE * bic, 0.0):
+        score = other.score(fitter, before, instead)
+        if score < least():
             continue
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
-        if fitter.gain(with_it, both) < LEFT_BESIDE * gain:
-            out.append(Confounder(other.effect, float(bic - other_bic)))
-    nearest: dict[str, Confounder] = {}
-    for confounder in sorted(out, key=lambda r: r.delta_bic):
-        nearest.setdefault(confounder.name, confounder)
-    return list(nearest.values())
+        if other.score(fitter, with_it, both) >= least():
+            continue
+        if other.effect not in nearest or own - score < nearest[other.effect].delta_bic:
+            nearest[other.effect] = Confounder(other.effect, own - score)
+    return sorted(nearest.values(), key=lambda c: c.delta_bic)
 
 
 def choose(
     fitter: Fitter,
     base: Sequence[int],
     candidates: Sequence[Candidate],
-    nothing: Fit | None = None,
     kept: Sequence[Candidate] = (),
 ) -> Choice:
     """Forward selection, each time with a look back.
@@ -130,28 +90,20 @@ def choose(
         fitter: has the columns of all.
         base: columns that are in the model anyway.
         candidates: effects that may be taken.
-        nothing: fit without the effects that ``base`` holds (a late attitude, a tilt).
         kept: candidates that are in the model to begin with.
     """
-    choice = Choice(fitter, list(base), list(candidates), list(kept), nothing=nothing)
+    choice = Choice(fitter, list(base), list(candidates), list(kept))
     while len(choice.chosen) < MOST_EFFECTS:
-        step, boundary = _best_jump(choice, choice.free)
+        step, wide = _with_best_jump(choice, choice.free)
         offered = [c for c in choice.candidates if c not in choice.chosen]
-        wide = choice.fitter
-        if step is not None and boundary is not None:
-            wide = choice.fitter.stepped(boundary)
-            offered.append(step)
+        offered += [step] if step is not None else []
         before = wide.fit(choice.free)
-        scored = []
+        best, most = None, least()
         for c in offered:
             after = wide.fit([*choice.free, *c.index])
-            scored.append((c.bic(wide, before, after), c, after))
-        scored.sort(key=lambda s: -s[0])
-        least = choice.least(before)
-        fine = (
-            c for bic, c, after in scored if bic >= least and accepted(wide, before, after, c, bic)
-        )
-        best = next(fine, None) or _reconciling(wide, choice.free, before, scored)
+            score = c.score(wide, before, after)
+            if score >= most and accepted(wide, before, after, c):
+                best, most = c, score
         if best is None:
             break
         if best is step:
@@ -178,95 +130,54 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     rest = [i for i in choice.free if i not in nuisances.index]
     before = fitter.fit(rest, held)
     with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
-    own = nuisances.bic(fitter, before, with_it)
-    better = own
+    better = max(nuisances.score(fitter, before, with_it), least())
     taken: Candidate | None = None
     for other in choice.candidates:
         if other in choice.chosen or other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
-        bic = other.bic(fitter, before, after)
-        if bic > max(better, choice.least(before)) and accepted(fitter, before, after, other, bic):
-            better, taken = bic, other
+        score = other.score(fitter, before, after)
+        if score > better and accepted(fitter, before, after, other):
+            better, taken = score, other
     if taken is None:
         return False
     choice.chosen.append(taken)
     return True
 
 
-def doubtful(choice: Choice, value: Callable[[Fit], float], least: float) -> list[str]:
-    """Effects beside any one of which a nuisances unknown would not reach the size of an effect.
-
-    Args:
-        choice: what was chosen.
-        value: the unknown of a fit.
-        least: size from which it counts.
-    """
-    out = []
-    for other in choice.candidates:
-        if other in choice.chosen:
-            continue
-        beside = choice.fitter.fit([*choice.free, *other.index], held_out=False)
-        if abs(value(beside)) < STILL * least:
-            out.append(other.effect)
-    return out
-
-
-def _best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, int | None]:
-    """The jump that would help most beside some columns, if there is none yet."""
+def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | None, Fitter]:
+    """The jump that would help most beside some columns, if there is none yet; sums with it."""
+    fitter = choice.fitter
     located = any(c.jump for c in choice.candidates)
-    if located or len(choice.fitter.blocks) < LEAST_BLOCKS:
-        return None, None
-    jumps = choice.fitter.jumps(list(beside))
+    if located or len(fitter.blocks) < FEWEST_BLOCKS:
+        return None, fitter
+    jumps = fitter.jumps(list(beside))
     if not jumps:
-        return None, None
+        return None, fitter
     boundary = max(jumps, key=lambda x: x[1])[0]
-    m = choice.fitter.model.size
-    index = (m, m + 1, m + 2)
-    return Candidate(BiasStep.effect, index, (LARGEST,) * 3, spent=1, jump=True), boundary
+    m = fitter.model.size
+    step = Candidate(
+        BiasStep.effect, (m, m + 1, m + 2), (LARGEST,) * 3, places=len(jumps), jump=True
+    )
+    return step, fitter.stepped(boundary)
 
 
 def _reconsider(choice: Choice) -> None:
-    """Drop what became insignificant, exchange what another one does better."""
+    """Drop what is no longer needed, exchange what another one does clearly better."""
     fitter = choice.fitter
     for c in list(choice.chosen[:-1]):
         rest = [i for i in choice.free if i not in c.index]
         before = fitter.fit(rest, held_out=False)
-        bic = c.bic(fitter, before, fitter.fit([*rest, *c.index], held_out=False))
-        if bic < MARGIN:
+        score = c.score(fitter, before, fitter.fit([*rest, *c.index], held_out=False))
+        if score < least():
             choice.chosen.remove(c)
             continue
-        swaps = []
-        for offered in choice.candidates:
-            if offered not in choice.chosen:
-                instead = fitter.fit([*rest, *offered.index], held_out=False)
-                swaps.append((offered.bic(fitter, before, instead), offered))
-        better, other = max(swaps, key=lambda s: s[0], default=(-np.inf, c))
-        if better > bic + MARGIN:
-            whole = fitter.fit(rest), fitter.fit([*rest, *other.index])
-            if accepted(fitter, *whole, other, better):
-                choice.chosen[choice.chosen.index(c)] = other
-
-
-def _reconciling(
-    fitter: Fitter,
-    free: Sequence[int],
-    before: Fit,
-    scored: Sequence[tuple[float, Candidate, Fit]],
-) -> Candidate | None:
-    """An effect of fair evidence with which blocks agree that contradict each other without."""
-    if fitter.variance_inflation_of(free) < CONTRADICTING:
-        return None
-    for bic, c, after in scored:
-        fair = bic > FAIR and convincing(fitter, before, after, c)
-        if fair and reconciles(fitter, free, c.index):
-            return c
-    return None
-
-
-def reconciles(fitter: Fitter, rest: Sequence[int], index: Sequence[int]) -> bool:
-    """Whether blocks contradict each other without the columns ``index``, and agree with them."""
-    apart = fitter.variance_inflation_of(rest)
-    return (
-        apart > CONTRADICTING and fitter.variance_inflation_of([*rest, *index]) < RECONCILED * apart
-    )
+        better, most = c, score + CLEARLY
+        before = fitter.fit(rest)
+        for other in choice.candidates:
+            if other not in choice.chosen:
+                after = fitter.fit([*rest, *other.index])
+                its = other.score(fitter, before, after)
+                if its > most and accepted(fitter, before, after, other):
+                    better, most = other, its
+        choice.chosen[choice.chosen.index(c)] = better

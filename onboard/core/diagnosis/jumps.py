@@ -9,8 +9,8 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import FURTHEST, REACH_S, SETTLED_S, SETTLING_S, SPACINGS
-from onboard.core.diagnosis.selection import OFFSETS, Fitter
+from onboard.core.diagnosis.limits import FURTHEST, SPACINGS_S
+from onboard.core.diagnosis.selection import FORGOTTEN_S, OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -24,13 +24,16 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
 
     One that is found at the edge of where it was looked for is looked for further there.
     """
+    coarse, fine = SPACINGS_S
+    # At the start of a block, a jump shows that is anywhere in those beside it.
+    reach = 1.5 * float(np.median([b.end - b.start for b in full.blocks]))
     for _ in range(FURTHEST):
-        best = _best(full, chosen, centre, *SPACINGS[0])
-        at_edge = abs(best.moment - centre) > REACH_S - 2.0 * SPACINGS[0][0]
+        best = _best(full, chosen, centre, coarse, reach)
+        at_edge = abs(best.moment - centre) > reach - 2.0 * coarse
         centre = best.moment
         if not at_edge:
             break
-    return _best(full, chosen, centre, *SPACINGS[1])
+    return _best(full, chosen, centre, fine, 1.5 * coarse)
 
 
 def _best(
@@ -42,7 +45,7 @@ def _best(
 ) -> BiasStep:
     jump = BiasStep(Origin(full.point.skew_from))
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
-    times = np.maximum(times, float(full.blocks[0].start) + SETTLED_S)
+    times = np.maximum(times, float(full.blocks[0].start) + FORGOTTEN_S)
     times = np.unique(times)
     scored = _scored(full, chosen, [jump.at(float(t)) for t in times])
     return max(scored, key=lambda x: x[0])[1]
@@ -61,7 +64,7 @@ def _scored(
         replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
     )
     moments = [s.moment for s in steps]
-    first, last = moments[0] - SETTLING_S, moments[-1] + SETTLING_S
+    first, last = moments[0] - FORGOTTEN_S, moments[-1] + FORGOTTEN_S
     far: list[Block] = []
     for batch, block in zip(full.batches, full.blocks, strict=True):
         if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
@@ -122,6 +125,6 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         tuple(made.indices(family)),
         family.plausible,
         family,
-        spent=int(jump),
+        places=made.trusted_s / SPACINGS_S[0] if jump else 1.0,
         jump=jump,
     )

@@ -12,7 +12,6 @@ from functools import cache
 
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.nuisances import ATTITUDE_UNKNOWNS
 from onboard.core.physics.catalogue import kinds
 from onboard.core.physics.effect import Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Quantity
@@ -29,13 +28,6 @@ def nuisance_kinds() -> dict[str, type[Effect]]:
 def timing_unknowns() -> list[str]:
     """Unknowns of the timing that are effects from a size on."""
     return [u for k in nuisance_kinds().values() if k.least is not None for u in k.in_every_model]
-
-
-def attitude_unknowns() -> list[str]:
-    """Unknowns of the recorded attitude that are effects from a size on."""
-    return [
-        u for k in nuisance_kinds().values() for u in k.in_every_model if u in ATTITUDE_UNKNOWNS
-    ]
 
 
 def constant_unknowns() -> list[str]:
@@ -75,26 +67,3 @@ def without(
     for name in names:
         at[index[name]] = values.get(name, 0.0)
     return at
-
-
-def reduced(name: str, point: Linearisation, told: float) -> tuple[float, float]:
-    """A timing effect's first unknown at the linearisation, and its least size, both as such.
-
-    Args:
-        name: of the effect.
-        point: what the unknown is counted from.
-        told: latency that the autopilot was told, s.
-
-    Returns:
-        What to add to the unknown for its whole size (s, or s^2 of averaging), and the size from
-        which it counts in the same unit.
-
-    Raises:
-        ValueError: that effect is no timing.
-    """
-    kind = nuisance_kinds()[name]
-    if kind.least is None:
-        raise ValueError(f"{name} has no least size")
-    unknown = kind.in_every_model[0]
-    least = kind.least**2 if unknown.endswith("_squared") else kind.least
-    return -kind.absent(point, told)[unknown], least

@@ -9,41 +9,23 @@ timing and residuals.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-import numpy as np
-
-from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.hypotheses import (
-    Choice,
-    choose,
-    doubtful,
-    reconsider_nuisance,
-)
+from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
-from onboard.core.diagnosis.limits import CONTRADICTING, LEAST_BLOCKS, RECONCILED, SUSPECT
-from onboard.core.diagnosis.nuisance_effects import (
-    Measured,
-    attitude_unknowns,
-    nuisance_effects,
-    nuisance_kinds,
-    reduced,
-    without,
-)
+from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
-from onboard.core.diagnosis.testability import unseen_share
-from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.gps_clock import fix_clock
-from onboard.core.estimate.solution import Solution, solve
+from onboard.core.estimate.limits import FEWEST_BLOCKS
+from onboard.core.estimate.solution import solve
 from onboard.core.inputs.segments import Batch
-from onboard.core.physics.effect import Effect, NuisanceFit, Origin
+from onboard.core.physics.effect import Effect, Origin
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -67,19 +49,10 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     flight = since_reboot(engine.batches) if latest else list(engine.batches)
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
-    full, testable = clear.full, clear.testable
-    full.doubting_attitude()
-    choice = _chosen(full, testable)
-    jumped = _with_jump(full, testable, choice)
-    if jumped is not None:
-        # Which change of the offset it is must not be decided by an attitude that it has tilted.
-        kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
-        other = _chosen(jumped[0].doubting(), jumped[1], kept)
-        if _wanders(choice) or _wanders(other):
-            full, testable, choice = *jumped, other
-    nuisances, doubts = _second_thoughts(choice, full, calibrator, imu)
+    full, choice = _selected(clear.full, clear.testable)
+    large, rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
-    if "gps_smoothing" in nuisances and "gps_smoothing" not in doubts:
+    if "gps_smoothing" in large and "gps_smoothing" not in rivals:
         families = [f.averaged() for f in families]
     final, families = settled(full, choice, families, named_only=clear.clipped)
     asked = not clear.clipped
@@ -87,7 +60,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     return Judge(
         calibrator,
         imu,
-        Evidence(full, choice, final, tuple(families), doubts, believed(flight), unused),
+        Evidence(full, choice, final, tuple(families), rivals, believed(flight), unused),
         origin,
         clear.absent,
         tuple(e for e in (clear.rail, clear.fault) if e is not None),
@@ -105,6 +78,20 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
     )
 
 
+def _selected(full: Examination, testable: Sequence[Effect]) -> tuple[Examination, Choice]:
+    """Effects by their scores, a jump among them if there is one; and the sums that say so."""
+    choice = _chosen(full, testable)
+    jumped = _with_jump(full, testable, choice)
+    if jumped is None:
+        return full, choice
+    # Which change of the offset it is must not be decided by an attitude that it has tilted.
+    kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
+    other = _chosen(jumped[0].doubting(), jumped[1], kept)
+    if _wanders(choice) or _wanders(other):
+        return jumped[0], other
+    return full, choice
+
+
 def _with_jump(
     full: Examination, testable: Sequence[Effect], choice: Choice
 ) -> tuple[Examination, list[Effect]] | None:
@@ -117,19 +104,14 @@ def _with_jump(
     steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
     fitter = Fitter(full.all_blocks, full.model, 1.0, full.absent)
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
-    if len(fitter.blocks) < LEAST_BLOCKS or not jumps:
+    if len(fitter.blocks) < FEWEST_BLOCKS or not jumps:
         return None
     boundary, gain = max(jumps, key=lambda x: x[1])
-    apart = full.found().variance_inflation
-    likely = _wanders(choice) or gain > SUSPECT
-    if not likely and apart < CONTRADICTING:
+    if not _wanders(choice) and surprise(gain, 3, len(jumps)) < least():
         return None
     everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
     made = Examination(full, everything, t0=full.point.skew_from, start=full)
-    if likely:
-        return made.tuned(), everything
-    agrees = made.with_noise().found().variance_inflation < RECONCILED * apart
-    return (made, everything) if agrees else None
+    return made.tuned(), everything
 
 
 def _wanders(choice: Choice) -> bool:
@@ -147,7 +129,7 @@ def _chosen(
     fitter = Fitter(full.all_blocks, full.model, solution.variance_inflation, full.absent)
     located = any(c.onset is not None for c in testable)
     jumps = [] if located else fitter.jumps(list(range(full.model.size)))
-    if jumps and len(fitter.blocks) >= LEAST_BLOCKS:
+    if jumps and len(fitter.blocks) >= FEWEST_BLOCKS:
         # Blocks that contradict each other because of a jump are no reason to doubt the jump.
         wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
         fitter.variance_inflation = min(
@@ -155,67 +137,5 @@ def _chosen(
         )
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    unseen = {name: unseen_share(full.batches, name) for c in testable for name in c.needs}
-    candidates = [
-        replace(candidate_of(full, c), unseen=max((unseen[name] for name in c.needs), default=0.0))
-        for c in testable
-    ]
-    index = full.model.index
-    errors = attitude_unknowns()
-    held = without(errors, index, full.point, full.absent, told=0.0)
-    gone = {index[c] for c in errors}
-    nothing = fitter.fit([i for i in base if i not in gone], held, held_out=False)
-    return choose(fitter, base, candidates, nothing, [c for c in candidates if c.columns in kept])
-
-
-def _second_thoughts(
-    choice: Choice, full: Examination, calibrator: Calibrator, imu: int
-) -> tuple[set[str], dict[str, list[str]]]:
-    """Timing and attitude errors that would be reported must be better than any other cause.
-
-    Returns:
-        Those that are large enough; of them, those beside which another effect could stand.
-    """
-    clock = fix_clock(calibrator.parameters, full.batches)
-    told = clock.configured_on_stamp
-    index = choice.fitter.model.index
-    nuisances: Measured = {}
-    unknowns = {name: kind.in_every_model for name, kind in nuisance_kinds().items()}
-    for _ in range(len(unknowns)):
-        fit = choice.fitter.fit(choice.free, held_out=False)
-        solution = Solution(
-            fit.theta,
-            fit.covariance,
-            choice.fitter.sums.N,
-            choice.fitter.variance_inflation,
-            1.0,
-            1.0,
-        )
-        nuisances = nuisance_effects(
-            NuisanceFit(
-                timing=timing_of(full, solution),
-                theta=solution.theta,
-                sigma=np.sqrt(np.diag(solution.covariance)),
-                index=index,
-                point=full.point,
-                parameters=calibrator.parameters,
-                imu=imu,
-                clock=clock,
-            )
-        )
-        taken = False
-        for name in nuisances:
-            target = Candidate(name, tuple(index[c] for c in unknowns[name]), ())
-            held = without(unknowns[name], index, full.point, choice.fitter.absent, told)
-            taken = taken or reconsider_nuisance(choice, target, held)
-        if not taken:
-            break
-    timed = [name for name in nuisances if nuisance_kinds()[name].least is not None]
-    return set(nuisances), {n: d for n in timed if (d := _doubts(choice, full, n, told))}
-
-
-def _doubts(choice: Choice, full: Examination, name: str, told: float) -> list[str]:
-    """Other effects beside which one of timing would be too small to mention."""
-    column = choice.fitter.model.index[nuisance_kinds()[name].in_every_model[0]]
-    start, least = reduced(name, full.point, told)
-    return doubtful(choice, lambda fit: start + float(fit.theta[column]), least)
+    candidates = [candidate_of(full, c) for c in testable]
+    return choose(fitter, base, candidates, [c for c in candidates if c.columns in kept])

@@ -17,9 +17,7 @@ from onboard.core.diagnosis.coasting import Contradiction, contradictions
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.faults import fault_effect
 from onboard.core.diagnosis.limits import (
-    FAR_OFF,
     FAULT_M_S,
-    FEWEST_REFUSED,
     MARGIN_S,
     OFF,
     SHORTEST_S,
@@ -88,7 +86,7 @@ def false_fixes(
     doubted = [r for r in refused(full.batches, calibrator.trust.refusals) if r.reason in OPINIONS]
     levels, least, jumped = _robust(full, full.found().theta)
     rejected = max(full.refused["velocity"], like.refused["velocity"])
-    if rejected < FEWEST_REFUSED and not jumped and not doubted:
+    if not rejected and not jumped and not doubted:
         return None, list(full.batches)
     contradicted = contradictions(full, levels, doubted)
     fault = fault_effect(
@@ -186,4 +184,4 @@ def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
     )
     spread = max(float(np.hypot(levels.velocity, levels.velocity_colour)), usual)
     least = max(FAULT_M_S, OFF * spread)
-    return levels, least, float(off.max()) > max(FAULT_M_S, FAR_OFF * usual)
+    return levels, least, float(off.max()) > max(FAULT_M_S, OFF * usual)

@@ -1,8 +1,8 @@
 """Physics without a name: products of measured signals, where the catalogue does not suffice.
 
 A product is taken when it explains a residual that is not noise, or when it explains *instead* of
-an effect of the catalogue far more than that one does: an effect that merely resembles what acts
-must not lend it its name.  The number of products that are tried is charged for.
+an effect of the catalogue clearly more than that one does: an effect that merely resembles what
+acts must not lend it its name.  The number of products that are tried is charged for.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 from onboard.core.diagnosis.candidates import Candidate, accepted
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.jumps import candidate_of
-from onboard.core.diagnosis.limits import FAR_BETTER, MARGIN, SUSPICIOUS
+from onboard.core.diagnosis.limits import CLEARLY, LOST
 from onboard.core.diagnosis.selection import Fitter
+from onboard.core.estimate.solution import by_chance
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.empirical import products
 
@@ -31,7 +32,8 @@ def searched(
         variance_inflation: factor by which evidence is weakened.
     """
     named = [f for f in families if f.onset is None]
-    if not named and final.found().variance_inflation < SUSPICIOUS:
+    contradicting = final.found().variance_inflation > by_chance(np.array(len(final.all_blocks)))
+    if not named and not contradicting:
         return list(families)
     terms = products(final.batches, Origin(final.point.skew_from))
     made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
@@ -39,22 +41,22 @@ def searched(
     fitter = Fitter(made.all_blocks, made.model, variance_inflation, made.absent)
     ours = set(made.indices_of([*families, *terms]))
     base = [i for i in range(made.model.size) if i not in ours]
-    spent = int(np.ceil(2.0 * np.log(len(terms)) / fitter.log_rows))
     offered = [
-        Candidate(t.effect, tuple(made.indices(t)), t.plausible, t, spent=spent) for t in terms
+        Candidate(t.effect, tuple(made.indices(t)), t.plausible, t, places=len(terms))
+        for t in terms
     ]
     kept = list(families)
     for family in named:
         rest = base + made.indices_of([f for f in kept if f is not family])
         own = candidate_of(made, family)
         before = fitter.fit(rest)
-        mine = own.bic(fitter, before, fitter.fit([*rest, *own.index], held_out=False))
+        mine = own.score(fitter, before, fitter.fit([*rest, *own.index], held_out=False))
         best = _best(fitter, rest, offered)
-        if best is not None and best[0] > max(mine + 2.0 * MARGIN, FAR_BETTER * mine):
+        if best is not None and best[0] > mine * (1.0 + LOST) + CLEARLY:
             kept = [f for f in kept if f is not family]
             if best[1] not in kept:
                 kept.append(best[1])
-    if final.found().variance_inflation >= SUSPICIOUS and kept == list(families):
+    if contradicting and kept == list(families):
         best = _best(fitter, base + made.indices_of(kept), offered)
         if best is not None:
             kept.append(best[1])
@@ -64,14 +66,14 @@ def searched(
 def _best(
     fitter: Fitter, rest: Sequence[int], offered: Sequence[Candidate]
 ) -> tuple[float, Effect] | None:
-    """The acceptable product with the most evidence: that, and its columns."""
+    """The acceptable product with the highest score: that, and its columns."""
     before = fitter.fit(rest)
     best: tuple[float, Effect] | None = None
     for c in offered:
         if c.columns is None or set(c.index) & set(rest):
             continue
         after = fitter.fit([*rest, *c.index])
-        bic = c.bic(fitter, before, after)
-        if accepted(fitter, before, after, c, bic) and (best is None or bic > best[0]):
-            best = bic, c.columns
+        score = c.score(fitter, before, after)
+        if accepted(fitter, before, after, c) and (best is None or score > best[0]):
+            best = score, c.columns
     return best

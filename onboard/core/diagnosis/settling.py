@@ -7,12 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.hypotheses import (
-    Choice,
-    reconciles,
-)
+from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.jumps import candidate_of
-from onboard.core.diagnosis.limits import FAIR, MARGIN
+from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import moved
@@ -24,19 +21,19 @@ def settled(
     full: Examination, choice: Choice, families: list[Effect], *, named_only: bool
 ) -> tuple[Examination, list[Effect]]:
     """The model that was chosen, until nothing in it is needless and nothing is left to find."""
-    final = _final(full, choice, families).doubting_attitude()
+    final = _final(full, choice, families)
     jumped = any(f.onset is not None for f in families)
     # Sizes that were chosen about nothing are not yet those that a jump, or a shape, leaves.
     if (jumped and any(f.in_proportion for f in families)) or any(f.shaped for f in families):
         found = final.found().theta
         families = _about_sizes([(f, found[final.indices(f)]) for f in families])
-        final = _again(full, families, final).with_rows().doubting_attitude()
+        final = _again(full, families, final).with_rows()
     # A jump may have passed for something slower, or the other way round.
     final, families = _pruned(full, families, final)
     inflation = choice.fitter.variance_inflation
     wider = families if named_only else searched(final, families, inflation)
     if wider != families:
-        final = _again(full, wider, final).with_noise().doubting_attitude()
+        final = _again(full, wider, final).with_noise()
         final, families = _pruned(full, wider, final)
     return final, families
 
@@ -48,7 +45,7 @@ def _pruned(
     kept = _needed(final, families)
     if len(kept) == len(families):
         return final, families
-    return _again(full, kept, final).with_rows().doubting_attitude(), kept
+    return _again(full, kept, final).with_rows(), kept
 
 
 def families_of(choice: Choice) -> list[Effect]:
@@ -92,7 +89,7 @@ def _again(full: Examination, families: Sequence[Effect], final: Examination) ->
 
 
 def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
-    """Families that stay significant when all of them are in one model."""
+    """Families that still count as found when all of them are in one model."""
     fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
     kept = list(families)
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
@@ -101,14 +98,14 @@ def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
         # What a needless jump makes of the offsets must not weaken what is said for the others.
         fitter.variance_inflation = fitter.variance_inflation_of(free)
         with_all = fitter.fit(free, held_out=False)
-        worst, least = None, np.inf
+        worst, lowest = None, np.inf
         for family in kept:
             c = candidate_of(made, family)
             rest = [i for i in free if i not in c.index]
-            bic = c.bic(fitter, fitter.fit(rest, held_out=False), with_all)
-            if bic < least and not (bic > FAIR and reconciles(fitter, rest, c.index)):
-                worst, least = family, bic
-        if least >= MARGIN:
+            score = c.score(fitter, fitter.fit(rest, held_out=False), with_all)
+            if score < lowest:
+                worst, lowest = family, score
+        if lowest >= least():
             break
         kept = [f for f in kept if f is not worst]
     return kept

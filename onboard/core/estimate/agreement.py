@@ -21,7 +21,7 @@ import numpy as np
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import STRANGER
 from onboard.core.estimate.saving import SavedEngine
-from onboard.core.estimate.solution import solve
+from onboard.core.estimate.solution import Solution, solve
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.chi_square import CHI_SQUARE_999
@@ -39,6 +39,13 @@ def agrees(engine: Engine, saved: SavedEngine) -> bool | None:
         return None
     if {p.sums.size for p in saved.blocks} != {engine.model.size}:
         return False
+    try:
+        return _agree(engine, found, saved)
+    except np.linalg.LinAlgError:  # sums that no flight can have made
+        return False
+
+
+def _agree(engine: Engine, found: Solution, saved: SavedEngine) -> bool | None:
     shift = engine.shift(saved.point, engine.point)
     then = solve([Block(p.start, p.end, p.sums.shifted(shift)) for p in saved.blocks], engine.model)
     apart = found.theta[:6] - then.theta[:6]

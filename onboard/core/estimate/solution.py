@@ -124,11 +124,11 @@ def _cluster_factor(
     ratio = found.sum(axis=0) / sum_expected
     # Blocks that say nothing of a number do not count for it (Satterthwaite 1946).
     blocks_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
-    beyond = ratio > _chance(blocks_that_count)
+    beyond = ratio > by_chance(blocks_that_count)
     return float(ratio[beyond].max() if beyond.any() else ratio.mean())
 
 
-def _chance(n: Array) -> Array:
+def by_chance(n: Array) -> Array:
     """What a mean of ``n`` squares of unit normals exceeds once in a thousand times.
 
     Source: Wilson and Hilferty (1931), the cube root of chi-square is nearly normal.

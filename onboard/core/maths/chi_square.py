@@ -20,10 +20,21 @@ def survival(x: float, dof: int) -> float:
     a, z = 0.5 * dof, 0.5 * x
     if not z > 0.0:
         return 1.0 if z <= 0.0 else float("nan")
-    log_front = a * math.log(z) - z - math.lgamma(a)
     if z < a + 1.0:
-        return 1.0 - math.exp(log_front) * _lower_series(a, z)
-    return math.exp(log_front) * _upper_fraction(a, z) if log_front > -745.0 else 0.0
+        return 1.0 - math.exp(_log_front(a, z)) * _lower_series(a, z)
+    return math.exp(log_survival(x, dof))
+
+
+def log_survival(x: float, dof: int) -> float:
+    """Natural logarithm of :func:`survival`, which is smaller than any number far out."""
+    a, z = 0.5 * dof, 0.5 * x
+    if not z >= a + 1.0:
+        return math.log(survival(x, dof))
+    return _log_front(a, z) + math.log(_upper_fraction(a, z))
+
+
+def _log_front(a: float, z: float) -> float:
+    return a * math.log(z) - z - math.lgamma(a)
 
 
 def _lower_series(a: float, z: float) -> float:

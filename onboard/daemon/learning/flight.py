@@ -131,7 +131,7 @@ def decode(data: bytes) -> JudgedFlight | None:
     """From the disk: nothing flown since; None if another version wrote it differently."""
     try:
         flight = msgspec.msgpack.decode(data, type=JudgedFlight)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, ValueError, RecursionError):
         return None
     told = {
         imu: replace(judged, diagnosed=replace(judged.diagnosed, resumed=True))

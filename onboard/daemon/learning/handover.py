@@ -17,6 +17,7 @@ from onboard.daemon.view.notices import Notices
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
+from onboard.mavlink.limits import PARAMETERS_MAX
 from onboard.mavlink.repetitions import Repetitions
 from onboard.outage import Outage
 
@@ -55,6 +56,7 @@ class Handover:
         clock: monotonic time, s.
         wall_clock: Unix time, s.
         save_every_s: how often sums go to disk.
+        needed: parameters that are taken however many others were told.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Handover:
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
         save_every_s: float,
+        needed: frozenset[str] = frozenset(),
     ) -> None:
         self.decoder = Decoder()
         self.repetitions = Repetitions()
@@ -78,6 +81,8 @@ class Handover:
         self._clock = clock
         self._wall_clock = wall_clock
         self._save_every_s = save_every_s
+        self._needed = needed
+        self._told: set[str] = set()
         self._next_save = 0.0
         self._samples: list[Sample] = []
         self._before_gap: list[Sample] | None = None
@@ -96,7 +101,7 @@ class Handover:
 
     def take(self, message: Message) -> tuple[Sample, ...]:
         """Decode a message of the autopilot and put its samples into the next batch."""
-        samples = self._consistent(self.decoder.decode(message))
+        samples = self._consistent(self._plausible(self.decoder.decode(message)))
         if samples and self._arrived is None:
             self._arrived = self._clock()
         self._samples += samples
@@ -125,6 +130,16 @@ class Handover:
         return learned.trust.trusted_s > 0.0 or (
             learned.flight is not None and learned.flight.current
         )
+
+    def _plausible(self, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+        """Without parameters beyond what any firmware has: everything that is told is kept."""
+        for sample in samples:
+            if type(sample) is ParameterValue and sample.name not in self._told:
+                if len(self._told) >= PARAMETERS_MAX and sample.name not in self._needed:
+                    self.counters["parameters_ignored"] += 1
+                    return ()
+                self._told.add(sample.name)
+        return samples
 
     @property
     def identified(self) -> bool:

@@ -20,6 +20,8 @@ import msgspec
 from onboard.errors import StateError
 
 SCHEMA = 2
+LARGEST = 64_000_000
+"""bytes; the sums of a flight have some hundred thousand."""
 
 
 class Saved(msgspec.Struct, frozen=True, kw_only=True):
@@ -63,12 +65,15 @@ class Store:
         """
         path = self.path(system_id, board)
         try:
+            if path.stat().st_size > LARGEST:
+                aside = self.set_aside(system_id, board)
+                raise StateError(f"{path}: larger than sums can be, set aside as {aside}")
             saved = msgspec.msgpack.decode(path.read_bytes(), type=Saved)
         except FileNotFoundError:
             return None
         except OSError as error:
             raise StateError(f"{path}: {error.strerror}") from None
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        except (msgspec.DecodeError, ValueError, RecursionError):
             raise StateError(
                 f"{path}: damaged, set aside as {self.set_aside(system_id, board)}"
             ) from None

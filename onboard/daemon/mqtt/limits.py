@@ -19,8 +19,10 @@ BACKOFF_CAP_S: Final = 60.0
 """s; ceiling of every wait: nothing hangs on a broker, and many vehicles may share it [tuned]."""
 STABLE_S: Final = 10.0
 """s; a connection that held this long starts the back-off from the beginning [tuned]."""
-FAREWELL_S: Final = 2.0
-"""s for what waits and for the last word at shutdown [service: inside TimeoutStopSec]."""
+FAREWELL_S: Final = 1.0
+"""s for what waits and for the last word at shutdown [service: a stop takes two seconds]."""
+HANG_UP_S: Final = 0.2
+"""s; a broker that has not taken the rest by then gets as long for each further step [tuned]."""
 
 # What waits
 

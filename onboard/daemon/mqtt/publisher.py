@@ -22,7 +22,8 @@ from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.outbox import Outbox, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
 from onboard.daemon.mqtt.tls import tls_context
-from onboard.daemon.setup.configuration import MqttSettings, read_secret
+from onboard.daemon.setup.configuration import MqttSettings
+from onboard.daemon.setup.secret_files import read_secret
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import JournalLine, Snapshot
 from onboard.mavlink.connection import Backoff
@@ -89,6 +90,7 @@ class Publisher:
         self._outage = Outage(limits.STABLE_S)
         self._refused = False
         self._closing = asyncio.Event()
+        self._hurried = False
         self._diagnosed = False
         self._task: asyncio.Task[None] | None = None
 
@@ -163,6 +165,7 @@ class Publisher:
             return
         await asyncio.wait((task,), timeout=limits.FAREWELL_S)
         if not task.done():
+            self._hurried = True
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 
@@ -187,27 +190,35 @@ class Publisher:
             max_queued_incoming_messages=limits.COMMANDS_WAITING,
         )
         async with client:
-            if settings.commands:
-                await self._subscribe(client)
-            self._outbox.connected()
-            await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
-            self.counters["mqtt_connects"] += 1
-            self.connected = True
-            if self._outage.since is None:
-                self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
-            self._outage.works(self._clock())
             try:
-                await self._speak(client)
+                await self._talk(client)
             finally:
-                # Leaving in good order keeps the broker from publishing the last will.
-                with contextlib.suppress(aiomqtt.MqttError):
-                    await client.publish(
-                        self._topic("availability"),
-                        OFFLINE,
-                        qos=1,
-                        retain=True,
-                        timeout=limits.FAREWELL_S,
-                    )
+                if self._closing.is_set():  # the library disconnects with this patience
+                    client.timeout = limits.HANG_UP_S
+
+    async def _talk(self, client: aiomqtt.Client) -> None:
+        """What is said from the first word to the last."""
+        if self._settings.commands:
+            await self._subscribe(client)
+        self._outbox.connected()
+        await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
+        self.counters["mqtt_connects"] += 1
+        self.connected = True
+        if self._outage.since is None:
+            self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
+        self._outage.works(self._clock())
+        try:
+            await self._speak(client)
+        finally:
+            # Leaving in good order keeps the broker from publishing the last will.
+            with contextlib.suppress(aiomqtt.MqttError):
+                await client.publish(
+                    self._topic("availability"),
+                    OFFLINE,
+                    qos=1,
+                    retain=True,
+                    timeout=limits.HANG_UP_S if self._hurried else limits.FAREWELL_S,
+                )
 
     async def _speak(self, client: aiomqtt.Client) -> None:
         """Send and listen, which also notices at once that the broker has gone."""

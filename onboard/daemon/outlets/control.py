@@ -27,6 +27,7 @@ import ipaddress
 import logging
 import re
 import socket
+from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -36,14 +37,22 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from msgspec import Meta
 
 from onboard.daemon.outlets import limits
+from onboard.daemon.outlets.acceptor import Acceptor
 from onboard.daemon.view.actions import Actions
 from onboard.errors import OnboardError, RefusedError
 
 logger = logging.getLogger(__name__)
+library = logging.getLogger("onboard.daemon.outlets.library")
+library.setLevel(logging.CRITICAL)
+"""The library's own log has a traceback for every request that is none; faults of ours are told by
+:func:`_errors_as_json`."""
 
 
 Page = Callable[[web.Application], None]
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+_HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[^\[\]:]*))(?::\d*)?")
 
 
 class Request(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -86,14 +95,21 @@ class Live:
 
 
 class ControlServer:
-    """HTTP server; ``pages`` add further handlers to the same application."""
+    """HTTP server; ``pages`` add further handlers, ``counters`` get what happens to connections."""
 
     def __init__(
-        self, actions: Actions, *, token: str | None = None, pages: Iterable[Page] = ()
+        self,
+        actions: Actions,
+        *,
+        token: str | None = None,
+        pages: Iterable[Page] = (),
+        counters: Counter[str] | None = None,
     ) -> None:
+        self._counters: Counter[str] = Counter() if counters is None else counters
         self._actions = actions
         self._token = token
         self._runner: web.AppRunner | None = None
+        self._acceptor: Acceptor | None = None
         self.live = Live()
         self.application = web.Application(
             middlewares=[_errors_as_json, self._guard], client_max_size=limits.BODY_MAX
@@ -112,13 +128,25 @@ class ControlServer:
 
     async def start(self, listening: socket.socket) -> None:
         """Serve on a socket that listens already; closing it is its owner's."""
-        runner = web.AppRunner(self.application, access_log=None, shutdown_timeout=2.0)
+        runner = web.AppRunner(
+            self.application,
+            access_log=None,
+            logger=library,
+            keepalive_timeout=limits.KEEP_ALIVE_S,
+            shutdown_timeout=limits.SHUTDOWN_S,
+        )
         await runner.setup()
-        await web.SockSite(runner, listening).start()
+        if runner.server is None:
+            raise RuntimeError("the HTTP library has made no server")
         self._runner = runner
+        self._acceptor = Acceptor(listening, runner.server, self._counters)
+        self._acceptor.start()
 
     async def stop(self) -> None:
         """Close all connections and the port."""
+        if self._acceptor is not None:
+            self._acceptor.close()
+            self._acceptor = None
         if self._runner is not None:
             self.live.publish(None)
             await self._runner.cleanup()
@@ -132,8 +160,12 @@ class ControlServer:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse foreign pages, foreign host names and, for changes, a wrong token."""
+        if self._acceptor is not None:
+            self._acceptor.asked(request.transport)
+        if not all(_is_text(value) for _, value in request.raw_headers):
+            raise web.HTTPBadRequest(text="a header is not UTF-8")
         origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != request.host:
+        if origin is not None and _place(origin) != request.host:
             raise web.HTTPForbidden(text=f"requests from {origin} are not accepted")
         if self._token is None and not _names_loopback(request.host):
             raise web.HTTPForbidden(text=f"host {request.host} is not this machine's loopback")
@@ -157,7 +189,12 @@ class ControlServer:
         if self.live.viewers >= limits.VIEWERS_MAX:
             raise web.HTTPServiceUnavailable(text=f"{limits.VIEWERS_MAX} viewers already")
         viewer = web.WebSocketResponse(heartbeat=20.0, max_msg_size=1024)
-        await viewer.prepare(request)
+        try:
+            await viewer.prepare(request)
+        except ValueError:
+            raise web.HTTPBadRequest(text="not a WebSocket's handshake") from None
+        if self._acceptor is not None:
+            self._acceptor.asked(request.transport, stays=True)
         self.live.viewers += 1
         sender = asyncio.create_task(self._feed(viewer), name="live viewer")
         try:
@@ -185,12 +222,20 @@ async def _send(viewer: web.WebSocketResponse, document: bytes) -> None:
         await viewer.send_str(document.decode())
 
 
+async def _body(request: web.Request) -> bytes:
+    """The body; an empty one is an empty document."""
+    try:
+        async with asyncio.timeout(limits.BODY_S):
+            return await request.read() or b"{}"
+    except TimeoutError:
+        raise web.HTTPRequestTimeout(text="the body did not come") from None
+
+
 def _acting(action: Callable[[tuple[int, ...]], Awaitable[str]]) -> Handler:
     """A POST handler around one action."""
 
     async def handle(request: web.Request) -> web.Response:
-        body = await request.read()
-        wanted = msgspec.json.decode(body or b"{}", type=Request)
+        wanted = msgspec.json.decode(await _body(request), type=Request)
         return _json(200, {"done": await action(wanted.imus)})
 
     return handle
@@ -200,8 +245,7 @@ def _approving(actions: Actions) -> Handler:
     """The POST handler of approvals."""
 
     async def handle(request: web.Request) -> web.Response:
-        body = await request.read()
-        wanted = msgspec.json.decode(body or b"{}", type=Approval)
+        wanted = msgspec.json.decode(await _body(request), type=Approval)
         done = await actions.approve(wanted.imus, despite_diagnosis=wanted.despite_diagnosis)
         return _json(200, {"done": done})
 
@@ -220,7 +264,7 @@ async def _errors_as_json(request: web.Request, handler: Handler) -> web.StreamR
             if name in {"Allow", "WWW-Authenticate"}
         }
         return _error(error.status, error.text or error.reason, headers=headers)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         unknown = re.search(r"unknown field `([^`]*)`", str(error))
         place = re.search(r"`\$\.?([^`]*)`", str(error))
         field = unknown or place
@@ -229,6 +273,8 @@ async def _errors_as_json(request: web.Request, handler: Handler) -> web.StreamR
         return _error(409, str(error))
     except OnboardError as error:
         return _error(500, str(error))
+    except ConnectionError:
+        raise  # whoever asked has gone before the answer: the library lets it rest
     except Exception:
         logger.exception("request %s %s failed", request.method, request.path)
         return _error(500, "internal error; the service's log has it")
@@ -259,10 +305,29 @@ def _token_matches(request: web.Request, token: str) -> bool:
     return scheme.lower() == "bearer" and hmac.compare_digest(given.encode(), token.encode())
 
 
+def _place(origin: str) -> str | None:
+    """Host and port of an origin; None if it is none."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:  # a bracket that is not closed
+        return None
+
+
+def _is_text(header: bytes) -> bool:
+    try:
+        header.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
 def _names_loopback(host: str) -> bool:
     """Whether a Host header names this machine itself (a rebound name does not)."""
-    name = urlsplit(f"//{host}").hostname or ""
-    if name == "localhost":
+    found = _HOST.fullmatch(host)
+    if found is None:
+        return False
+    name = found["name"] or found["six"] or ""
+    if name.lower() == "localhost":
         return True
     try:
         return ipaddress.ip_address(name).is_loopback

@@ -9,15 +9,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib
+import logging
 import socket
+from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from onboard.daemon.outlets import limits
 from onboard.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from onboard.daemon.outlets.control import ControlServer, Page
     from onboard.daemon.view.actions import Actions
+
+logger = logging.getLogger(__name__)
 
 ANY_ADDRESS = frozenset({"0.0.0.0", "::"})  # noqa: S104 - compared with, not bound to
 
@@ -26,7 +31,8 @@ class Door:
     """Listens; hands the socket to a :class:`~.control.ControlServer` when needed.
 
     ``pages`` add handlers to the application when it is made; one that imports what it needs only
-    when it is called keeps that out of memory until then.
+    when it is called keeps that out of memory until then.  ``counters`` get what happens to
+    connections.
     """
 
     def __init__(
@@ -37,7 +43,9 @@ class Door:
         port: int,
         token: str | None,
         pages: Iterable[Page] = (),
+        counters: Counter[str] | None = None,
     ) -> None:
+        self._counters = counters
         self._actions = actions
         self._address = address
         self._port = port
@@ -95,9 +103,17 @@ class Door:
             self._opening = asyncio.create_task(self._open(self._socket), name="open the door")
 
     async def _open(self, listening: socket.socket) -> None:
+        try:
+            await self._serve(listening)
+        except OSError as error:  # no descriptor left, say: the next who knocks tries again
+            logger.warning("the page cannot be served yet: %s", error.strerror or error)
+            await asyncio.sleep(limits.ACCEPT_RETRY_S)
+            asyncio.get_running_loop().add_reader(listening, self._knock)
+
+    async def _serve(self, listening: socket.socket) -> None:
         control = await asyncio.to_thread(importlib.import_module, "onboard.daemon.outlets.control")
         server: ControlServer = control.ControlServer(
-            self._actions, token=self._token, pages=self._pages
+            self._actions, token=self._token, pages=self._pages, counters=self._counters
         )
         await server.start(listening)
         self._server = server

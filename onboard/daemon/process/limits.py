@@ -15,6 +15,10 @@ FINISH_PUSH_S: Final = 8.0
 with SAVE_S and the broker's farewell inside TimeoutStopSec]."""
 SAVE_S: Final = 5.0
 """s that the learner gets at shutdown for what has come and its last save [service: as before]."""
+STALL_S: Final = 0.05
+"""s; a turn of the loop that takes longer is counted: half the link's tick [tuned]."""
+STALL_TOLD_S: Final = 60.0
+"""s between two lines in the log about that [tuned]."""
 STALE_S: Final = 5.0
 """s; a flag not repeated for so long says nothing about now [data: five HEARTBEATs]."""
 CONTRADICTION_S: Final = 1.2

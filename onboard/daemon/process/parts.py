@@ -15,7 +15,7 @@ from onboard.daemon.process.signing_file import SigningFile
 from onboard.daemon.process.situation import Situation
 from onboard.daemon.process.vigilance import Vigilance
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.parameters import ParameterWatch
+from onboard.daemon.pushing.parameters import NEEDED, ParameterWatch
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.pusher import Pusher
 from onboard.daemon.pushing.witness import Witness
@@ -160,4 +160,5 @@ def _handover(
         clock=clock,
         wall_clock=wall_clock,
         save_every_s=configuration.estimator.save_every_s,
+        needed=NEEDED,
     )

@@ -11,6 +11,7 @@ from onboard.daemon.outlets.outlets import Outlets
 from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Life
 from onboard.daemon.process.parts import Parts
+from onboard.daemon.process.turns import Turns
 from onboard.daemon.view.accelerometers import imu_view
 from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.link_health import link_view
@@ -28,6 +29,7 @@ class Portrait:
     parts: Parts
     outlets: Outlets
     life: Life
+    turns: Turns
     wall_clock: Callable[[], float]
 
     def snapshot(self, now: float, *, uptime_s: float) -> Snapshot:
@@ -114,6 +116,8 @@ class Portrait:
             total.update(self.parts.handover.learned.counters)
         refused = self.parts.handover.decoder.refused
         total.update({f"refused {name}": count for name, count in refused.items()})
+        total["loop_stalls"] = self.turns.stalls
+        total["loop_stall_worst_ms"] = round(self.turns.worst_s * 1e3)
         total["journal_damaged"] = self.parts.journal.damaged
         if self.parts.recorder is not None:
             total["recorded_frames"] = self.parts.recorder.frames

@@ -26,7 +26,9 @@ from onboard.daemon.process.interrupts import stop_signals
 from onboard.daemon.process.notify import Notifier
 from onboard.daemon.process.parts import Parts
 from onboard.daemon.process.portrait import Portrait
-from onboard.daemon.setup.configuration import Configuration, read_secret
+from onboard.daemon.process.turns import turns_here
+from onboard.daemon.setup import settings
+from onboard.daemon.setup.configuration import Configuration
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import OnboardError
 from onboard.mavlink.decode import Decoder, is_armed, is_autopilot
@@ -68,7 +70,9 @@ class Service:
         self._life = Life()
         self.contact = Contact(self.parts, self._life)
         self._outlets = Outlets(configuration, self, self.notices, clock=clock)
-        self._portrait = Portrait(self.parts, self._outlets, self._life, wall_clock)
+        self._turns = turns_here()
+        self._stalls_told, self._tell_stalls_at = 0, 0.0
+        self._portrait = Portrait(self.parts, self._outlets, self._life, self._turns, wall_clock)
         self._notifier = Notifier.from_environment()
         self._pages = tuple(pages)
         self._clock = clock
@@ -156,6 +160,7 @@ class Service:
         self.contact.look_around(now)
         parts.pusher.judge(parts.witness.report(condition, now))
         self.handover.tell_of_lag(now)
+        self._tell_of_stalls(now)
         learned = self.handover.learned
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
@@ -174,6 +179,18 @@ class Service:
         self._outlets.publish()
         if self.handover.keeps_up(now):
             self._notifier.send(WATCHDOG="1", STATUS=self._portrait.sentence(self._clock()))
+
+    def _tell_of_stalls(self, now: float) -> None:
+        """In the log, now and then: nobody but a programmer can do anything about it."""
+        stalls = self._turns.stalls
+        if stalls > self._stalls_told and now >= self._tell_stalls_at:
+            self._stalls_told, self._tell_stalls_at = stalls, now + limits.STALL_TOLD_S
+            logger.warning(
+                "the loop was away for more than %.0f ms %d times since the start, %.0f ms at most",
+                limits.STALL_S * 1e3,
+                stalls,
+                self._turns.worst_s * 1e3,
+            )
 
     def _on_learned(self, learned: Learned) -> None:
         if learned.flown:
@@ -265,11 +282,16 @@ class Service:
 
     def _make_server(self) -> Door:
         http = self.configuration.http
-        token = http.token
-        if http.token_file is not None:
-            token = read_secret(http.token_file, key="[http] token_file")
+        token = settings.http_token(http)
         pages = (status_page, self._outlets.history.page, *self._pages)
-        return Door(self, address=http.address, port=http.port, token=token, pages=pages)
+        return Door(
+            self,
+            address=http.address,
+            port=http.port,
+            token=token,
+            pages=pages,
+            counters=self._life.counters,
+        )
 
 
 def _first(failures: BaseExceptionGroup[OnboardError]) -> OnboardError:

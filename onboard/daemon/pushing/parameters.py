@@ -50,6 +50,7 @@ KNOWLEDGE = (
     "PTCH_TRIM_DEG",
 )
 """Good to have, in a recording too; under one of two names, by version; the last two of planes."""
+NEEDED = frozenset((*REQUIRED, *MEANING, *KNOWLEDGE))
 
 
 class ParameterWatch:

@@ -19,8 +19,14 @@ from msgspec import Meta
 from onboard.errors import ConfigurationError
 from onboard.push.limits import LEAST_DISARMED_S
 
-Positive = Annotated[float, Meta(gt=0.0)]
-NotNegative = Annotated[float, Meta(ge=0.0)]
+LARGEST = 1e9
+"""No setting is larger; infinity is none."""
+LONGEST_FILE = 65536
+"""bytes; the sample, which shows every key, has 3500."""
+LONGEST_LINE = 4096
+"""Characters; dotted keys as long as a file take the parser minutes."""
+Positive = Annotated[float, Meta(gt=0.0, le=LARGEST)]
+NotNegative = Annotated[float, Meta(ge=0.0, le=LARGEST)]
 Rate = Annotated[float, Meta(ge=0.0, le=1000.0)]
 Port = Annotated[int, Meta(ge=0, le=65535)]
 SystemId = Annotated[int, Meta(ge=1, le=255)]
@@ -30,6 +36,15 @@ Text = Annotated[str, Meta(min_length=1)]
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of all sections."""
+
+
+def is_host(text: str) -> bool:
+    """Whether the system can be asked for a host of this name (an empty one is for all)."""
+    try:
+        text.encode("idna")
+    except UnicodeError:
+        return False
+    return True
 
 
 class RatesSettings(Section, frozen=True, kw_only=True):
@@ -97,7 +112,7 @@ class EstimatorSettings(Section, frozen=True, kw_only=True):
     hdop_max: Positive = 2.5
     speed_accuracy_max: Positive = 1.5
     buffer_s: Annotated[float, Meta(ge=60.0, le=3600.0)] = 300.0
-    memory_s: Annotated[float, Meta(ge=60.0)] = 1800.0
+    memory_s: Annotated[float, Meta(ge=60.0, le=LARGEST)] = 1800.0
     save_every_s: Positive = 60.0
 
 
@@ -123,7 +138,7 @@ class RecordingSettings(Section, frozen=True, kw_only=True):
 
     enabled: bool = False
     directory: Text | None = None
-    keep_files: Annotated[int, Meta(ge=1)] = 20
+    keep_files: Annotated[int, Meta(ge=1, le=1_000_000)] = 20
     file_size_mb: Positive = 100.0
 
 
@@ -140,6 +155,10 @@ class HttpSettings(Section, frozen=True, kw_only=True):
         """Refuse what would leave the autopilot's parameters open to a network."""
         if self.token is not None and self.token_file is not None:
             raise ValueError("token and token_file exclude each other")
+        if not is_host(self.address):
+            raise ValueError(f"address {self.address} is no address or name of this machine")
+        if self.token is not None and not self.token.strip():
+            raise ValueError("token is blank")
         if self.enabled and not self.loopback and self.token is None and self.token_file is None:
             raise ValueError(
                 f"address {self.address} is not loopback: give a token or a token_file, "
@@ -182,7 +201,7 @@ class MqttSettings(Section, frozen=True, kw_only=True):
     port: Port = 1883
     prefix: Text | None = None
     commands: bool = False
-    state_interval_s: Annotated[float, Meta(ge=0.1)] = 2.0
+    state_interval_s: Annotated[float, Meta(ge=0.1, le=LARGEST)] = 2.0
     client_id: Text | None = None
     username: Text | None = None
     password_file: Text | None = None
@@ -232,13 +251,29 @@ def read(path: Path) -> dict[str, Any]:
         ConfigurationError: it cannot be read or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            data = file.read(LONGEST_FILE + 1)
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror or error}") from None
+    except ValueError:  # a NUL in the path itself
+        raise ConfigurationError(f"{str(path)!r}: not a file name") from None
+    if len(data) > LONGEST_FILE:
+        raise ConfigurationError(f"{path}: longer than {LONGEST_FILE} bytes")
+    for number, line in enumerate(data.split(b"\n"), start=1):
+        if len(line) > LONGEST_LINE:
+            raise ConfigurationError(
+                f"{path}: line {number} is longer than {LONGEST_LINE} characters"
+            )
+    try:
+        return tomllib.loads(data.decode("utf-8"))
     except UnicodeDecodeError as error:
         raise ConfigurationError(f"{path}: not UTF-8 text at byte {error.start}") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigurationError(f"{path}: not TOML that is meant: nested too deep") from None
+    except ValueError:  # Python's limit on the digits of an integer
+        raise ConfigurationError(f"{path}: a number with too many digits") from None
 
 
 def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:
@@ -248,25 +283,27 @@ def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:
         ConfigurationError: a wrong key or value, named by its path.
     """
     try:
-        return msgspec.convert(document, Configuration)
+        chosen = msgspec.convert(document, Configuration)
     except msgspec.ValidationError as error:
         raise ConfigurationError(f"{source}: {_explain(str(error))}") from None
+    _refuse_control_characters(chosen, source)
+    return chosen
 
 
-def read_secret(path: str, *, key: str) -> str:
-    """First line of a secret's own file.
-
-    Raises:
-        ConfigurationError: it cannot be read or is empty; ``key`` is named.
-    """
-    try:
-        lines = Path(path).expanduser().read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ConfigurationError(f"{path} ({key}): {reason}") from None
-    if not lines or not lines[0].strip():
-        raise ConfigurationError(f"{path} ({key}): empty")
-    return lines[0].strip()
+def _refuse_control_characters(chosen: Configuration, source: str) -> None:
+    """A NUL ends a path for the system, and a line break one in the log."""
+    tables: list[tuple[str, msgspec.Struct]] = [("", chosen)]
+    while tables:
+        place, table = tables.pop()
+        for name in table.__struct_fields__:
+            value = getattr(table, name)
+            if isinstance(value, msgspec.Struct):
+                tables.append((f"{place}.{name}".lstrip("."), value))
+            for text in value if isinstance(value, tuple) else (value,):
+                if isinstance(text, str) and not text.isprintable():
+                    raise ConfigurationError(
+                        f"{source}: [{place}] {name}: a character that is not printable"
+                    )
 
 
 def _explain(message: str) -> str:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.limits import TrustLimits
-from onboard.daemon.setup import configuration
+from onboard.daemon.setup import configuration, secret_files
 from onboard.daemon.setup.recording import RollingRecorder
+from onboard.errors import ConfigurationError
 from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.signing import Signing, SigningRecord
@@ -69,7 +70,11 @@ def endpoints(link: configuration.LinkSettings) -> tuple[Endpoint, ...]:
     Raises:
         ConfigurationError: one of them is not understood.
     """
-    return tuple(Endpoint.parse(text) for text in link.endpoints)
+    parsed = tuple(Endpoint.parse(text) for text in link.endpoints)
+    for endpoint in parsed:
+        if not configuration.is_host(endpoint.host):
+            raise ConfigurationError(f"endpoint {endpoint}: {endpoint.host!r} is no host's name")
+    return parsed
 
 
 def signing(
@@ -89,8 +94,19 @@ def signing(
     """
     if link.signing_key_file is None:
         return None
-    secret = configuration.read_secret(link.signing_key_file, key="[link] signing_key_file")
+    secret = secret_files.read_secret(link.signing_key_file, key="[link] signing_key_file")
     return Signing.from_passphrase(secret, wall_clock, record)
+
+
+def http_token(http: configuration.HttpSettings) -> str | None:
+    """[http] token or token_file; None if neither is given.
+
+    Raises:
+        ConfigurationError: the file cannot be used.
+    """
+    if http.token_file is None:
+        return http.token
+    return secret_files.read_secret(http.token_file, key="[http] token_file")
 
 
 def recorder(

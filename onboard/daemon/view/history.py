@@ -28,6 +28,8 @@ logger = logging.getLogger(__name__)
 
 SCHEMA = "onboard.history/1"
 ROWS_MAX = 300
+LARGEST = 4_000_000
+"""bytes; rows of five accelerometers have some hundred thousand."""
 SAVE_S = 300.0
 """Between two writes to the disk; SD cards wear."""
 BACK_S = 1.0
@@ -223,9 +225,12 @@ class History:
         application.router.add_get("/api/history", history)
 
     def _load(self, system_id: int) -> Kept:
+        path = self._path(system_id)
         try:
-            kept = msgspec.msgpack.decode(self._path(system_id).read_bytes(), type=Kept)
-        except (OSError, msgspec.DecodeError):
+            if path.stat().st_size > LARGEST:
+                return Kept()
+            kept = msgspec.msgpack.decode(path.read_bytes(), type=Kept)
+        except (OSError, msgspec.DecodeError, ValueError, RecursionError):
             return Kept()
         return kept if kept.schema == SCHEMA else Kept()
 

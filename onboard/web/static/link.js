@@ -6,7 +6,7 @@ import { clockTime, fixed, plain, vehicleInWords } from "./words.js";
 const ABSENT = ["unsupported", "silent"];
 const SLOW = 0.7; // of the rate that was granted
 
-export function showLink(link) {
+export function showLink(link, counters = {}) {
   const { frames = 0, lost = 0, bad_frames: damaged = 0, reboots = 0 } = link.counters;
   const share = frames + lost > 0 ? (100 * lost) / (frames + lost) : 0;
   const facts = [
@@ -16,6 +16,7 @@ export function showLink(link) {
     ["Signed", link.signed ? "yes" : "no"],
     ...(link.warnings ?? []).map((text) => ["Warning", text]),
     ...(reboots ? [["Reboots", String(reboots)]] : []),
+    ...(counters.loop_stalls ? [["Stalls", `${counters.loop_stalls}, ${counters.loop_stall_worst_ms} ms at most`]] : []),
   ];
   const rates = Object.entries(link.messages)
     .map(([name, rate]) => [name, rate.rate_hz, rate.granted_hz ?? rate.wanted_hz, rate.stream])

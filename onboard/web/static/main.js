@@ -28,7 +28,7 @@ function showSnapshot(snapshot) {
   push.show(snapshot.push, snapshot.imus, snapshot.parameters);
   showDiagnosis(snapshot.diagnosis, snapshot.push);
   showJournal(snapshot.journal, snapshot.notices);
-  showLink(snapshot.link);
+  showLink(snapshot.link, snapshot.counters);
   showHeader(snapshot);
 }
 

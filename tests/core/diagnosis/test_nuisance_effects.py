@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.nuisance_effects import (
-    attitude_unknowns,
     constant_unknowns,
     nuisance_effects,
     nuisance_kinds,
-    reduced,
     timing_unknowns,
     without,
 )
@@ -83,7 +81,6 @@ LEAST = {
 def test_these_are_all():
     assert set(nuisance_kinds()) == {*LEAST, "mount_tilt"}
     assert sorted(timing_unknowns()) == ["attitude_delay", "gps_delay", "window_squared"]
-    assert sorted(attitude_unknowns()) == ["attitude_delay", "heading", "tilt_pitch", "tilt_roll"]
     assert sorted(constant_unknowns()) == ["heading", "tilt_pitch", "tilt_roll"]
     every = {u for kind in nuisance_kinds().values() for u in kind.in_every_model}
     assert every == {*timing_unknowns(), *constant_unknowns()}
@@ -202,33 +199,3 @@ def test_other_columns_are_absent_at_zero():
     index = INDEX | {"extra": len(UNKNOWNS)}
     at = without(["extra"], index, POINT, np.ones(len(index)), TOLD)
     assert at[-1] == 0.0
-
-
-# -- sizes of timing effects in the unknown's own unit ----------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "unknown", "whole"),
-    [
-        ("gps_latency", "gps_delay", POINT.delay - TOLD),
-        ("gps_smoothing", "window_squared", POINT.window**2),
-        ("imu_delay", "attitude_delay", POINT.attitude_delay),
-    ],
-)
-def test_a_timing_effect_is_reduced_to_its_unknown(name, unknown, whole):
-    add, least = reduced(name, POINT, TOLD)
-    assert add == pytest.approx(whole)
-    # At its absent value the whole size is nothing.
-    at = without([unknown], INDEX, POINT, np.zeros(len(UNKNOWNS)), TOLD)
-    assert at[INDEX[unknown]] + add == pytest.approx(0.0, abs=1e-15)
-    # The least size as such is where the catalogue begins to report it.
-    size = least if name != "gps_smoothing" else np.sqrt(least)
-    number, _, centre = LEAST[name]
-    assert found(**{number: (centre + 0.999 * size, SURELY)}) == {}
-    assert set(found(**{number: (centre + 1.001 * size, SURELY)})) == {name}
-
-
-@pytest.mark.parametrize("name", ["heading_error", "mount_tilt"])
-def test_what_is_no_timing_has_no_least_size(name):
-    with pytest.raises(ValueError, match=name):
-        reduced(name, POINT, TOLD)

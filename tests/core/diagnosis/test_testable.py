@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis import testability
-from onboard.core.diagnosis.limits import LEAST_SPREAD
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from tests.core.diagnosis.flights import batches, resting
@@ -50,20 +49,19 @@ def test_a_signal_that_is_missing_takes_its_effects_away_and_no_other(name):
     assert all(name in absent[e] and "recording" in absent[e] for e in needing(name))
 
 
-@pytest.mark.parametrize("name", LEAST_SPREAD)
-def test_a_signal_that_hardly_changes_is_as_good_as_none(name):
-    wide = 2 if name == "vibration" else 1
+@pytest.mark.parametrize("name", ["temperature", "throttle", "vibration"])
+def test_a_signal_that_does_not_change_is_as_good_as_none(name):
+    wide = 3 if name == "vibration" else 1
 
     def moving(spread):
-        # Evenly over its range, so that 98 less 2 per cent is 0.96 of it.
         def signal(t):
-            x = 20.0 + spread / 0.96 * (np.arange(len(t)) % 41) / 40.0
+            x = 20.0 + spread * (np.arange(len(t)) % 41) / 40.0
             return x if wide == 1 else np.stack([x, np.full_like(x, 20.0), x], axis=-1)
 
         return flight(**SIGNALS | {name: signal})
 
-    still, why = asked(moving(0.9 * LEAST_SPREAD[name]))
-    enough, _ = asked(moving(1.1 * LEAST_SPREAD[name]))
+    still, why = asked(moving(0.0))
+    enough, _ = asked(moving(0.01))
     assert needing(name)
     assert enough - still == needing(name)
     assert all("did not change" in why[e] for e in needing(name))
@@ -81,12 +79,10 @@ def test_a_single_wild_sample_is_no_change():
 
 def test_change_from_one_batch_to_the_next_counts():
     """Each batch is too short to show it: it is the flight that has to."""
-    flown = flight(**SIGNALS)
-    for batch in flown:
-        spread = np.ptp(batch.segment.slow["temperature"][1])
-        assert spread < 2.5 * LEAST_SPREAD["temperature"]
-    slowly = flight(**SIGNALS | {"temperature": lambda t: 30.0 + (t - 100.0) / 60.0})
-    assert all(np.ptp(b.segment.slow["temperature"][1]) < 0.5 for b in slowly)
+    slowly = flight(**SIGNALS)
+    for i, batch in enumerate(slowly):
+        t, _ = batch.segment.slow["temperature"]
+        batch.segment.slow["temperature"] = (t, np.full(len(t), 30.0 + 0.1 * i))
     assert needing("temperature") <= asked(slowly)[0]
 
 

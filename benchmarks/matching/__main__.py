@@ -1,0 +1,5 @@
+"""``python -m benchmarks.matching``."""
+
+from benchmarks.matching.runner import main
+
+main()

@@ -1,0 +1,82 @@
+"""Timing and constant attitude errors against what else could explain what is taken for them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.diagnosis.candidates import Candidate
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.hypotheses import Choice, confounders_of, reconsider_nuisance
+from onboard.core.diagnosis.limits import CLEARLY
+from onboard.core.diagnosis.nuisance_effects import (
+    Measured,
+    nuisance_effects,
+    nuisance_kinds,
+    without,
+)
+from onboard.core.estimate.calibration_record import timing_of
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.gps_clock import fix_clock
+from onboard.core.estimate.solution import Solution
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.effect import NuisanceFit
+
+
+def compared(
+    choice: Choice, full: Examination, calibrator: Calibrator, imu: int
+) -> tuple[set[str], dict[str, list[str]]]:
+    """Effects that are in every model, and are large; what does better in their place is taken.
+
+    Returns:
+        Those that are large enough; of the timing among them, others that do about as well.
+    """
+    told = fix_clock(calibrator.parameters, full.batches).configured_on_stamp
+    large: Measured = {}
+    for _ in nuisance_kinds():
+        large = _large(choice, full, calibrator, imu)
+        targets = (_target(choice, full, name, told) for name in large)
+        if not any(reconsider_nuisance(choice, target, held) for target, held in targets):
+            break
+    rivals = {
+        name: others
+        for name in large
+        if nuisance_kinds()[name].least is not None
+        if (others := _rivals(choice, *_target(choice, full, name, told)))
+    }
+    return set(large), rivals
+
+
+def _large(choice: Choice, full: Examination, calibrator: Calibrator, imu: int) -> Measured:
+    """Effects that are in every model, as large as they are in the model that was chosen."""
+    fitter = choice.fitter
+    fit = fitter.fit(choice.free, held_out=False)
+    solution = Solution(
+        fit.theta, fit.covariance, fitter.sums.N, fitter.variance_inflation, 1.0, 1.0
+    )
+    return nuisance_effects(
+        NuisanceFit(
+            timing=timing_of(full, solution),
+            theta=fit.theta,
+            sigma=np.sqrt(np.diag(fit.covariance)),
+            index=fitter.model.index,
+            point=full.point,
+            parameters=calibrator.parameters,
+            imu=imu,
+            clock=fix_clock(calibrator.parameters, full.batches),
+        )
+    )
+
+
+def _target(choice: Choice, full: Examination, name: str, told: float) -> tuple[Candidate, Array]:
+    """An effect that is in every model as one on trial, and unknowns (m,) without it."""
+    unknowns, index = nuisance_kinds()[name].in_every_model, choice.fitter.model.index
+    held = without(unknowns, index, full.point, choice.fitter.absent, told)
+    return Candidate(name, tuple(index[c] for c in unknowns), ()), held
+
+
+def _rivals(choice: Choice, target: Candidate, held: Array) -> list[str]:
+    """Other effects that do about as well in the place of one of timing."""
+    rest = [i for i in choice.free if i not in target.index]
+    others = [c for c in choice.candidates if c not in choice.chosen]
+    found = confounders_of(choice.fitter, rest, target, others, held)
+    return [r.name for r in found if r.delta_bic < CLEARLY]

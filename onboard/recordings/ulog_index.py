@@ -1,0 +1,222 @@
+"""Where the records of a ULog are, and what their bytes mean.
+
+A ULog is a header of 16 bytes and messages ``length (2) kind (1) body``; F messages give the fields
+of a type, A messages the number of a topic, D messages its records.  The walk goes over the file
+once and keeps the place of each record that is wanted; types are never unfolded, only measured, so
+that time and memory are bounded by the length of the file, whatever is in it.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from mmap import mmap
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.errors import RecordingError
+from onboard.recordings.ulog_types import Layout, Types
+
+Bytes = bytes | mmap
+Records = NDArray[np.void]
+
+MAGIC = b"ULog\x01\x12\x35"
+SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+HEADER_LENGTH = 16
+KINDS = frozenset(b"BFIMPQARDLCSO")
+LONGEST_UNKNOWN = 10000
+"""bytes; a message of a kind that nobody knows and that is longer is damage."""
+MOST_PARAMETERS = 20_000
+"""PX4 has some 2000."""
+UNFOLDED = 32
+"""Elements; longer arrays are of bytes to be passed on, and are not made columns."""
+_HEAD = struct.Struct("<HB")
+
+
+@dataclass(slots=True)
+class Topic:
+    """One instance of a topic: its layout, and where its records are."""
+
+    layout: Layout
+    offsets: array[int] = field(default_factory=lambda: array("q"))
+
+    def records(self, data: Bytes) -> Records:
+        """(n,) structured array of all its records."""
+        if not self.offsets:
+            return np.zeros(0, self.layout.dtype)
+        size = self.layout.dtype.itemsize
+        window = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
+        records: Records = window[np.frombuffer(self.offsets, np.int64)].view(self.layout.dtype)
+        return records[:, 0]
+
+
+@dataclass(slots=True)
+class UlogIndex:
+    """Wanted topics by name and instance; parameters with the time (us) of their change."""
+
+    topics: dict[tuple[str, int], Topic] = field(default_factory=dict)
+    initial: dict[str, float] = field(default_factory=dict)
+    changed: list[tuple[int, str, float]] = field(default_factory=list)
+    damaged_places: int = 0
+    dropouts: int = 0
+    dropped_ms: int = 0
+
+
+class _Walk:
+    """One walk over the file; the state is what it has learnt so far."""
+
+    def __init__(self, data: Bytes, wanted: frozenset[str]) -> None:
+        self.data = data
+        self.wanted = wanted
+        self.index = UlogIndex()
+        self._types = Types()
+        self._layouts: dict[str, Layout | None] = {}
+        self._topic_of: dict[int, Topic] = {}
+        self._others: set[int] = set()
+        self._defining = True
+        self._time = 0
+        self._jumps: list[int] = []
+        self._sync = 0
+        self._handlers: dict[int, Callable[[int, int], bool]] = {
+            ord("D"): self._record,
+            ord("F"): self._type,
+            ord("A"): self._subscription,
+            ord("P"): self._parameter,
+            ord("O"): self._dropout,
+            ord("B"): self._flags,
+        }
+
+    def run(self) -> None:
+        data, end = self.data, len(self.data)
+        at = HEADER_LENGTH
+        whole = True
+        while at + _HEAD.size <= end:
+            size, kind = _HEAD.unpack_from(data, at)
+            body, stop = at + _HEAD.size, at + _HEAD.size + size
+            if self._jumps and stop > self._jumps[0]:
+                at = max(at, self._jumps.pop(0))
+                continue
+            if kind in KINDS and stop <= end:
+                handler = self._handlers.get(kind)
+                good = handler is None or handler(body, stop)
+                at = stop
+            else:
+                at, good = self._resume(at, size, kind, end)
+            if whole and not good:
+                self.index.damaged_places += 1
+            whole = good
+
+    def _resume(self, at: int, size: int, kind: int, end: int) -> tuple[int, bool]:
+        """Where to go on after a message that is none, and whether it may be of a new kind."""
+        stop = at + _HEAD.size + size
+        if 0 <= self._sync <= at:
+            self._sync = self.data.find(SYNC, at + 1)
+        plausible = bool(kind) and 0 < size <= LONGEST_UNKNOWN and stop <= end
+        if self._sync >= 0 and (not plausible or self._sync < stop):
+            return self._sync + len(SYNC), False
+        if plausible:
+            return stop, True
+        return (end, True) if kind in KINDS and size else (at + 1, False)
+
+    def _record(self, body: int, stop: int) -> bool:
+        if stop - body < 2:
+            return False
+        number = self.data[body] | self.data[body + 1] << 8
+        topic = self._topic_of.get(number)
+        if topic is None:
+            return number in self._others
+        layout, size = topic.layout, stop - body - 2
+        if not layout.dtype.itemsize <= size <= layout.longest:
+            return False
+        topic.offsets.append(body + 2)
+        at = body + 2 + layout.timestamp
+        self._time = max(self._time, int.from_bytes(self.data[at : at + 8], "little"))
+        return True
+
+    def _type(self, body: int, stop: int) -> bool:
+        return self._types.learn(bytes(self.data[body:stop]))
+
+    def _subscription(self, body: int, stop: int) -> bool:
+        self._defining = False
+        if stop - body < 4:
+            return False
+        instance, number = struct.unpack_from("<BH", self.data, body)
+        name = bytes(self.data[body + 3 : min(stop, body + 80)]).decode("ascii", "replace")
+        self._topic_of.pop(number, None)
+        self._others.add(number)
+        if name not in self.wanted:
+            return True
+        if name not in self._layouts:
+            self._layouts[name] = self._types.layout(name)
+        layout = self._layouts[name]
+        if layout is None:
+            return False
+        topic = self.index.topics.setdefault((name, instance), Topic(layout))
+        if topic.layout != layout:
+            return False
+        self._topic_of[number] = topic
+        return True
+
+    def _parameter(self, body: int, stop: int) -> bool:
+        length = self.data[body] if stop > body else 0
+        key = bytes(self.data[body + 1 : body + 1 + length]).decode("ascii", "replace")
+        kind, _, name = key.partition(" ")
+        form = {"float": "<f", "int32_t": "<i"}.get(kind)
+        if form is None or not name or stop - body != 1 + length + 4:
+            return False
+        (value,) = struct.unpack_from(form, self.data, body + 1 + length)
+        index = self.index
+        if len(index.initial) + len(index.changed) >= MOST_PARAMETERS:
+            return False
+        if self._defining:
+            index.initial[name] = float(value)
+        else:
+            index.changed.append((self._time, name, float(value)))
+        return True
+
+    def _dropout(self, body: int, stop: int) -> bool:
+        if stop - body != 2:
+            return False
+        self.index.dropouts += 1
+        self.index.dropped_ms += int.from_bytes(self.data[body:stop], "little")
+        return True
+
+    def _flags(self, body: int, stop: int) -> bool:
+        if body != HEADER_LENGTH + _HEAD.size or stop - body < 40:
+            return False
+        incompatible = bytes(self.data[body + 8 : body + 16])
+        if incompatible[0] & ~1 or any(incompatible[1:]):
+            raise RecordingError("a ULog with a feature that is not known here")
+        if incompatible[0] & 1:
+            offsets = struct.unpack_from("<3Q", self.data, body + 16)
+            self._jumps = sorted(n for n in offsets if stop <= n < len(self.data))
+        return True
+
+
+def index_ulog(data: Bytes, wanted: frozenset[str]) -> UlogIndex:
+    """Find the records of the ``wanted`` topics; damage is counted.
+
+    Raises:
+        RecordingError: the header is not a ULog's, or says that it cannot be read.
+    """
+    if len(data) < HEADER_LENGTH or data[: len(MAGIC)] != MAGIC:
+        raise RecordingError("a ULog whose header is damaged")
+    walk = _Walk(data, wanted)
+    walk.run()
+    return walk.index
+
+
+def columns_of(records: Records) -> dict[str, NDArray[Any]]:
+    """Fields by name, (n,) each; elements of an array as ``name[i]``."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name in records.dtype.names or ():
+        values = records[name]
+        if values.ndim == 1:
+            columns[name] = values
+        elif values.shape[1] <= UNFOLDED:
+            columns.update({f"{name}[{i}]": values[:, i] for i in range(values.shape[1])})
+    return columns

@@ -1,0 +1,41 @@
+"""A second signal ends the service at once, in good order."""
+
+import asyncio
+import os
+import signal
+
+import pytest
+
+from onboard.cli.run import _serve
+from onboard.daemon.process.service import Service
+from onboard.daemon.setup.configuration import from_mapping
+from tests.daemon.daemons import until
+
+
+@pytest.mark.parametrize("first", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGINT])
+async def test_it_leaves_what_was_under_way_and_frees_everything(
+    document, monkeypatch, first, second
+):
+    waiting = asyncio.Event()
+    services = []
+
+    async def unfinished(self):
+        services.append(self)
+        waiting.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(Service, "_finish_push", unfinished)
+    serving = asyncio.create_task(_serve(from_mapping(document, source="test")))
+    await until(lambda: serving.done() or signal.getsignal(first) is not signal.SIG_DFL)
+    await asyncio.sleep(0.2)
+    os.kill(os.getpid(), first)
+    async with asyncio.timeout(30.0):
+        await waiting.wait()
+        os.kill(os.getpid(), second)
+        assert await serving is second
+    (service,) = services
+    assert service.phase == "stopped"
+    # The journal's lock and the ports are free: the next start finds nothing in its way.
+    again = Service(from_mapping(document, source="test"))
+    again.parts.journal.close()

@@ -1,0 +1,48 @@
+"""A log that cannot be flooded."""
+
+import logging
+
+from onboard.daemon.setup.logs import KINDS_MAX, Restrained
+
+
+class Kept(logging.Handler):
+    def __init__(self):
+        super().__init__()
+        self.lines = []
+
+    def emit(self, record):
+        self.lines.append(record.getMessage())
+
+
+def logger_and_lines(name, now):
+    handler = Kept()
+    handler.addFilter(Restrained(lines=3, period_s=60.0, clock=lambda: now[0]))
+    logger = logging.getLogger(name)
+    logger.propagate = False
+    logger.addHandler(handler)
+    return logger, handler
+
+
+def test_one_line_again_and_again_is_written_a_few_times_and_then_counted():
+    now = [0.0]
+    logger, handler = logger_and_lines("flooded", now)
+    for at in [0.0] * 100_000 + [61.0]:
+        now[0] = at
+        logger.warning("again: %d", 1)
+    assert handler.lines[:3] == ["again: 1"] * 3
+    assert handler.lines[3:] == ["again: 1 (99997 more were not written)"]
+
+
+def test_other_lines_are_written_meanwhile():
+    logger, handler = logger_and_lines("mixed", [0.0])
+    for _ in range(100):
+        logger.warning("flood")
+    logger.warning("something else")
+    assert handler.lines == ["flood"] * 3 + ["something else"]
+
+
+def test_what_is_remembered_is_bounded():
+    restrained = Restrained()
+    for number in range(3 * KINDS_MAX):
+        restrained.filter(logging.LogRecord("x", 30, "file.py", number, "text", (), None))
+    assert len(restrained._kinds) == KINDS_MAX
