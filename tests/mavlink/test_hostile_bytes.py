@@ -106,7 +106,7 @@ class Turns:
         self.loop_turns = []
         self.turn = 0
 
-    def receive(self, data):
+    def receive(self, data, _address=None):
         self.sizes.append(len(data))
         self.loop_turns.append(self.turn)
 
