@@ -1,0 +1,39 @@
+"""Drag of the body: proportional to the square of the speed through the air."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+
+PLAUSIBLE = 0.1
+"""m^2/kg: ballistic coefficients from 10 kg/m^2 up [physics]."""
+FLOOR_SHARE = 0.05
+"""Of the nominal value [use]."""
+
+
+class BodyDrag(Effect):
+    """``f_i = -(rho / 2) |u_i| u_i / b_i`` on each lateral axis; the unknowns are ``1 / b``."""
+
+    name = "body_drag"
+    manoeuvre = "fly straight legs at full speed, forwards and sideways"
+
+    def __init__(self, frame: CopterAirframe) -> None:
+        """Nominally the frame's, the same on both axes."""
+        nominal = frame.body_drag
+        super().__init__(
+            [
+                Unknown(axis, nominal, PLAUSIBLE, FLOOR_SHARE * max(nominal, 0.02), "m^2/kg")
+                for axis in ("x", "y")
+            ]
+        )
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Add the drag."""
+        u = air.u_b[:, :2]
+        pressure = 0.5 * air.rho[:, None] * np.abs(u) * u
+        air.force_b[:, :2] -= pressure * np.asarray(values)

@@ -1,0 +1,54 @@
+"""What all effects share: unknowns with a nominal value, and how they act on the prediction."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from onboard.core.vehicle.air import Air
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One number of an effect.
+
+    Attributes:
+        name: in the document.
+        nominal: its value where the airframe is the nominal one.
+        plausible: standard deviation over the vehicles that fly: prior, and scale of steps.
+        floor: differences below do not matter.
+        unit: in the document.
+    """
+
+    name: str
+    nominal: float
+    plausible: float
+    floor: float
+    unit: str
+
+
+class Effect(ABC):
+    """One piece of physics.
+
+    Attributes:
+        name: in the controlled vocabulary; empty for what is only estimated beside the effects.
+        unknowns: its numbers.
+        manoeuvre: what would show it, as an imperative.
+    """
+
+    name: str = ""
+    manoeuvre: str = ""
+
+    def __init__(self, unknowns: Sequence[Unknown]) -> None:
+        """Take the unknowns."""
+        self.unknowns = tuple(unknowns)
+
+    @abstractmethod
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Change the prediction by these values of the unknowns."""
+
+    def missing(self, air: Air) -> str:
+        """Why this recording cannot speak of it; empty where it can."""
+        del air
+        return ""

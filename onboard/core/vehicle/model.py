@@ -1,0 +1,123 @@
+"""A model of the specific force: effects in a row, their unknowns as one vector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.flight import Flight
+
+DIFFERENCE = 1e-3
+"""Step of a difference quotient, in plausible sizes: forces are smooth [cost]."""
+
+
+class Start(Protocol):
+    """Makes the :class:`Air` that a prediction begins with."""
+
+    def __call__(self, flight: Flight) -> Air:
+        """Still air around a flight."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForceModel:
+    """What predicts the force of one flight.
+
+    Attributes:
+        flight: n steps.
+        effects: in the order in which they act.
+        axes: body axes that it predicts.
+        start: makes the air.
+    """
+
+    flight: Flight
+    effects: tuple[Effect, ...]
+    axes: tuple[int, ...]
+    start: Start
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Of all effects, in a row."""
+        return tuple(u for e in self.effects for u in e.unknowns)
+
+    @property
+    def nominal(self) -> Array:
+        """(m,) values of the nominal airframe."""
+        return np.array([u.nominal for u in self.unknowns])
+
+    @property
+    def plausible(self) -> Array:
+        """(m,) prior standard deviations."""
+        return np.array([u.plausible for u in self.unknowns])
+
+    def indices(self, name: str) -> list[int]:
+        """Places of an effect's unknowns; empty if it is not in the model."""
+        out: list[int] = []
+        at = 0
+        for effect in self.effects:
+            if effect.name == name:
+                out += range(at, at + len(effect.unknowns))
+            at += len(effect.unknowns)
+        return out
+
+    def index(self, unknown: str) -> int:
+        """Place of an unknown by its own name, of the first effect that has it.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for k, u in enumerate(self.unknowns):
+            if u.name == unknown:
+                return k
+        raise KeyError(unknown)
+
+    @property
+    def beside(self) -> list[int]:
+        """Places of what is only estimated beside the effects."""
+        return self.indices("")
+
+    def air(self, theta: Array, gust: Array | None = None) -> Air:
+        """The prediction at unknowns (m,), in air that also moves by ``gust`` (3,), m/s."""
+        air = self.start(self.flight)
+        if gust is not None:
+            air.gust_n = gust
+        at = 0
+        for effect in self.effects:
+            n = len(effect.unknowns)
+            effect.act(air, theta[at : at + n].tolist())
+            at += n
+        return air
+
+    def predicted(self, theta: Array) -> Array:
+        """(n, k) force along the axes, m/s^2."""
+        out: Array = self.air(theta).force_b[:, list(self.axes)]
+        return out
+
+    def sensitivity(self, theta: Array) -> Array:
+        """(n, k) change of the force by a gust of 1 m/s from anywhere, 1/s."""
+        here = self.predicted(theta)
+        squares = np.zeros_like(here)
+        for direction in 0.1 * np.eye(3):
+            there = self.air(theta, direction).force_b[:, list(self.axes)]
+            squares += ((there - here) / 0.1) ** 2
+        return np.sqrt(squares)
+
+    def measured(self) -> Array:
+        """(n, k) what the accelerometer says."""
+        out: Array = self.flight.f_b[:, list(self.axes)]
+        return out
+
+    def jacobian(self, theta: Array) -> Array:
+        """(n, k, m) by central differences."""
+        columns = []
+        for j, size in enumerate(self.plausible):
+            h = DIFFERENCE * size
+            up, down = theta.copy(), theta.copy()
+            up[j] += h
+            down[j] -= h
+            columns.append((self.predicted(up) - self.predicted(down)) / (2.0 * h))
+        return np.stack(columns, axis=-1)
