@@ -54,7 +54,7 @@ class CopterAirframe:
             if name not in known:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"{name} is not a number")
+                raise ValueError(f"{name} is not a number")  # noqa: TRY004 - of a file
             numbers[name] = float(value)
         frame = replace(cls(), **numbers)
         for name in ("mass", "refSpd", "maxVoltage", "hoverThrOut", "disc_area", "refVoltage"):

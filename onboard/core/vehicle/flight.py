@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ from onboard.core.vehicle.limits import CONTACT_M_S2, STEP_S
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import inside
 from onboard.core.vehicle.trajectory import Motion
+
+_BY_STEP = (
+    *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
+    *("outputs", "commands", "battery", "airspeed", "ekf_wind"),
+)
+"""Fields that have a value for each step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +75,8 @@ class Flight:
 
     def kept(self, mask: Mask) -> Flight:
         """The steps (n,) that are True."""
-        cut = {
-            name: getattr(self, name)[mask]
-            for name in (
-                *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
-                *("outputs", "commands", "battery", "airspeed", "ekf_wind"),
-            )
-        }
-        return Flight(
-            ground=self.ground, velocity_sigma=self.velocity_sigma, step_s=self.step_s, **cut
-        )
+        cut = {name: getattr(self, name)[mask] for name in _BY_STEP}
+        return replace(self, **cut)
 
 
 def flight_of(
@@ -112,8 +110,20 @@ def flight_of(
     flight = Flight(
         ground=ground,
         velocity_sigma=max(m.velocity_sigma for m in pieces),
-        piece=joined.pop("piece").astype(np.int64),
-        **joined,
+        piece=joined["piece"].astype(np.int64),
+        t=joined["t"],
+        f_b=joined["f_b"],
+        w_b=joined["w_b"],
+        R_bn=joined["R_bn"],
+        v_b=joined["v_b"],
+        v_n=joined["v_n"],
+        height=joined["height"],
+        rho=joined["rho"],
+        outputs=joined["outputs"],
+        commands=joined["commands"],
+        battery=joined["battery"],
+        airspeed=joined["airspeed"],
+        ekf_wind=joined["ekf_wind"],
     )
     flight = flight.kept(air)
     # What was cut out divides a piece: the noise's memory must not reach across.
@@ -123,9 +133,7 @@ def flight_of(
     return flight
 
 
-def _binned(
-    m: Motion, signals: Signals, commands: Stream, number: int
-) -> dict[str, Array] | None:
+def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[str, Array] | None:
     """Means of a piece's samples over the steps that have any."""
     which = np.floor((m.t - m.t[0]) / STEP_S).astype(np.int64)
     steps, first, counts = np.unique(which, return_index=True, return_counts=True)

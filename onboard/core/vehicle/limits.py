@@ -13,12 +13,12 @@ from typing import Final
 STEP_S: Final = 0.1
 """Step of the grid, s: the rate at which ordinary logs have outputs and battery [data sheet]."""
 FEWEST_STEPS: Final = 100
-"""Steps that a flight must have to be looked at: ten seconds [physics: fewer unknowns than rows]."""
+"""Steps that a flight must have to be looked at: ten seconds [physics: unknowns by rows]."""
 MARGIN_S: Final = 3.0
 """s of flight next to the ground that are left out: contact and ground effect are another
 physics [physics]."""
 GROUND_M: Final = 2.0
-"""Heights closer than this to where the vehicle stood are the ground, m [data sheet: GPS height]."""
+"""Heights closer than this to where the vehicle stood are the ground, m [data sheet]."""
 STILL_M_S: Final = 0.3
 """Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
 STILL_S: Final = 1.0
@@ -75,4 +75,21 @@ TESTABLE: Final = 3.0
 """Sigmas in the largest plausible size that make an effect testable [probability]."""
 ALIKE: Final = 0.7
 """Correlation of two effects' unknowns past which each explains half of the other
+[probability]."""
+AMBIGUOUS: Final = 10.0
+"""Fall of chi-square within which two effects cannot be told apart (Kass and Raftery, 1995)
+[probability]."""
+TURBULENCE_FLOOR_M_S: Final = 0.3
+"""Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
+
+# What is shown (flown_alone, curves).
+
+ALONE_S: Final = 10.0
+"""s for which the model flies on alone [use]."""
+ALONE_EVERY_S: Final = 4.0
+"""s between the starts of such flights [cost]."""
+CURVE_BINS: Final = 24
+"""Points of a curve with its data [cost]."""
+MOST_OUTLYING: Final = 0.1
+"""Share of steps past which they are no outliers but flight that the model fails on
 [probability]."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,12 +16,12 @@ from onboard.core.vehicle.flight import Flight
 DIFFERENCE = 1e-3
 """Step of a difference quotient, in plausible sizes: forces are smooth [cost]."""
 
+GUST = 0.1
+"""Gust of the difference quotient, m/s [cost]."""
 
-class Start(Protocol):
-    """Makes the :class:`Air` that a prediction begins with."""
 
-    def __call__(self, flight: Flight) -> Air:
-        """Still air around a flight."""
+Start: TypeAlias = Callable[[Flight], Air]
+"""Makes the still air that a prediction for a flight begins with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +98,19 @@ class ForceModel:
         out: Array = self.air(theta).force_b[:, list(self.axes)]
         return out
 
+    def gust_slope(self, theta: Array) -> Array:
+        """(n, k, 3) change of the force by a gust towards north, east, down, 1/s."""
+        here = self.predicted(theta)
+        columns = [
+            (self.air(theta, gust).force_b[:, list(self.axes)] - here) / GUST
+            for gust in GUST * np.eye(3)
+        ]
+        return np.stack(columns, axis=-1)
+
     def sensitivity(self, theta: Array) -> Array:
         """(n, k) change of the force by a gust of 1 m/s from anywhere, 1/s."""
-        here = self.predicted(theta)
-        squares = np.zeros_like(here)
-        for direction in 0.1 * np.eye(3):
-            there = self.air(theta, direction).force_b[:, list(self.axes)]
-            squares += ((there - here) / 0.1) ** 2
-        return np.sqrt(squares)
+        out: Array = np.sqrt(np.sum(self.gust_slope(theta) ** 2, axis=-1))
+        return out
 
     def measured(self) -> Array:
         """(n, k) what the accelerometer says."""

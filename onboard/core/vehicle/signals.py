@@ -1,4 +1,4 @@
-"""What a recording says of the vehicle beside its motion: outputs, battery, airspeed, parameters."""
+"""What a recording says of the vehicle beside its motion: outputs, battery, airspeed."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
 PLAUSIBLE = 0.1
 """m^2/kg: ballistic coefficients from 10 kg/m^2 up [physics]."""
@@ -37,3 +37,18 @@ class BodyDrag(Effect):
         u = air.u_b[:, :2]
         pressure = 0.5 * air.rho[:, None] * np.abs(u) * u
         air.force_b[:, :2] -= pressure * np.asarray(values)
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """Ballistic coefficients, as EK3_DRAG_BCOEF_X and _Y; none where there is no drag."""
+        out = []
+        for unknown, value, sigma in zip(self.unknowns, values, sigmas, strict=True):
+            nominal = 1.0 / unknown.nominal if unknown.nominal > 0.0 else float("nan")
+            known = value > 2.0 * sigma and value > 0.0
+            b = 1.0 / value if known else float("nan")
+            its = sigma / value**2 if known else float("nan")
+            out.append(Shown(f"bcoef_{unknown.name}", nominal, b, its, "kg/m^2"))
+            area = Shown(
+                f"area_by_mass_{unknown.name}", unknown.nominal, value, sigma, unknown.unit
+            )
+            out.append(area)
+        return out

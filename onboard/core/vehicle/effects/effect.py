@@ -28,6 +28,17 @@ class Unknown:
     unit: str
 
 
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A number as people and other programs read it: nominal value, value, sigma, unit."""
+
+    name: str
+    nominal: float
+    value: float
+    sigma: float
+    unit: str
+
+
 class Effect(ABC):
     """One piece of physics.
 
@@ -47,6 +58,13 @@ class Effect(ABC):
     @abstractmethod
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Change the prediction by these values of the unknowns."""
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """The unknowns in the units of the document."""
+        return [
+            Shown(u.name, u.nominal, v, s, u.unit)
+            for u, v, s in zip(self.unknowns, values, sigmas, strict=True)
+        ]
 
     def missing(self, air: Air) -> str:
         """Why this recording cannot speak of it; empty where it can."""

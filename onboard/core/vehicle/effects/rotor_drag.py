@@ -24,9 +24,7 @@ class RotorDrag(Effect):
     def __init__(self, frame: CopterAirframe) -> None:
         """Nominally the frame's."""
         nominal = frame.rotor_drag
-        super().__init__(
-            [Unknown("coefficient", nominal, PLAUSIBLE, FLOOR_SHARE * nominal, "1/s")]
-        )
+        super().__init__([Unknown("mcoef", nominal, PLAUSIBLE, FLOOR_SHARE * nominal, "1/s")])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
 FLOOR = 0.05
 """Of the logarithm: 5 % of the thrust [use]."""
@@ -33,3 +33,8 @@ class ThrustScale(Effect):
     def missing(self, air: Air) -> str:
         """It takes outputs."""
         return "" if air.commands is not None else "no motor outputs in the recording"
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """The ratio to the frame's thrust by mass."""
+        ratio = math.exp(min(values[0], 5.0))
+        return [Shown("ratio", 1.0, ratio, ratio * sigmas[0], "1")]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.vehicle.air import Air
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
 FLOOR = 0.2
 """Of the share of the voltage's square [use]."""
@@ -16,7 +16,7 @@ LEAST_FALL = 0.01
 
 
 class VoltageSag(Effect):
-    """Thrust goes with ``(V / V_full)^(2 share)``: 1 as of a motor, 0 as of a battery that holds."""
+    """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds."""
 
     name = "voltage_sag"
     manoeuvre = "fly from a full battery to the warning, with full throttle now and then"
@@ -41,3 +41,7 @@ class VoltageSag(Effect):
         if float(np.std(np.log(np.maximum(air.volts, 0.1)))) < LEAST_FALL:
             return "the voltage hardly changed"
         return ""
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """The exponent of the voltage."""
+        return [Shown("exponent", 0.0, 2.0 * values[0], 2.0 * sigmas[0], "1")]
