@@ -44,6 +44,7 @@ class Flight:
         airspeed: (n,) as reported; NaN where there is none.
         ekf_wind: (n, 2) or empty (n, 0).
         velocity_sigma: of the velocity, m/s.
+        attitude_sigma: of roll and pitch, rad.
         step_s: length of a step, s.
     """
 
@@ -63,6 +64,7 @@ class Flight:
     airspeed: Array
     ekf_wind: Array
     velocity_sigma: float
+    attitude_sigma: float
     step_s: float = STEP_S
 
     def __len__(self) -> int:
@@ -110,6 +112,7 @@ def flight_of(
     flight = Flight(
         ground=ground,
         velocity_sigma=max(m.velocity_sigma for m in pieces),
+        attitude_sigma=max(m.attitude_sigma for m in pieces),
         piece=joined["piece"].astype(np.int64),
         t=joined["t"],
         f_b=joined["f_b"],

@@ -25,11 +25,15 @@ STILL_S: Final = 1.0
 """s for which it must show it [probability: five fixes in a row]."""
 CONTACT_M_S2: Final = 40.0
 """Specific force that no copter's rotors make, m/s^2: an impact [physics]."""
-VELOCITY_WANDER: Final = (0.02, 0.06, 0.2)
-"""Levels (m/s^2 per sqrt(s)) between which the wander of the integrated acceleration's error is
-chosen by likelihood: attitude errors of 0.1 to 1 degree that change within seconds [physics]."""
-VELOCITY_NOISE_M_S: Final = 0.1
-"""White noise of a receiver's velocity where nothing else is known, m/s [data sheet]."""
+ATTITUDE_WANDER: Final = (1e-4, 4e-4, 1.5e-3, 6e-3)
+"""Noise of the integrated rates, rad per sqrt(s), among which the likeliest is taken: from a good
+gyroscope's to coning at 25 samples a second [data sheet]."""
+VELOCITY_NOISE_M_S: Final = (0.02, 0.06, 0.2)
+"""White noise of a receiver's velocity, likewise, m/s [data sheet]."""
+LEVELS_FROM: Final = 400
+"""Fixes from which these are found [cost]."""
+FEWEST_FIXES: Final = 5
+"""Fewer are no piece of flight [physics]."""
 
 # Noise (noise).
 

@@ -1,8 +1,8 @@
 """Velocity and force of a flight: the accelerometer carries the motion, GPS holds it to the truth.
 
 The receiver's velocity is late and averaged; the integrated specific force is neither, but drifts.
-So the difference of the two, both averaged alike, is smoothed over seconds and added to the
-integral (a fixed-interval smoother; Rauch, Tung and Striebel 1965).
+So the difference of the two, both averaged alike, is what a smoother
+(:mod:`onboard.core.vehicle.smoother`) finds the errors of velocity and attitude from.
 """
 
 from __future__ import annotations
@@ -15,7 +15,22 @@ import numpy as np
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.vehicle.limits import VELOCITY_NOISE_M_S, VELOCITY_WANDER
+from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
+from onboard.core.vehicle.limits import (
+    ATTITUDE_WANDER,
+    FEWEST_FIXES,
+    LEVELS_FROM,
+    VELOCITY_NOISE_M_S,
+)
+from onboard.core.vehicle.smoother import (
+    BIAS,
+    PSI,
+    Levels,
+    Steps,
+    V,
+    likelihood,
+    smoothed,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +66,7 @@ class Motion:
         v_n: (n, 3) velocity, m/s.
         height: (n,) above mean sea level, m.
         velocity_sigma: of the velocity, m/s.
+        attitude_sigma: of roll and pitch, rad.
     """
 
     t: Array
@@ -60,6 +76,7 @@ class Motion:
     v_n: Array
     height: Array
     velocity_sigma: float
+    attitude_sigma: float
 
 
 def motions(batches: Sequence[Batch], sensors: Sensors) -> list[Motion]:
@@ -93,26 +110,70 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     t, f_b, w_b, R = t[keep], f_b[keep], w_b[keep], R[keep]
     if len(t) < 20:
         return None
-    a_n = np.einsum("nij,nj->ni", R, f_b)
-    a_n[:, 2] += STANDARD_GRAVITY
-    v_n = np.zeros_like(a_n)
-    v_n[1:] = np.cumsum(0.5 * (a_n[1:] + a_n[:-1]) * np.diff(t)[:, None], axis=0)
+    f_n = np.einsum("nij,nj->ni", R, f_b)
+    v_n = _integral(t, f_n + np.array([0.0, 0.0, STANDARD_GRAVITY]))
     fix_t, fix_v, fix_h = _fixes(run)
     true_t = fix_t - sensors.gps_delay
     inner = (true_t >= t[0]) & (true_t <= t[-1])
-    if np.count_nonzero(inner) < 5:
+    if np.count_nonzero(inner) < FEWEST_FIXES:
         return None
     true_t, fix_v, fix_h = true_t[inner], fix_v[inner], fix_h[inner]
     half = sensors.gps_window / np.sqrt(12.0)
-    error, sigma = np.zeros_like(v_n), 0.0
-    for axis in range(3):
-        late = np.interp(true_t + half, t, v_n[:, axis])
-        early = np.interp(true_t - half, t, v_n[:, axis])
-        left = fix_v[:, axis] - 0.5 * (late + early)
-        smooth, level = _smoothed(true_t, left)
-        error[:, axis] = np.interp(t, true_t, smooth)
-        sigma = max(sigma, level)
-    return Motion(t, f_b, w_b, R, v_n + error, np.interp(t, true_t, fix_h), sigma)
+    # What the receiver averages over is averaged here, too: two points have the same variance.
+    average = 0.5 * (_at(true_t + half, t, v_n) + _at(true_t - half, t, v_n))
+    steps = _steps(true_t, t, f_n, w_b, R, fix_v - average)
+    errors = smoothed(steps, _levels(steps))
+    v_n = v_n + _at(t, true_t, errors.x[:, V])
+    R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
+    return Motion(
+        t,
+        f_b,
+        w_b - _at(t, true_t, errors.x[:, BIAS]),
+        R,
+        v_n,
+        np.interp(t, true_t, fix_h),
+        float(np.max(errors.sigma[V])),
+        float(np.max(errors.sigma[PSI][:2])),
+    )
+
+
+def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Array) -> Steps:
+    """What the smoother goes over, from the samples at ``t`` (n,) to the fixes at ``at`` (k,)."""
+    h = np.diff(t)
+    mean_rate = 0.5 * (w_b[1:] + w_b[:-1])
+    by_gyro = R[:-1] @ rotation_from_vector(mean_rate * h[:, None])
+    beyond = vector_from_rotation(np.swapaxes(by_gyro, -1, -2) @ R[1:])
+    turned = np.zeros_like(f_n)
+    turned[1:] = np.cumsum(np.einsum("nij,nj->ni", R[1:], beyond), axis=0)
+    impulse = _at(at, t, _integral(t, f_n))
+    turned_at = _at(at, t, turned)
+    nearest = np.clip(np.searchsorted(t, at), 0, len(t) - 1)
+    return Steps(
+        np.diff(at, prepend=at[0]),
+        np.diff(impulse, axis=0, prepend=impulse[:1]),
+        np.diff(turned_at, axis=0, prepend=turned_at[:1]),
+        R[nearest],
+        measured,
+    )
+
+
+def _levels(steps: Steps) -> Levels:
+    """The likeliest noise, of the first minute or two."""
+    sample = steps.until(LEVELS_FROM)
+    trials = [Levels(a, v) for a in ATTITUDE_WANDER for v in VELOCITY_NOISE_M_S]
+    return max(trials, key=lambda levels: likelihood(sample, levels))
+
+
+def _integral(t: Array, x: Array) -> Array:
+    """(n, 3) integral of x (n, 3) from the first sample on, by trapezes."""
+    out = np.zeros_like(x)
+    out[1:] = np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t)[:, None], axis=0)
+    return out
+
+
+def _at(at: Array, t: Array, x: Array) -> Array:
+    """(m, 3) values of x (n, 3) by straight lines."""
+    return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
 
 
 def _fixes(run: Sequence[Batch]) -> tuple[Array, Array, Array]:
@@ -125,61 +186,3 @@ def _fixes(run: Sequence[Batch]) -> tuple[Array, Array, Array]:
     if not np.isfinite(v[:, 2]).any() and len(t) > 10:
         v[5:-5, 2] = -(h[10:] - h[:-10]) / (t[10:] - t[:-10])
     return t, v, h
-
-
-def _smoothed(t: Array, y: Array) -> tuple[Array, float]:
-    """Smoothed ``y`` (n,) at its times and its sigma, the wander chosen by likelihood."""
-    best: tuple[float, Array, float] | None = None
-    for wander in VELOCITY_WANDER:
-        score, smooth, sigma = _rts(t, y, wander)
-        if best is None or score > best[0]:
-            best = score, smooth, sigma
-    if best is None:
-        raise ValueError("no level of wander")
-    return best[1], best[2]
-
-
-def _rts(t: Array, y: Array, wander: float) -> tuple[float, Array, float]:
-    """Log-likelihood, smoothed mean (n,) and its sigma, noise of the measurement profiled out.
-
-    The state is an error and its rate; the rate is a random walk.
-    """
-    n = len(t)
-    r = VELOCITY_NOISE_M_S**2
-    m, P = np.zeros(2), np.diag([1.0, 0.25])
-    known = np.flatnonzero(np.isfinite(y))
-    if len(known) == 0:
-        return 0.0, np.zeros(n), 1.0
-    m[0] = y[known[0]]
-    means, covariances = np.empty((n, 2)), np.empty((n, 2, 2))
-    ahead_m, ahead_P, moves = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
-    score, squares, count = 0.0, 0.0, 0
-    for k in range(n):
-        h = t[k] - t[k - 1] if k else 0.0
-        A = np.array([[1.0, h], [0.0, 1.0]])
-        q = wander**2
-        Q = q * np.array([[h**3 / 3.0, h * h / 2.0], [h * h / 2.0, h]])
-        m = A @ m
-        P = A @ P @ A.T + Q
-        ahead_m[k], ahead_P[k], moves[k] = m, P, A
-        if np.isfinite(y[k]):
-            s = P[0, 0] + r
-            e = y[k] - m[0]
-            gain = P[:, 0] / s
-            m = m + gain * e
-            P = P - np.outer(gain, P[0])
-            score -= 0.5 * (e * e / s + np.log(s))
-            squares += e * e / s
-            count += 1
-        means[k], covariances[k] = m, P
-    out = means[:, 0].copy()
-    ms, Ps = means[-1], covariances[-1]
-    variance = Ps[0, 0]
-    for k in range(n - 2, -1, -1):
-        C = covariances[k] @ moves[k + 1].T @ np.linalg.inv(ahead_P[k + 1])
-        ms = means[k] + C @ (ms - ahead_m[k + 1])
-        Ps = covariances[k] + C @ (Ps - ahead_P[k + 1]) @ C.T
-        out[k] = ms[0]
-        variance += Ps[0, 0]
-    scatter = squares / max(count, 1)
-    return score, out, float(np.sqrt(max(variance / n, 0.0) * max(scatter, 1.0)))
