@@ -18,6 +18,9 @@ from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.flight import Flight, flight_of
 from onboard.core.vehicle.limits import FEWEST_STEPS
+from onboard.core.vehicle.plane import plane_commands
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Stream
 from onboard.core.vehicle.trajectory import motions
@@ -118,10 +121,14 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
         ValueError: a frame that makes no sense.
     """
     kind = recording.signals.kind
-    airframe = CopterAirframe.of(frame)
-    outputs = Outputs.of(recording.signals, airframe)
-    commands = outputs.commands(recording.signals, airframe.propExpo)
-    flight = _flight(recording, commands if kind in COPTERS else Stream())
+    airframe, plane = CopterAirframe.of(frame), PlaneAirframe.of(frame)
+    commands = Stream()
+    if kind in COPTERS:
+        outputs = Outputs.of(recording.signals, airframe)
+        commands = outputs.commands(recording.signals, airframe.propExpo)
+    elif kind in PLANES:
+        commands = plane_commands(recording.signals)
+    flight = _flight(recording, commands)
     names = NAMES.get(kind, NAMES["copter"])
     if flight is None or len(flight) < FEWEST_STEPS:
         absent = tuple(NotTestable(n, NOTHING) for n in names)
@@ -132,7 +139,13 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
             kind or "unknown", not_testable=tuple(NotTestable(n, why) for n in names), note=why
         )
     sigma = recording.sensors.force_sigma
-    return match_copter(flight, recording.signals, airframe, sigma)
+    if kind in COPTERS:
+        return match_copter(flight, recording.signals, airframe, sigma)
+    found = match_plane(flight, plane, sigma)
+    if found is not None:
+        return found
+    why = "it never flew as fast as a plane flies, below the stall"
+    return VehicleMatch(kind, not_testable=tuple(NotTestable(n, why) for n in names), note=why)
 
 
 def _flight(recording: FlownRecording, commands: Stream) -> Flight | None:
@@ -222,6 +235,12 @@ def settings_of(
         value = named["gps_latency"].values["delay"]
         lag = 1e3 * value.real
         out.append(Setting("SIM_GPS1_LAG_MS", float(round(lag)), 1e3 * value.sigma, "gps_latency"))
+    if "airspeed_scale" in named:
+        value = named["airspeed_scale"].values["scale"]
+        told = recording.signals.parameters.get("ARSPD_RATIO", 2.0)
+        ratio = told * (value.simulation / value.real) ** 2
+        sigma = 2.0 * ratio * value.sigma / value.real
+        out.append(Setting("SIM_ARSPD_RATIO", ratio, sigma, "airspeed_scale"))
     if "gps_lever_arm" in named:
         for axis in "xyz":
             value = named["gps_lever_arm"].values[axis]

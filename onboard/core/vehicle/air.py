@@ -16,16 +16,18 @@ class Air:
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
         rho: (n,) density, kg/m^3.
-        commands: (n, 3) of the motors, 0 to 1: mean, mean square, and evenness; None where they
-            were not recorded.
+        commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
+            plane: throttle and rudder.  None where they were not recorded.
         volts: (n,) of the battery; None where it was not recorded.
         power: (n,) mean over the motors of the thrust's share of the largest; by thrust_curve.
         thrust: (n,) specific force of the rotors from the commands, m/s^2; None without commands.
         pull: (n,) specific force of the rotors from the accelerometer and z drag, m/s^2.
-        force_b: (n, 3) predicted specific force, m/s^2.
+        force_b: (n, 3 or 4) predicted specific force, m/s^2, and airspeed where there is one, m/s.
+        alpha, pressure, lift: (n,) of a plane: angle of attack (rad), specific force by coefficient
+            (m/s^2), coefficient of lift.
     """
 
-    def __init__(self, flight: Flight, volts: Array | None = None) -> None:
+    def __init__(self, flight: Flight, volts: Array | None = None, columns: int = 3) -> None:
         """Begin with still, standard air and no force."""
         n = len(flight)
         self.flight = flight
@@ -37,7 +39,8 @@ class Air:
         self.power: Array | None = None
         self.thrust: Array | None = None
         self.pull = np.zeros(n)
-        self.force_b = np.zeros((n, 3))
+        self.force_b = np.zeros((n, columns))
+        self.alpha = self.pressure = self.lift = np.zeros(n)
         self._u_b: Array | None = None
 
     @property

@@ -7,12 +7,10 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
-from onboard.core.vehicle.limits import CURVE_BINS
+from onboard.core.vehicle.binning import FEWEST_IN_BIN, binned
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.records import Curve
 from onboard.core.vehicle.signals import Signals
-
-FEWEST_IN_BIN = 5
 
 
 def copter_curves(m: Matched, frame: CopterAirframe, signals: Signals) -> tuple[Curve, ...]:
@@ -27,20 +25,6 @@ def copter_curves(m: Matched, frame: CopterAirframe, signals: Signals) -> tuple[
     return tuple(c for c in curves if len(c.x))
 
 
-def binned(x: Array, y: Array, low: float, high: float) -> tuple[Array, Array, Array]:
-    """Middle, mean and scatter of y in even bins of x; only bins with enough data."""
-    edges = np.linspace(low, high, CURVE_BINS + 1)
-    which = np.clip(np.digitize(x, edges) - 1, 0, CURVE_BINS - 1)
-    middle, mean, spread = [], [], []
-    for k in range(CURVE_BINS):
-        mine = y[which == k]
-        if len(mine) >= FEWEST_IN_BIN:
-            middle.append(float(np.mean(x[which == k])))
-            mean.append(float(np.mean(mine)))
-            spread.append(float(np.std(mine)))
-    return np.array(middle), np.array(mean), np.array(spread)
-
-
 def _drag(m: Matched, frame: CopterAirframe, axis: int) -> Curve:
     """Specific force of drag over the speed through the air, at hover thrust and sea level."""
     theta, model = m.fit.theta, m.model
@@ -52,7 +36,7 @@ def _drag(m: Matched, frame: CopterAirframe, axis: int) -> Curve:
         return -linear * x - 0.5 * SEA_LEVEL_DENSITY * quadratic * np.abs(x) * x
 
     data = law(u, c_m, k) + m.fit.residual[:, axis]
-    x, mean, spread = binned(u, data, float(u.min()), float(u.max()))
+    x, mean, spread = binned(u, data)
     return Curve(
         f"drag_{'xy'[axis]}",
         "speed through the air",
@@ -82,7 +66,7 @@ def _thrust(m: Matched, frame: CopterAirframe) -> Curve | None:
     column = model.axes.index(2)
     power = np.maximum((1.0 - expo) * c + expo * air.commands[:, 1], 1e-3)
     share = top * scale * power - m.fit.residual[:, column] * power / np.maximum(air.power, 1e-3)
-    x, mean, spread = binned(c, share, float(c.min()), float(c.max()))
+    x, mean, spread = binned(c, share)
     return Curve(
         "thrust",
         "mean command of the motors",
@@ -106,8 +90,7 @@ def _sag(m: Matched, frame: CopterAirframe, signals: Signals) -> Curve | None:
     flown = (b.t >= flight.t[0]) & (b.t <= flight.t[-1])
     if np.count_nonzero(flown) < 2 * FEWEST_IN_BIN or float(np.ptp(used[flown])) <= 0.0:
         return None
-    low, high = float(used[flown].min()), float(used[flown].max())
-    x, mean, spread = binned(used[flown], b.x[flown, 0], low, high)
+    x, mean, spread = binned(used[flown], b.x[flown, 0])
     nominal = np.full(len(x), frame.maxVoltage)
     return Curve(
         "sag", "charge taken", "Ah", "battery voltage", "V", x, mean, spread, mean.copy(), nominal

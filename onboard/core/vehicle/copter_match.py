@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from onboard.core.diagnosis.records import NotTestable
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.battery import fitted_battery
@@ -39,6 +38,7 @@ from onboard.core.vehicle.matching import (
     numbers_of,
     series_of,
     wind_of,
+    windless,
 )
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Signals
@@ -84,7 +84,7 @@ def match_copter(
         alone_before=before,
         alone_after=after,
         ambiguous=ambiguous_of(found),
-        not_testable=_windless(untested, found),
+        not_testable=windless(untested, found),
         numbers=numbers_of(found),
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
@@ -96,16 +96,6 @@ def match_copter(
 
 def _manoeuvres(m: Matched) -> dict[str, str]:
     return {e.name: e.manoeuvre for e in m.model.effects if e.name}
-
-
-def _windless(untested: tuple[NotTestable, ...], m: Matched) -> tuple[NotTestable, ...]:
-    """A calm has no profile: that is the reason, not the flight."""
-    if "wind" in m.chosen.effects:
-        return untested
-    return tuple(
-        replace(n, why="there was no wind to have one") if n.name == "wind_profile" else n
-        for n in untested
-    )
 
 
 def _with_battery(

@@ -34,6 +34,9 @@ def drift_alone(flight: Flight, error_b: Array, slope: Array) -> float:
     drift = np.zeros((len(at), 3))
     for k in range(length):
         i = at + k
-        off = error_b[i] + np.einsum("nij,nj->ni", slope[i], drift)
-        drift = drift + h * np.einsum("nji,nj->ni", flight.R_bn[i], off)
+        R_nb = np.swapaxes(flight.R_bn[i], -1, -2)
+        # Implicit: a plane's lift answers faster than a step.
+        damped = np.eye(3) - h * R_nb @ slope[i]
+        pushed = drift + h * np.einsum("nij,nj->ni", R_nb, error_b[i])
+        drift = np.linalg.solve(damped, pushed[..., None])[..., 0]
     return float(np.sqrt(np.mean(np.sum(drift**2, axis=1))))

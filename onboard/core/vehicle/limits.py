@@ -68,7 +68,10 @@ OUTLYING: Final = 5.0
 """Robust sigmas past which a step is no part of what the model describes (stall, gust front,
 contact): 6e-7 of normal ones [probability]."""
 
-# Decisions (decision).
+STALL_SHARE: Final = 0.85
+"""Of the angle of stall: up to it lift is a straight line to a per cent [physics]."""
+
+# Decisions (choices).
 
 FALSE_ALARM: Final = 1e-3
 """Probability that a recording of the nominal airframe shows any given effect by chance; divided

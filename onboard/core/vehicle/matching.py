@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,10 @@ from onboard.core.vehicle.records import (
     ForceSeries,
     WindEstimate,
 )
+
+AIRSPEED = "airspeed_scale"
+FORCE = (0, 1, 2)
+"""Columns of a prediction that are forces; a further one is airspeed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +113,6 @@ def rms(x: Array) -> float:
 def differences(m: Matched) -> tuple[Difference, ...]:
     """The effects that were chosen, and turbulence, with their evidence."""
     fit, chosen = m.fit, m.chosen
-    after = rms(m.held)
     whole = sum(max(chosen.gains[n], 0.0) for n in chosen.effects)
     out = []
     for name in chosen.effects:
@@ -118,6 +121,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         effect = _effect(m.model, name)
         shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
         apart = fit.theta[places] - m.model.nominal[places]
+        columns = [k for k, a in enumerate(m.model.axes) if (a in FORCE) != (name == AIRSPEED)]
         out.append(
             Difference(
                 name,
@@ -128,8 +132,8 @@ def differences(m: Matched) -> tuple[Difference, ...]:
                     m.model.flight, fit.jacobian[:, :, places] @ apart, m.model.axes, fit.block
                 ),
                 chosen.rivals[name],
-                rms(held_out(m.choices, without)),
-                after,
+                rms(held_out(m.choices, without)[:, columns]),
+                rms(m.held[:, columns]),
             )
         )
     if m.turbulence.found:
@@ -185,6 +189,7 @@ def mismatch_of(m: Matched) -> dict[str, AxisMismatch]:
     return {
         AXES[axis]: AxisMismatch(rms(m.nominal[:, k]), rms(m.held[:, k]))
         for k, axis in enumerate(m.model.axes)
+        if axis in FORCE
     }
 
 
@@ -196,10 +201,12 @@ def drifts_of(m: Matched) -> tuple[float, float]:
 
 def series_of(m: Matched) -> ForceSeries:
     """Forces over time, for a report."""
-    measured = m.model.measured()
+    columns = [k for k, axis in enumerate(m.model.axes) if axis in FORCE]
+    measured = m.model.measured()[:, columns]
     t = m.model.flight.t - m.model.flight.t[0]
-    axes = tuple(AXES[a] for a in m.model.axes)
-    return ForceSeries(t, axes, measured, measured - m.nominal, measured - m.held)
+    axes = tuple(AXES[m.model.axes[k]] for k in columns)
+    before, after = measured - m.nominal[:, columns], measured - m.held[:, columns]
+    return ForceSeries(t, axes, measured, before, after)
 
 
 def ambiguous_of(m: Matched) -> tuple[Ambiguity, ...]:
@@ -224,6 +231,14 @@ def not_testable_of(
     )
 
 
+def windless(untested: tuple[NotTestable, ...], m: Matched) -> tuple[NotTestable, ...]:
+    """A calm has no profile: that is the reason, not the flight."""
+    if "wind" in m.chosen.effects:
+        return untested
+    why = "there was no wind to have one"
+    return tuple(replace(n, why=why) if n.name == "wind_profile" else n for n in untested)
+
+
 def numbers_of(m: Matched) -> dict[str, Compared]:
     """Every unknown of the model."""
     out, at = {}, 0
@@ -242,7 +257,7 @@ def is_explained(m: Matched) -> bool:
     left = [
         rms(m.held[:, k]) / max(rms(m.fit.sensitivity[:, k]), 1e-6)
         for k, axis in enumerate(m.model.axes)
-        if axis < 2
+        if axis in (0, 1)
     ]
     return max(left, default=0.0) < TURBULENCE_FLOOR_M_S
 
@@ -254,9 +269,11 @@ def _effect(model: ForceModel, name: str) -> Effect:
 def _drift(model: ForceModel, theta: Array, residual: Array) -> float:
     n = len(model.flight)
     error, slope = np.zeros((n, 3)), np.zeros((n, 3, 3))
-    error[:, list(model.axes)] = -residual
+    columns = [k for k, axis in enumerate(model.axes) if axis in FORCE]
+    axes = [model.axes[k] for k in columns]
+    error[:, axes] = -residual[:, columns]
     # Moving air one way is moving the vehicle the other way.
-    slope[:, list(model.axes)] = -model.gust_slope(theta)
+    slope[:, axes] = -model.gust_slope(theta)[:, columns]
     return drift_alone(model.flight, error, slope)
 
 
@@ -282,9 +299,10 @@ def _cut(flight: Flight, kept: Mask) -> Flight:
 def _turbulence(fit: Fit) -> Turbulence:
     """Gusts by how the lateral noise grows with the sensitivity to them."""
     flight = fit.model.flight
+    lateral = (0, 1) if "rotor_drag" in {e.name for e in fit.model.effects} else (1,)
     found = []
     for k, axis in enumerate(fit.model.axes):
-        if axis == 2:
+        if axis not in lateral:
             continue
         data = fit.residual[:, k], fit.sensitivity[:, k], flight.piece, flight.step_s
         noise = fitted_noise(*data, gusts=True)

@@ -114,7 +114,8 @@ class ForceModel:
 
     def measured(self) -> Array:
         """(n, k) what the accelerometer says."""
-        out: Array = self.flight.f_b[:, list(self.axes)]
+        every = np.hstack([self.flight.f_b, self.flight.airspeed[:, None]])
+        out: Array = every[:, list(self.axes)]
         return out
 
     def jacobian(self, theta: Array) -> Array:

@@ -22,6 +22,7 @@ from onboard.core.vehicle.limits import (
     LEAST_NOISE_M_S2,
     WHITE_SHARES,
 )
+from onboard.core.vehicle.recursion import accumulated, pieces_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,17 +84,11 @@ def whitened(
     scaled = rows / noise.size(sensitivity)[:, None]
     rec = _recursion(step_s, noise.correlation_s, noise.white)
     out = np.empty_like(scaled)
-    edges = np.flatnonzero(np.diff(piece)) + 1
-    for part in np.split(np.arange(len(piece)), edges):
+    for part in pieces_of(piece):
         y = scaled[part]
         z = y.copy()
         z[1:] -= rec.phi * y[:-1]
-        shift, factor = 1, rec.decay
-        while shift < len(z) and factor > 1e-12:
-            moved = factor * z[:-shift]
-            z[shift:] += moved
-            shift, factor = 2 * shift, factor * factor
-        z /= math.sqrt(rec.variance)
+        z = accumulated(z, rec.decay) / math.sqrt(rec.variance)
         z[0] = y[0]
         out[part] = z
     return out

@@ -10,7 +10,7 @@ from onboard.core.vehicle.records import Place
 
 MOST = 4
 LEAST_SHARE = 0.05
-AXES = "xyz"
+AXES = ("x", "y", "z", "airspeed")
 CLIMB_M_S, FAST_M_S, TURN_RAD_S = 1.0, 5.0, 0.3
 
 
@@ -61,7 +61,11 @@ def places_of(
         share = sum(by_block[b] for b in group)
         out.append(
             Place(
-                float(t[0]), float(t[-1]), f"body_{axis}", regime_of(flight, mine), round(share, 4)
+                float(t[0]),
+                float(t[-1]),
+                axis if axis == AXES[-1] else f"body_{axis}",
+                regime_of(flight, mine),
+                round(share, 4),
             )
         )
     return tuple(out)

@@ -25,4 +25,4 @@ class SensorOffset(Effect):
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add it."""
-        air.force_b += np.asarray(values)
+        air.force_b[:, :3] += np.asarray(values)

@@ -45,6 +45,8 @@ class WindProfile(Effect):
 
     def missing(self, air: Air) -> str:
         """It takes heights that differ."""
-        above = np.clip(air.flight.height - air.flight.ground, LOWEST_M, self.top)
+        above = np.maximum(air.flight.height - air.flight.ground, LOWEST_M)
         low, high = np.percentile(above, [5, 95])
-        return "" if high > LEAST_RATIO * low else f"flown between {low:.0f} and {high:.0f} m only"
+        if min(high, self.top) > LEAST_RATIO * min(low, self.top):
+            return ""
+        return f"flown between {low:.0f} and {high:.0f} m only"
