@@ -96,7 +96,7 @@ class Flown:
             t = np.array([f.t for f in fixes])
             v = np.array([(f.v_n, f.v_e, f.v_d or 0.0) for f in fixes])
             height = np.array([f.altitude for f in fixes])
-            self.grounded = grounded_spans(t, v, height)
+            self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")
             self.ground = float(np.percentile(height, 0.5))
         step = _averaged_over(self._kept)
         for sample in _with_landings(_slower(self._kept, step), self.grounded):

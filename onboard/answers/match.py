@@ -228,7 +228,9 @@ def settings_of(
         out += _wind_settings(vehicle)
     if "turbulence" in named:
         value = named["turbulence"].values["rms"]
-        out.append(Setting("SIM_WIND_TURB", value.real, value.sigma, "turbulence"))
+        # The simulator's gusts point anywhere: the setting is their length, not a component.
+        gain = math.sqrt(2.0)
+        out.append(Setting("SIM_WIND_TURB", gain * value.real, gain * value.sigma, "turbulence"))
     if {"rotor_drag", "body_drag"} & set(named):
         out += _drag_settings(vehicle)
     if "gps_latency" in named:

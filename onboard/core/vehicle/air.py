@@ -15,6 +15,8 @@ class Air:
         flight: what was recorded.
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
+        gust_variance: of the air along each axis, m^2/s^2.
+        tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
         commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
             plane: throttle and rudder.  None where they were not recorded.
@@ -33,6 +35,8 @@ class Air:
         self.flight = flight
         self.wind_n = np.zeros((n, 3))
         self.gust_n = np.zeros(3)
+        self.gust_variance = 0.0
+        self.tilt = (0.0, 0.0)
         self.rho = flight.rho
         self.commands: Array | None = flight.commands if flight.commands.shape[1] else None
         self.volts = volts

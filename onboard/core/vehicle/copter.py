@@ -13,6 +13,7 @@ from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.body_drag import BodyDrag
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.ground_effect import GroundEffect
+from onboard.core.vehicle.effects.gust_drag import GustDrag
 from onboard.core.vehicle.effects.inflow import Inflow
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
@@ -23,7 +24,7 @@ from onboard.core.vehicle.effects.thrust_tilt import ThrustTilt
 from onboard.core.vehicle.effects.vertical_drag import VerticalDrag
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.signals import Signals, Stream
@@ -36,6 +37,22 @@ else it is another battery, and what was flown is taken for full [physics]."""
 DENSITY_RANGE_M = 500.0
 """Range of heights, m, over which the standard atmosphere loses 5 %: below, a density that is off
 looks like another thrust and another drag [physics]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Which of the forms of a model that no number tells apart.
+
+    Attributes:
+        profile_top: height from which the wind is constant, m.
+        by_components: whether rotors that lean drag as the simulator's do.
+        gusty: whether the air is turbulent, so that gusts act on the mean force, and commands
+            answer them.
+    """
+
+    profile_top: float = TOP_M
+    by_components: bool = False
+    gusty: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +127,7 @@ def copter_model(
     flight: Flight,
     frame: CopterAirframe,
     force_sigma: Array,
-    profile_top: float,
+    variant: Variant = Variant(),
 ) -> ForceModel:
     """Every effect of a copter that this recording can speak of."""
 
@@ -120,12 +137,13 @@ def copter_model(
     still = start(flight)
     everything: list[Effect] = [
         Wind(),
-        WindProfile(profile_top),
+        WindProfile(variant.profile_top),
+        *([GustDrag()] if variant.gusty else []),
         *([AirDensity()] if flown_high(flight) else []),
         VerticalDrag(frame),
-        RotorDrag(frame),
-        BodyDrag(frame),
         ThrustTilt(),
+        RotorDrag(frame, by_components=variant.by_components),
+        BodyDrag(frame),
         MotorLag(),
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),
@@ -136,7 +154,7 @@ def copter_model(
     ]
     effects = tuple(e for e in everything if not e.missing(still))
     axes = (0, 1, 2) if still.commands is not None else (0, 1)
-    return ForceModel(flight, effects, axes, start)
+    return ForceModel(flight, effects, axes, start, instrumented=variant.gusty)
 
 
 def copter_missing(flight: Flight, frame: CopterAirframe) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.battery import fitted_battery
 from onboard.core.vehicle.copter import (
     Outputs,
+    Variant,
     copter_missing,
     copter_model,
     full_voltage,
@@ -23,7 +25,7 @@ from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
-from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
+from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.matching import (
@@ -36,6 +38,7 @@ from onboard.core.vehicle.matching import (
     mismatch_of,
     not_testable_of,
     numbers_of,
+    rms,
     series_of,
     wind_of,
     windless,
@@ -48,6 +51,13 @@ MANOEUVRES = {
     for e in (AirDensity, GroundEffect, MotorLag, ThrustCurve, ThrustScale, VoltageSag, WindProfile)
 }
 
+RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
+    # ArduPilot's wind is constant from 60 m on, the open air's is not.
+    ("wind_profile", {"profile_top": math.inf}),
+    # ArduPilot's rotors that lean drag more on one axis.
+    ("thrust_tilt", {"by_components": True}),
+)
+"""Where an effect was found, another form of the model: that which predicts better is taken."""
 DIGITS = 6
 """Of the numbers of a frame file: parameters are of single precision [data sheet]."""
 
@@ -63,13 +73,17 @@ def match_copter(
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    found = matched(copter_model(flight, frame, force_sigma, TOP_M))
-    if "wind_profile" in found.chosen.effects:
-        # ArduPilot's wind is constant from 60 m on, the open air's is not: the likelier one.
-        other = matched(copter_model(flight, frame, force_sigma, math.inf))
-        names = found.chosen.effects
-        if other.choices.solved(names).chi2 < found.choices.solved(names).chi2:
-            found = other
+    variant = Variant()
+    found = matched(copter_model(flight, frame, force_sigma, variant))
+    if found.turbulence.found:
+        variant = replace(variant, gusty=True)
+        found = matched(copter_model(flight, frame, force_sigma, variant))
+    for name, change in RIVAL_FORMS:
+        if name in found.chosen.effects:
+            other_form = replace(variant, **change)
+            other = matched(copter_model(flight, frame, force_sigma, other_form))
+            if rms(other.held) < rms(found.held):
+                variant, found = other_form, other
     before, after = drifts_of(found)
     effects = tuple(
         _with_battery(d, found.model.flight, signals, frame) for d in differences(found)

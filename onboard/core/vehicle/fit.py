@@ -10,14 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FEWEST_BLOCKS,
+    INSTRUMENT_WINDOWS,
     NOISE_ROUNDS,
     ROUNDS,
     SETTLED,
+    THRUST_AXIS,
 )
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
@@ -77,8 +80,10 @@ class Fit:
 
     @property
     def sigma(self) -> Array:
-        """(m,) standard deviations."""
-        return np.sqrt(np.diag(self.covariance))
+        """(m,) standard deviations, with what the laws are good for."""
+        plain = np.sqrt(np.diag(self.covariance))
+        pairs = zip(self.model.unknowns, self.theta.tolist(), plain.tolist(), strict=True)
+        return np.array([u.doubted(v, s) for u, v, s in pairs])
 
     @property
     def scale(self) -> float:
@@ -175,7 +180,8 @@ def _settled(
         for _halving in range(6):
             trial = theta + step
             then = cost(trial)
-            if then <= now + 1e-6:
+            # Regressors that are told from the past lead to no minimum of these squares.
+            if model.instrumented or then <= now + 1e-6:
                 theta, now = trial, then
                 break
             step = 0.5 * step
@@ -202,7 +208,32 @@ def _rows(
         if jacobian is not None:
             rows = np.hstack([rows, jacobian[:, k]])
         sensitive = windows.mean(sensitivity[:, k])
-        out.append(whitened(windows.mean(rows), its, sensitive, windows.piece, step))
+        made = whitened(windows.mean(rows), its, sensitive, windows.piece, step)
+        if jacobian is not None and model.instrumented and model.axes[k] == THRUST_AXIS:
+            made[:, 1:] = _instrumented(made[:, 1:], windows.piece)
+        out.append(made)
+    return out
+
+
+def _instrumented(rows: Array, piece: NDArray[np.int64]) -> Array:
+    """(r, m) regressors as far as their own past tells them (two-stage least squares).
+
+    An autopilot answers a gust at once: its commands are no longer independent of the disturbance,
+    and least squares would take the answer for the cause.  What the commands were before the gust
+    is independent of it.  J. D. Angrist and J.-S. Pischke, *Mostly Harmless Econometrics* (2009),
+    chapter 4.
+    """
+    past = []
+    for lag in INSTRUMENT_WINDOWS:
+        moved = np.zeros_like(rows)
+        moved[lag:] = rows[:-lag]
+        moved[np.concatenate([np.ones(lag, dtype=bool), piece[lag:] != piece[:-lag]])] = 0.0
+        past.append(moved)
+    instruments = np.hstack(past)
+    size = np.linalg.norm(instruments, axis=0)
+    instruments = instruments[:, size > 0.0] / size[size > 0.0]
+    told, *_ = np.linalg.lstsq(instruments, rows, rcond=1e-8)
+    out: Array = instruments @ told
     return out
 
 

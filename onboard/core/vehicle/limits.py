@@ -58,6 +58,11 @@ FEWEST_BLOCKS: Final = 5
 """Fewer blocks do not tell the scatter between them [probability]."""
 FOLDS: Final = 8
 """Folds of the cross-validation [cost]."""
+INSTRUMENT_WINDOWS: Final = (2, 4)
+"""Windows ago of which commands are told from: longer than a gust that an autopilot answers at once
+lasts, shorter than a manoeuvre [physics]."""
+THRUST_AXIS: Final = 2
+"""Body axis along which the commands act."""
 ROUNDS: Final = 12
 """Gauss-Newton steps at the most [cost]."""
 SETTLED: Final = 0.02

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -40,11 +41,22 @@ FORCE = (0, 1, 2)
 
 @dataclass(frozen=True, slots=True)
 class Turbulence:
-    """RMS of the gusts, m/s, its sigma, and twice the log-likelihood it adds."""
+    """Gusts along an axis.
+
+    Attributes:
+        rms: of those that the noise shows, slower than the steps, m/s.
+        sigma: of it.
+        evidence: twice the log-likelihood that it adds.
+        whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; the same as
+            ``rms`` where that is not known.
+        whole_sigma: of it.
+    """
 
     rms: float
     sigma: float
     evidence: float
+    whole: float
+    whole_sigma: float
 
     @property
     def found(self) -> bool:
@@ -84,7 +96,7 @@ def matched(model: ForceModel) -> Matched:
     fit = fitted(model)
     kept = _inlying(fit)
     if not kept.all():
-        model = ForceModel(_cut(model.flight, kept), model.effects, model.axes, model.start)
+        model = replace(model, flight=_cut(model.flight, kept))
         fit = fitted(model, fit.theta)
     choices = Choices(fit)
     chosen = choose(choices)
@@ -138,7 +150,10 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         )
     if m.turbulence.found:
         t = m.turbulence
-        value = {"rms": Compared(0.0, t.rms, t.sigma, "m/s")}
+        value = {
+            "rms": Compared(0.0, t.whole, t.whole_sigma, "m/s"),
+            "rms_below_5_hz": Compared(0.0, t.rms, t.sigma, "m/s"),
+        }
         out.append(Difference("turbulence", "vehicle", value, 0.0))
     return tuple(out)
 
@@ -175,7 +190,7 @@ def wind_of(m: Matched) -> WindEstimate:
         flight.mean_height,
         exponent,
         exponent_sigma,
-        m.turbulence.rms if m.turbulence.found else None,
+        m.turbulence.whole if m.turbulence.found else None,
         np.array(when),
         np.array(heights),
         np.array(series).reshape(-1, 2),
@@ -313,4 +328,11 @@ def _turbulence(fit: Fit) -> Turbulence:
     gust = float(np.sqrt(np.mean([g * g for g, _, _ in found]))) if found else 0.0
     count = sum(n for _, _, n in found) if found else 1.0
     evidence = sum(e for _, e, _ in found)
-    return Turbulence(gust, gust / np.sqrt(2.0 * max(count, 1.0)), evidence)
+    sigma = gust / math.sqrt(2.0 * max(count, 1.0))
+    whole, its = gust, sigma
+    if any(u.name == "gust_variance" for u in fit.model.unknowns):
+        k = fit.model.index("gust_variance")
+        variance, spread = float(fit.theta[k]), float(fit.sigma[k])
+        if variance > max(SURE * spread, gust**2):
+            whole, its = math.sqrt(variance), spread / (2.0 * math.sqrt(variance))
+    return Turbulence(gust, sigma, evidence, whole, its)

@@ -33,12 +33,15 @@ class ForceModel:
         effects: in the order in which they act.
         axes: body axes that it predicts.
         start: makes the air.
+        instrumented: whether the vehicle's commands answer what acts along z (see
+            :func:`onboard.core.vehicle.fit.fitted`).
     """
 
     flight: Flight
     effects: tuple[Effect, ...]
     axes: tuple[int, ...]
     start: Start
+    instrumented: bool = False
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

@@ -8,7 +8,9 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.limits import GROUND_M, MARGIN_S, STILL_M_S, STILL_S
 
 
-def grounded_spans(t: Array, v_n: Array, height: Array) -> list[tuple[float, float]]:
+def grounded_spans(
+    t: Array, v_n: Array, height: Array, *, rolls: bool = False
+) -> list[tuple[float, float]]:
     """Intervals (s) in which a vehicle stands on the ground, with a margin to either side.
 
     A hover is still, too: only what is as low as the lowest such place counts.
@@ -17,6 +19,7 @@ def grounded_spans(t: Array, v_n: Array, height: Array) -> list[tuple[float, flo
         t: (n,) times of fixes, s.
         v_n: (n, 3) velocity, m/s; NaN down where it is not measured.
         height: (n,) m.
+        rolls: whether it may move on the ground: then all that is as low is the ground.
     """
     if len(t) < 2:
         return []
@@ -29,6 +32,9 @@ def grounded_spans(t: Array, v_n: Array, height: Array) -> list[tuple[float, flo
     # A flight that is recorded in parts may begin in a hover: nothing was lower then either.
     if float(np.percentile(height, 1)) < lowest - GROUND_M:
         return []
+    if rolls:
+        runs = [(i, j) for i, j in _runs(height < lowest + GROUND_M) if j - i > 1]
+        levels = [lowest] * len(runs)
     return [
         (float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S)
         for (i, j), level in zip(runs, levels, strict=True)

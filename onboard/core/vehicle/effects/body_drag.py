@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
+from onboard.core.vehicle.gusts import signed_square
 
 PLAUSIBLE = 0.1
 """m^2/kg: ballistic coefficients from 10 kg/m^2 up [physics]."""
 FLOOR_SHARE = 0.05
 """Of the nominal value [use]."""
+
+DOUBT = 0.0004
+"""What the law is good for, m^2/kg: a per cent of a usual body [physics]."""
 
 
 class BodyDrag(Effect):
@@ -27,16 +29,16 @@ class BodyDrag(Effect):
         nominal = frame.body_drag
         super().__init__(
             [
-                Unknown(axis, nominal, PLAUSIBLE, FLOOR_SHARE * max(nominal, 0.02), "m^2/kg")
+                Unknown(axis, nominal, PLAUSIBLE, FLOOR_SHARE * max(nominal, 0.02), "m^2/kg", DOUBT)
                 for axis in ("x", "y")
             ]
         )
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag."""
-        u = air.u_b[:, :2]
-        pressure = 0.5 * air.rho[:, None] * np.abs(u) * u
-        air.force_b[:, :2] -= pressure * np.asarray(values)
+        for axis, value in enumerate(values):
+            square = signed_square(air.u_b[:, axis], air.gust_variance)
+            air.force_b[:, axis] -= 0.5 * value * air.rho * square
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Ballistic coefficients, as EK3_DRAG_BCOEF_X and _Y; none where there is no drag."""

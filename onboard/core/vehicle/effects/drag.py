@@ -24,8 +24,10 @@ class Drag(Effect):
         """Nominally the file's."""
         super().__init__(
             [
-                Unknown("c_drag_p", frame.c_drag_p, 0.1, FLOOR_SHARE * frame.c_drag_p, "1"),
-                Unknown("induced", frame.induced, 0.03, 2 * FLOOR_SHARE * frame.induced, "1"),
+                Unknown("c_drag_p", frame.c_drag_p, 0.1, FLOOR_SHARE * frame.c_drag_p, "1", 0.003),
+                Unknown(
+                    "induced", frame.induced, 0.03, 2 * FLOOR_SHARE * frame.induced, "1", 0.005
+                ),
             ]
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ class Unknown:
         plausible: standard deviation over the vehicles that fly: prior, and scale of steps.
         floor: differences below do not matter.
         unit: in the document.
+        doubt: what the form of the law itself is good for, as a standard deviation.
+        share: the same as a share of the value.
     """
 
     name: str
@@ -26,6 +29,12 @@ class Unknown:
     plausible: float
     floor: float
     unit: str
+    doubt: float = 0.0
+    share: float = 0.0
+
+    def doubted(self, value: float, sigma: float) -> float:
+        """A sigma of the fit with what the law is good for."""
+        return math.sqrt(sigma**2 + self.doubt**2 + (self.share * value) ** 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.gusts import positive_square
 
 
 class Inflow(Effect):
@@ -26,6 +25,6 @@ class Inflow(Effect):
         """Take it off, and pull."""
         if air.thrust is None:
             return
-        climb = np.maximum(-air.u_b[:, 2], 0.0)
-        air.thrust = air.thrust - values[0] * air.rho / self._density * climb**2
+        square = positive_square(-air.u_b[:, 2], air.gust_variance)
+        air.thrust = air.thrust - values[0] * air.rho / self._density * square
         air.force_b[:, 2] -= air.thrust

@@ -24,9 +24,16 @@ class Lift(Effect):
         """Nominally the file's."""
         super().__init__(
             [
-                Unknown("c_lift_0", frame.c_lift_0, 0.3, FLOOR_SHARE * abs(frame.c_lift_0), "1"),
                 Unknown(
-                    "c_lift_a", frame.c_lift_a, 2.0, FLOOR_SHARE * abs(frame.c_lift_a), "1/rad"
+                    "c_lift_0", frame.c_lift_0, 0.3, FLOOR_SHARE * abs(frame.c_lift_0), "1", 0.01
+                ),
+                Unknown(
+                    "c_lift_a",
+                    frame.c_lift_a,
+                    2.0,
+                    FLOOR_SHARE * abs(frame.c_lift_a),
+                    "1/rad",
+                    share=0.01,
                 ),
             ]
         )

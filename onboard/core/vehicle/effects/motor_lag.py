@@ -22,7 +22,7 @@ class MotorLag(Effect):
 
     def __init__(self) -> None:
         """Nominally none (slew_max 150/s is a hundredth of a second)."""
-        super().__init__([Unknown("time_constant", 0.0, 0.1, FLOOR_S, "s")])
+        super().__init__([Unknown("time_constant", 0.0, 0.1, FLOOR_S, "s", doubt=0.003)])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Delay the commands."""

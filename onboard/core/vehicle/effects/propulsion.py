@@ -23,7 +23,7 @@ class Propulsion(Effect):
 
     def __init__(self, frame: PlaneAirframe) -> None:
         """Nominally the simulator's."""
-        super().__init__([Unknown("log_ratio", 0.0, 0.7, FLOOR, "1")])
+        super().__init__([Unknown("log_ratio", 0.0, 0.7, FLOOR, "1", doubt=0.01)])
         self._full = frame.full_thrust
 
     def act(self, air: Air, values: Sequence[float]) -> None:

@@ -29,8 +29,8 @@ class SideForce(Effect):
         floor = FLOOR_SHARE * abs(frame.c_y_b)
         super().__init__(
             [
-                Unknown("c_y_b", frame.c_y_b, 0.5, floor, "1/rad"),
-                Unknown("c_y_deltar", frame.c_y_deltar, 0.2, RUDDER_FLOOR, "1"),
+                Unknown("c_y_b", frame.c_y_b, 0.5, floor, "1/rad", share=0.02),
+                Unknown("c_y_deltar", frame.c_y_deltar, 0.2, RUDDER_FLOOR, "1", 0.02),
             ]
         )
         self._constant = frame.c_y_0

@@ -20,7 +20,7 @@ class ThrustCurve(Effect):
 
     def __init__(self, frame: CopterAirframe) -> None:
         """Nominally the frame's propExpo."""
-        super().__init__([Unknown("expo", frame.propExpo, 0.5, FLOOR, "1")])
+        super().__init__([Unknown("expo", frame.propExpo, 0.5, FLOOR, "1", doubt=0.006)])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Commands to power."""

@@ -21,7 +21,7 @@ class ThrustScale(Effect):
 
     def __init__(self, frame: CopterAirframe) -> None:
         """Nominally the frame's hoverThrOut."""
-        super().__init__([Unknown("log_ratio", 0.0, 0.7, FLOOR, "1")])
+        super().__init__([Unknown("log_ratio", 0.0, 0.7, FLOOR, "1", doubt=0.005)])
         self._full, self._density = frame.full_thrust, frame.reference_density
 
     def act(self, air: Air, values: Sequence[float]) -> None:

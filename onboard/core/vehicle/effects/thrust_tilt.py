@@ -21,8 +21,9 @@ class ThrustTilt(Effect):
 
     def __init__(self) -> None:
         """Nominally along the body's axis."""
-        super().__init__([Unknown(a, 0.0, 0.1, FLOOR_RAD, "rad") for a in ("x", "y")])
+        super().__init__([Unknown(a, 0.0, 0.1, FLOOR_RAD, "rad", doubt=0.001) for a in ("x", "y")])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Lean the pull."""
+        air.tilt = (values[0], values[1])
         air.force_b[:, :2] += np.asarray(values) * air.pull[:, None]

@@ -12,6 +12,7 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.gusts import signed_square
 
 LEAST_PULL = 0.05
 """Share of gravity below which rotors are taken to idle [physics]."""
@@ -45,7 +46,7 @@ class VerticalDrag(Effect):
         """Free the measured force of it, and predict it."""
         linear, quadratic = values
         u = air.u_b[:, 2]
-        still = 0.5 * air.rho * quadratic * np.abs(u) * u
+        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance)
         measured = -air.flight.f_b[:, 2]
         air.pull = measured
         for _ in range(TURNS):

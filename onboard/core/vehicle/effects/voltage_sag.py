@@ -23,7 +23,7 @@ class VoltageSag(Effect):
 
     def __init__(self, full_voltage: float) -> None:
         """Nominally a constant voltage (battCapacityAh 0)."""
-        super().__init__([Unknown("share", 0.0, 1.0, FLOOR, "1")])
+        super().__init__([Unknown("share", 0.0, 1.0, FLOOR, "1", doubt=0.005)])
         self.full_voltage = full_voltage
 
     def act(self, air: Air, values: Sequence[float]) -> None:

@@ -12,6 +12,9 @@ PLAUSIBLE_M_S = 10.0
 FLOOR_M_S = 0.3
 """Wind below this is calm: Beaufort 0 [use]."""
 
+DOUBT_M_S = 0.02
+"""What a constant wind is good for, m/s: errors of the velocity do not average out [data sheet]."""
+
 
 class Wind(Effect):
     """A constant wind, towards north and east, at the flight's mean height."""
@@ -24,8 +27,8 @@ class Wind(Effect):
         unit = "m/s"
         super().__init__(
             [
-                Unknown("north", 0.0, PLAUSIBLE_M_S, FLOOR_M_S, unit),
-                Unknown("east", 0.0, PLAUSIBLE_M_S, FLOOR_M_S, unit),
+                Unknown("north", 0.0, PLAUSIBLE_M_S, FLOOR_M_S, unit, doubt=DOUBT_M_S),
+                Unknown("east", 0.0, PLAUSIBLE_M_S, FLOOR_M_S, unit, doubt=DOUBT_M_S),
             ]
         )
 

@@ -28,7 +28,7 @@ class WindProfile(Effect):
 
     def __init__(self, top: float = TOP_M) -> None:
         """A uniform wind has exponent zero."""
-        super().__init__([Unknown("exponent", 0.0, 0.3, 0.05, "1")])
+        super().__init__([Unknown("exponent", 0.0, 0.3, 0.05, "1", doubt=0.01)])
         self.top = top
 
     def act(self, air: Air, values: Sequence[float]) -> None:
