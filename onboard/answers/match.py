@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from onboard.answers.flown import FlownRecording, flown
 from onboard.answers.sensor_level import calibration_settings, sensor_differences
 from onboard.core.diagnosis.records import NotTestable, Verdict
+from onboard.core.inputs.segments import Batch
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import Outputs
 from onboard.core.vehicle.copter_match import match_copter
@@ -39,6 +40,8 @@ NAMES = {
     ),
 }
 """Catalogue by vehicle."""
+SLOW_M_S, FAST_M_S = 3.0, 7.0
+"""Speed over ground that a tenth of the flight is slower than: of a copter, of a plane."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
 
 
@@ -120,7 +123,7 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
     Raises:
         ValueError: a frame that makes no sense.
     """
-    kind = recording.signals.kind
+    kind = recording.signals.kind or guessed_kind(recording.batches)
     airframe, plane = CopterAirframe.of(frame), PlaneAirframe.of(frame)
     commands = Stream()
     if kind in COPTERS:
@@ -146,6 +149,18 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
         return found
     why = "it never flew as fast as a plane flies, below the stall"
     return VehicleMatch(kind, not_testable=tuple(NotTestable(n, why) for n in names), note=why)
+
+
+def guessed_kind(batches: Sequence[Batch]) -> str:
+    """A copter stops in the air, a plane does not; empty where neither is clear."""
+    v_n = [b.fixes.v_n for b in batches]
+    if not v_n:
+        return ""
+    speed = np.linalg.norm(np.nan_to_num(np.concatenate(v_n))[:, :2], axis=1)
+    slow = float(np.percentile(speed, 10))
+    if slow < SLOW_M_S:
+        return "copter"
+    return "plane" if slow > FAST_M_S else ""
 
 
 def _flight(recording: FlownRecording, commands: Stream) -> Flight | None:
@@ -235,7 +250,7 @@ def settings_of(
         out += _drag_settings(vehicle)
     if "gps_latency" in named:
         value = named["gps_latency"].values["delay"]
-        lag = 1e3 * value.real
+        lag = max(1e3 * value.real, 0.0)
         out.append(Setting("SIM_GPS1_LAG_MS", float(round(lag)), 1e3 * value.sigma, "gps_latency"))
     if "airspeed_scale" in named:
         value = named["airspeed_scale"].values["scale"]

@@ -145,8 +145,11 @@ def _facts(result: Match) -> Table:
     for k, s in enumerate(result.settings):
         sigma = f"  (sigma {number(s.sigma, s.sigma)})" if s.sigma > 0.0 else ""
         table.add_row("" if k else "Settings", f"{s.name} {number(s.value, s.sigma)}{sigma}")
-    for k, n in enumerate(result.not_testable):
-        table.add_row("" if k else "Not tested", f"{n.name}: {n.why}")
+    reasons: dict[str, list[str]] = {}
+    for n in result.not_testable:
+        reasons.setdefault(n.why, []).append(n.name)
+    for k, (why, names) in enumerate(reasons.items()):
+        table.add_row("" if k else "Not tested", f"{', '.join(names)}: {why}")
     if vehicle.note:
         table.add_row("Note", vehicle.note)
     return table

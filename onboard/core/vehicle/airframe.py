@@ -13,6 +13,10 @@ from dataclasses import dataclass, fields, replace
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 
+LEAST_BODY_DRAG = 1e-4
+"""m^2/kg; a file cannot have rotors' drag and none at all of the body: its reference test gives
+what is left over to the body."""
+
 
 @dataclass(frozen=True, slots=True)
 class CopterAirframe:
@@ -120,7 +124,7 @@ class CopterAirframe:
         for _ in range(60):
             angle = 0.5 * (low + high)
             made = replace(made, refAngle=angle)
-            if made.body_drag < max(body_drag, 0.0):
+            if made.body_drag < max(body_drag, LEAST_BODY_DRAG):
                 low = angle
             else:
                 high = angle

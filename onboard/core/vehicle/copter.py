@@ -71,6 +71,9 @@ class Outputs:
         low, high = pwm if 0.0 < pwm[0] < pwm[1] else (frame.pwmMin, frame.pwmMax)
         least = get("MOT_SPIN_MIN", frame.spin_min)
         most = get("MOT_SPIN_MAX", frame.spin_max)
+        if "PWM_MIN" in signals.parameters:  # PX4's: idle is within the curve
+            low, high = get("PWM_MIN", frame.pwmMin), get("PWM_MAX", frame.pwmMax)
+            least, most = 0.0, 1.0
         if signals.normalised or not least < most:
             low, high, least, most = 0.0, 1.0, 0.0, 1.0
         return cls(signals.motors, low + least * (high - low), low + most * (high - low))

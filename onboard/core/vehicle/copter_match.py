@@ -132,6 +132,8 @@ def _with_battery(
 def _battery(signals: Signals, flight: Flight, frame: CopterAirframe) -> tuple[float, float] | None:
     """Capacity and resistance from power-up to the end of the flight."""
     b = signals.battery
+    if not len(b) or b.x.shape[1] < 2:
+        return None
     before_end = (b.t <= flight.t[-1]) & (b.x[:, 0] > 1.0)
     fit = fitted_battery(
         b.t[before_end],

@@ -21,6 +21,8 @@ GROUND_M: Final = 2.0
 """Heights closer than this to where the vehicle stood are the ground, m [data sheet]."""
 STILL_M_S: Final = 0.3
 """Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
+LEVEL_M_S: Final = 0.15
+"""Vertical speed of a vehicle that rolls, as a receiver shows it, m/s [data sheet]."""
 STILL_S: Final = 1.0
 """s for which it must show it [probability: five fixes in a row]."""
 CONTACT_M_S2: Final = 40.0

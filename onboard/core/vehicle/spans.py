@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.limits import GROUND_M, MARGIN_S, STILL_M_S, STILL_S
+from onboard.core.vehicle.limits import GROUND_M, LEVEL_M_S, MARGIN_S, STILL_M_S, STILL_S
 
 
 def grounded_spans(
@@ -19,12 +19,16 @@ def grounded_spans(
         t: (n,) times of fixes, s.
         v_n: (n, 3) velocity, m/s; NaN down where it is not measured.
         height: (n,) m.
-        rolls: whether it may move on the ground: then all that is as low is the ground.
+        rolls: whether it may move on the ground: then what is level and lowest is the ground.
     """
     if len(t) < 2:
         return []
     slow = np.linalg.norm(np.nan_to_num(v_n), axis=1) < STILL_M_S
     runs = [(i, j) for i, j in _runs(slow) if t[j - 1] - t[i] >= STILL_S]
+    if rolls:
+        level = np.abs(np.nan_to_num(v_n[:, 2])) < LEVEL_M_S
+        low = height < float(np.min(height)) + GROUND_M
+        runs += [(i, j) for i, j in _runs(level & low) if t[j - 1] - t[i] >= STILL_S]
     if not runs:
         return []
     levels = [float(np.median(height[i:j])) for i, j in runs]
@@ -32,13 +36,10 @@ def grounded_spans(
     # A flight that is recorded in parts may begin in a hover: nothing was lower then either.
     if float(np.percentile(height, 1)) < lowest - GROUND_M:
         return []
-    if rolls:
-        runs = [(i, j) for i, j in _runs(height < lowest + GROUND_M) if j - i > 1]
-        levels = [lowest] * len(runs)
     return [
         (float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S)
-        for (i, j), level in zip(runs, levels, strict=True)
-        if level < lowest + GROUND_M
+        for (i, j), level_m in zip(runs, levels, strict=True)
+        if level_m < lowest + GROUND_M
     ]
 
 
