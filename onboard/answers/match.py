@@ -40,6 +40,12 @@ NAMES = {
     ),
 }
 """Catalogue by vehicle."""
+SURE = 3.0
+"""Sigmas by which two recordings must differ beyond what matters [probability]."""
+SAME = 0.05
+"""Share of a number within which two vehicles are the same [use]."""
+DESCRIBING = ("lowest", "capacity", "rms_below_5_hz")
+"""Numbers that tell of the flight, not of the vehicle."""
 SLOW_M_S, FAST_M_S = 3.0, 7.0
 """Speed over ground that a tenth of the flight is slower than: of a copter, of a plane."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
@@ -190,8 +196,10 @@ def _apart(real: VehicleMatch, simulated: VehicleMatch) -> tuple[Difference, ...
                 b.sigma if math.isfinite(b.sigma) else 0.0,
             )
             values[key] = Compared(b.real, a.real, sigma, value.unit)
-            floor = 0.05 * abs(b.real) if b.real else 0.0
-            differs = differs or abs(a.real - b.real) > floor + 3.0 * sigma
+            if key in DESCRIBING or not math.isfinite(a.real + b.real):
+                continue
+            floor = max(a.floor, b.floor, SAME * abs(b.real))
+            differs = differs or abs(a.real - b.real) > floor + SURE * sigma
         if differs:
             base = ours or Difference(name, "vehicle", {})
             out.append(
@@ -213,11 +221,11 @@ def _value(
     match_: VehicleMatch, found: Difference | None, name: str, key: str, shown: Compared
 ) -> Compared:
     """A number as this recording has it: found, or the model's own estimate, or nominal."""
-    if found is not None and key in found.values:
-        return found.values[key]
     known = match_.numbers.get(f"{name}.{key}")
     if known is not None:
         return known
+    if found is not None and key in found.values:
+        return found.values[key]
     return Compared(shown.simulation, shown.simulation, 0.0, shown.unit)
 
 
@@ -253,7 +261,7 @@ def settings_of(
         lag = max(1e3 * value.real, 0.0)
         out.append(Setting("SIM_GPS1_LAG_MS", float(round(lag)), 1e3 * value.sigma, "gps_latency"))
     if "airspeed_scale" in named:
-        value = named["airspeed_scale"].values["scale"]
+        value = named["airspeed_scale"].values["over_equivalent"]
         told = recording.signals.parameters.get("ARSPD_RATIO", 2.0)
         ratio = told * (value.simulation / value.real) ** 2
         sigma = 2.0 * ratio * value.sigma / value.real

@@ -255,13 +255,19 @@ def windless(untested: tuple[NotTestable, ...], m: Matched) -> tuple[NotTestable
 
 
 def numbers_of(m: Matched) -> dict[str, Compared]:
-    """Every unknown of the model."""
-    out, at = {}, 0
+    """Every unknown of the model, by ``effect.unknown``, and as the document shows it."""
+    out: dict[str, Compared] = {}
+    at = 0
+    sigmas = m.fit.sigma
     for effect in m.model.effects:
-        for u in effect.unknowns:
-            key = f"{effect.name}.{u.name}" if effect.name else u.name
-            out[key] = Compared(u.nominal, float(m.fit.theta[at]), float(m.fit.sigma[at]), u.unit)
-            at += 1
+        end = at + len(effect.unknowns)
+        values, spread = m.fit.theta[at:end].tolist(), sigmas[at:end].tolist()
+        prefix = f"{effect.name}." if effect.name else ""
+        for s in effect.shown(values, spread):
+            out[prefix + s.name] = Compared(s.nominal, s.value, s.sigma, s.unit)
+        for u, value, sigma in zip(effect.unknowns, values, spread, strict=True):
+            out[prefix + u.name] = Compared(u.nominal, value, sigma, u.unit, u.floor)
+        at = end
     return out
 
 

@@ -23,13 +23,15 @@ __all__ = ["Ambiguity", "NotTestable", "Verdict"]
 class Compared:
     """One number: as the simulation has it, as the recording has it, and how sure that is.
 
-    ``sigma`` is that of the recording's, or of the difference where both are measured.
+    ``sigma`` is that of the recording's, or of the difference where both are measured; differences
+    below ``floor`` do not matter.
     """
 
     simulation: float
     real: float
     sigma: float
     unit: str
+    floor: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

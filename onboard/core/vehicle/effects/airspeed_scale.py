@@ -45,4 +45,4 @@ class AirspeedScale(Effect):
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Against the simulator's."""
-        return [Shown("scale", self.simulated, values[0], sigmas[0], "1")]
+        return [Shown("over_equivalent", self.simulated, values[0], sigmas[0], "1")]
