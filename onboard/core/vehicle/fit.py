@@ -169,7 +169,7 @@ def _settled(
     now = cost(theta)
     for _ in range(ROUNDS):
         rows = _rows(
-            model, measured - model.predicted(theta), model.jacobian(theta), noise, sensitivity
+            model, measured - model.predicted(theta), model.steps(theta), noise, sensitivity
         )
         N, b = np.diag(prior), prior * (nominal - theta)
         for r in rows:

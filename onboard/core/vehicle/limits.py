@@ -65,7 +65,7 @@ INSTRUMENT_WINDOWS: Final = (2, 4)
 lasts, shorter than a manoeuvre [physics]."""
 THRUST_AXIS: Final = 2
 """Body axis along which the commands act."""
-ROUNDS: Final = 12
+ROUNDS: Final = 6
 """Gauss-Newton steps at the most [cost]."""
 SETTLED: Final = 0.02
 """Sigmas that a step may move and count as no move [cost]."""

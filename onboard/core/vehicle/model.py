@@ -121,8 +121,17 @@ class ForceModel:
         out: Array = every[:, list(self.axes)]
         return out
 
+    def steps(self, theta: Array) -> Array:
+        """(n, k, m) derivatives by one-sided differences: good enough to step by."""
+        here, columns = self.predicted(theta), []
+        for j, size in enumerate(self.plausible):
+            there = theta.copy()
+            there[j] += DIFFERENCE * size
+            columns.append((self.predicted(there) - here) / (DIFFERENCE * size))
+        return np.stack(columns, axis=-1)
+
     def jacobian(self, theta: Array) -> Array:
-        """(n, k, m) by central differences."""
+        """(n, k, m) derivatives by central differences."""
         columns = []
         for j, size in enumerate(self.plausible):
             h = DIFFERENCE * size

@@ -22,7 +22,7 @@ from onboard.core.vehicle.limits import (
     LEAST_NOISE_M_S2,
     WHITE_SHARES,
 )
-from onboard.core.vehicle.recursion import accumulated, pieces_of
+from onboard.core.vehicle.recursion import accumulated, starts_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +83,14 @@ def whitened(
     """
     scaled = rows / noise.size(sensitivity)[:, None]
     rec = _recursion(step_s, noise.correlation_s, noise.white)
-    out = np.empty_like(scaled)
-    for part in pieces_of(piece):
-        y = scaled[part]
-        z = y.copy()
-        z[1:] -= rec.phi * y[:-1]
-        z = accumulated(z, rec.decay) / math.sqrt(rec.variance)
-        z[0] = y[0]
-        out[part] = z
+    starts = starts_of(piece)
+    root = math.sqrt(rec.variance)
+    z = scaled.copy()
+    z[1:] -= rec.phi * scaled[:-1]
+    z[starts] = scaled[starts]
+    out: Array = accumulated(z, rec.decay, starts) / root
+    # The first of a piece has nothing before it: it is as large as the process.
+    out[starts] = scaled[starts]
     return out
 
 

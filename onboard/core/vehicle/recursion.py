@@ -11,26 +11,36 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
 
 NEGLIGIBLE = 1e-12
 
 
-def accumulated(z: Array, factor: float) -> Array:
-    """``y_k = z_k + factor y_(k-1)`` along the first axis of z (n, ...), y_(-1) = 0."""
+def accumulated(z: Array, factor: float, starts: Mask | None = None) -> Array:
+    """``y_k = z_k + factor y_(k-1)`` along the first axis of z (n, ...), y_(-1) = 0.
+
+    Args:
+        z: (n, ...).
+        factor: at most one in size.
+        starts: (n,) where the sum begins anew; nowhere but at the first if None.
+    """
     out = z.copy()
+    weight = np.full(len(z), factor)
+    if starts is not None:
+        weight[starts] = 0.0
+    shape = (-1,) + (1,) * (z.ndim - 1)
     shift = 1
     while shift < len(out) and factor > NEGLIGIBLE:
-        moved = factor * out[:-shift]
-        out[shift:] += moved
+        out[shift:] += weight[shift:].reshape(shape) * out[:-shift]
+        weight[shift:] *= weight[:-shift].copy()
         shift, factor = 2 * shift, factor * factor
     return out
 
 
-def pieces_of(piece: NDArray[np.int64]) -> list[NDArray[np.intp]]:
-    """Indices of each uninterrupted piece, by its number (n,)."""
-    edges = np.flatnonzero(np.diff(piece)) + 1
-    return np.split(np.arange(len(piece)), edges)
+def starts_of(piece: NDArray[np.int64]) -> Mask:
+    """(n,) where an uninterrupted piece begins, by its number (n,)."""
+    out: Mask = np.concatenate([[True], np.diff(piece) != 0])
+    return out
 
 
 def lagged(x: Array, tau: float, piece: NDArray[np.int64], step_s: float) -> Array:
@@ -44,11 +54,8 @@ def lagged(x: Array, tau: float, piece: NDArray[np.int64], step_s: float) -> Arr
     """
     decay = math.exp(-step_s / tau)
     slope = tau / step_s * (1.0 - decay)
-    out = np.empty_like(x)
-    for part in pieces_of(piece):
-        own = x[part]
-        drive = np.zeros_like(own)
-        drive[1:] = (1.0 - slope) * own[1:] + (slope - decay) * own[:-1]
-        drive[0] = own[0]
-        out[part] = accumulated(drive, decay)
-    return out
+    starts = starts_of(piece)
+    drive = np.empty_like(x)
+    drive[1:] = (1.0 - slope) * x[1:] + (slope - decay) * x[:-1]
+    drive[starts] = x[starts]
+    return accumulated(drive, decay, starts)
