@@ -253,7 +253,9 @@ def settings_of(
         value = named["turbulence"].values["rms"]
         # The simulator's gusts point anywhere: the setting is their length, not a component.
         gain = math.sqrt(2.0)
-        out.append(Setting("SIM_WIND_TURB", gain * value.real, gain * value.sigma, "turbulence"))
+        if value.sigma < 0.5 * value.real:
+            length, its = gain * value.real, gain * value.sigma
+            out.append(Setting("SIM_WIND_TURB", length, its, "turbulence"))
     if {"rotor_drag", "body_drag"} & set(named):
         out += _drag_settings(vehicle)
     if "gps_latency" in named:

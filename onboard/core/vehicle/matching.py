@@ -341,4 +341,7 @@ def _turbulence(fit: Fit) -> Turbulence:
         variance, spread = float(fit.theta[k]), float(fit.sigma[k])
         if variance > max(SURE * spread, gust**2):
             whole, its = math.sqrt(variance), spread / (2.0 * math.sqrt(variance))
+        else:
+            # Gusts that are too fast for the steps may be there: as large as the drag allows.
+            its = max(math.sqrt(max(variance, 0.0) + SURE * spread) - gust, sigma)
     return Turbulence(gust, sigma, evidence, whole, its)
