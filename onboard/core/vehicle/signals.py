@@ -77,8 +77,10 @@ class Signals:
         if not len(self.outputs):
             return ()
         if self.normalised:
-            moving = np.nanstd(self.outputs.x, axis=0) > 0.0
+            moving = np.std(np.nan_to_num(self.outputs.x), axis=0) > 0.0
             return tuple(np.flatnonzero(moving).tolist())
         if any(name.startswith("SERVO") for name in self.parameters):
             return self.channels_of(*MOTOR_FUNCTIONS)
-        return tuple(np.flatnonzero(np.nanstd(self.outputs.x, axis=0) > 5.0).tolist()[:8])
+        return tuple(
+            np.flatnonzero(np.std(np.nan_to_num(self.outputs.x), axis=0) > 5.0).tolist()[:8]
+        )
