@@ -46,6 +46,9 @@ VERBS: dict[str, Verb] = {
     "explain": Verb(
         "onboard.cli.explain", "explain", "Find the physics that a recording has left out."
     ),
+    "match": Verb(
+        "onboard.cli.match", "match", "Find what a vehicle has that its simulation lacks."
+    ),
     "fleet": Verb("onboard.cli.fleet", "fleet", "Calibrate from every recording in folders."),
     "service": Verb("onboard.cli.service", "service", "The systemd unit: show it, install it."),
     "sim": Verb("onboard.cli.sim", "sim", "The simulated autopilot alone, for any ground station."),

@@ -42,6 +42,7 @@ class Decoder:
         "VFR_HUD",
         "WIND",
         "BATTERY_STATUS",
+        "SERVO_OUTPUT_RAW",
         "SYS_STATUS",
         "SYSTEM_TIME",
         "PARAM_VALUE",

@@ -19,6 +19,7 @@ from onboard.core.inputs.samples import (
     GpsIntegrity,
     ImuSample,
     ImuSource,
+    Outputs,
     ParameterValue,
     Sample,
     Throttle,
@@ -38,6 +39,8 @@ ACCEL_FIELDS = 0x07
 """Bits of HIGHRES_IMU.fields_updated."""
 UNKNOWN_U16 = 0xFFFF
 CENTI = 0.01
+CHANNELS = 14
+"""Outputs that are read, as many as a log has."""
 NO_POSITION_FIX = 1
 """GPS fix types up to this one (no GPS, no fix) have neither position nor velocity."""
 DETECTED = 3
@@ -220,6 +223,13 @@ class Readings:
             return NOTHING
         self._has_battery_status = True
         return (Battery(t, voltage, None if m.current_battery < 0 else m.current_battery * CENTI),)
+
+    def _servo_output_raw(self, m: Message) -> Samples:
+        t = self._clock.latest
+        if t is None or m.port != 0:
+            return NOTHING
+        pulses = tuple(float(getattr(m, f"servo{n}_raw")) for n in range(1, CHANNELS + 1))
+        return (Outputs(t, tuple(0.0 if p == UNKNOWN_U16 else p for p in pulses)),)
 
     def _sys_status(self, m: Message) -> Samples:
         t = self._clock.latest

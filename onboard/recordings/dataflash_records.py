@@ -21,6 +21,7 @@ from onboard.core.inputs.samples import (
     EkfHealth,
     GpsFix,
     ImuSample,
+    Outputs,
     ParameterValue,
     Sample,
     Throttle,
@@ -28,6 +29,7 @@ from onboard.core.inputs.samples import (
     Vibration,
 )
 from onboard.recordings.dataflash_context import (
+    CHANNELS,
     GPS_NAMES,
     Context,
     Floats,
@@ -216,6 +218,15 @@ def motors(batch: Batch, context: Context) -> Converted:
     return map(Throttle, batch.t.tolist(), np.clip((mean - low) / (high - low), 0.0, 1.0).tolist())
 
 
+def outputs(batch: Batch, _context: Context) -> Converted:
+    """RCOU: pulse widths of the channels that the layout has."""
+    columns = [c for c in (f"C{n}" for n in range(1, CHANNELS + 1)) if batch.form.has(c)]
+    if not columns:
+        return [None] * len(batch.t)
+    values = zip(*batch.floats(*columns), strict=True)
+    return map(Outputs, batch.t.tolist(), values)
+
+
 def airspeed(batch: Batch, _context: Context) -> Converted:
     """ARSP of the first sensor."""
     values, sensor = batch.floats("Airspeed")[0], batch.integers("I")
@@ -337,7 +348,7 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
     "ATT": (attitude,),
     "VIBE": (vibration,),
     "CTUN": (throttle,),
-    "RCOU": (motors,),
+    "RCOU": (motors, outputs),
     "ARSP": (airspeed,),
     "XKF2": (ekf_bias, wind),
     "XKF4": (ekf_status,),

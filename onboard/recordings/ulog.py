@@ -18,6 +18,7 @@ from onboard.core.inputs.samples import (
     GpsFix,
     GpsIntegrity,
     ImuSample,
+    Outputs,
     ParameterValue,
     Sample,
     VehicleState,
@@ -36,6 +37,7 @@ BLOCK = 16384
 ARMED = 2
 KINDS = {1: "copter", 2: "plane", 3: "rover"}
 """vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""
+MOST_OUTPUTS = 16
 JAMMED = 2
 """jamming_state and spoofing_state: 1 is fine, 2 and 3 are trouble."""
 
@@ -113,6 +115,16 @@ def _chosen(index: UlogIndex) -> dict[tuple[str, int], Topic]:
         topics = {key: topic for key, topic in topics.items() if key[0] != "vehicle_gps_position"}
     if ("sensor_combined", 0) in topics:
         topics.pop(("vehicle_acceleration", 0), None)
+    # Auxiliary outputs move servos; and what goes to the pins is another form of the motors'.
+    extra = ("actuator_outputs",) if ("actuator_motors", 0) in topics else ()
+    single = ("actuator_outputs", "actuator_motors", "airspeed_validated", "wind", "wind_estimate")
+    topics = {
+        key: c
+        for key, c in topics.items()
+        if key[0] not in extra and not (key[0] in single and key[1])
+    }
+    if ("airspeed_validated", 0) in topics:
+        topics.pop(("airspeed", 0), None)
     return topics
 
 
@@ -277,6 +289,32 @@ def battery_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
     return [Battery(at, volts, amperes) for at, volts, amperes in values]
 
 
+def actuator_outputs(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+    """Pulse widths of the main outputs, microseconds."""
+    return _outputs(t, columns, "output", normalised=False)
+
+
+def actuator_motors(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+    """Commands of the motors, 0 to 1; NaN for those that are not there."""
+    return _outputs(t, columns, "control", normalised=True)
+
+
+def _outputs(t: Floats, columns: Columns, name: str, *, normalised: bool) -> list[Sample]:
+    used = [f"{name}[{k}]" for k in range(MOST_OUTPUTS) if f"{name}[{k}]" in columns]
+    if not used:
+        raise KeyError(name)
+    rows = zip(*(_floats(columns, column) for column in used), strict=True)
+    return [Outputs(at, row, normalised) for at, row in zip(t.tolist(), rows, strict=True)]
+
+
+def wind(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+    """The autopilot's own estimate."""
+    north, east = _floats(columns, "windspeed_north"), _floats(columns, "windspeed_east")
+    return [
+        AirData(at, wind_n=n, wind_e=e) for at, n, e in zip(t.tolist(), north, east, strict=True)
+    ]
+
+
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     "sensor_combined": (sensor_combined,),
     "vehicle_acceleration": (vehicle_acceleration,),
@@ -287,4 +325,9 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
     "vehicle_land_detected": (vehicle_land_detected,),
     "airspeed": (airspeed,),
     "battery_status": (battery_status,),
+    "actuator_outputs": (actuator_outputs,),
+    "actuator_motors": (actuator_motors,),
+    "wind": (wind,),
+    "wind_estimate": (wind,),
+    "airspeed_validated": (airspeed,),
 }

@@ -152,6 +152,19 @@ class Battery:
 
 
 @dataclass(frozen=True, slots=True)
+class Outputs:
+    """What the autopilot commands its motors and servos, by channel from the first.
+
+    ``values`` are pulse widths, microseconds, 0 where a channel is not driven; with ``normalised``
+    they are commands, 0 to 1 (of motors) and NaN where there is none.
+    """
+
+    t: float
+    values: tuple[float, ...]
+    normalised: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterValue:
     """A parameter as the autopilot reported it; ``t`` is None where the message has no time."""
 
@@ -180,6 +193,7 @@ Sample: TypeAlias = (
     | Throttle
     | AirData
     | Battery
+    | Outputs
     | ParameterValue
     | EkfBias
 )

@@ -1,0 +1,296 @@
+"""A recording as a flight: what the sensor level has found, and the vehicle's own streams.
+
+The samples are kept while they are read: where the vehicle touched the ground shows only when the
+whole flight is known, and neither level may learn from an impact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from onboard.answers.answer import Answer
+from onboard.answers.recorded import Recorded, unanswered
+from onboard.answers.replay import Reading, read
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.comparison import Comparison
+from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.samples import (
+    AirData,
+    Battery,
+    GpsFix,
+    ImuSample,
+    Outputs,
+    Sample,
+    VehicleState,
+)
+from onboard.core.inputs.segments import Batch
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.signals import Signals, Stream
+from onboard.core.vehicle.spans import grounded_spans
+from onboard.core.vehicle.trajectory import Sensors
+
+FASTEST_HZ = 100.0
+"""Inertial samples beyond this rate are averaged: no vehicle's force changes faster [physics]."""
+UNKNOWN_FORCE = 0.05
+"""Sigma of the force, m/s^2, where the sensor level found nothing: a factory's calibration
+[data sheet]."""
+LEAST_FORCE = 0.002
+"""Sigma of the force that no calibration goes below, m/s^2 [physics: quantisation, filters]."""
+
+S = TypeVar("S", Outputs, Battery, AirData)
+
+
+class Flown:
+    """Collects a recording, then puts it through the sensor level without what was on the ground.
+
+    A reader for :func:`onboard.answers.replay.read`.
+    """
+
+    def __init__(self, imu: int = 1) -> None:
+        """Take which accelerometer to look at."""
+        self.recorded = Recorded((imu,))
+        self.imu = imu
+        self._kept: list[Sample] = []
+        self.grounded: list[tuple[float, float]] = []
+        self.ground = 0.0
+        self.flying: list[Batch] = []
+        self.kind = ""
+
+    @property
+    def imus(self) -> tuple[int, ...]:
+        """Accelerometers that can be asked about."""
+        return self.recorded.imus
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The autopilot's parameters as they were reported last, by name."""
+        return self.recorded.parameters
+
+    @property
+    def standing_s(self) -> float:
+        """Time on the ground, s."""
+        return self.recorded.standing_s
+
+    def feed(self, sample: Sample) -> object:
+        """Keep a sample, but not of other accelerometers."""
+        if not isinstance(sample, ImuSample) or sample.imu == self.imu:
+            self._kept.append(sample)
+        if isinstance(sample, VehicleState) and sample.kind:
+            self.kind = sample.kind
+        return None
+
+    def restart(self) -> object:
+        """One recording is one flight: nothing to forget."""
+        return None
+
+    def finish(self) -> object:
+        """Everything is known now: find the ground, and learn from the rest."""
+        fixes = [s for s in self._kept if isinstance(s, GpsFix) and s.fix_type >= 3]
+        if fixes:
+            t = np.array([f.t for f in fixes])
+            v = np.array([(f.v_n, f.v_e, f.v_d or 0.0) for f in fixes])
+            height = np.array([f.altitude for f in fixes])
+            self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")
+            self.ground = float(np.percentile(height, 0.5))
+        step = _averaged_over(self._kept)
+        for sample in _with_landings(_slower(self._kept, step), self.grounded):
+            self.recorded.feed(sample)
+        return self.recorded.finish()
+
+    def answer(self, imu: int) -> Answer:
+        """What the sensor level says."""
+        return self.recorded.answer(imu)
+
+    def compared(self, calibrations: list[Calibration]) -> Comparison | None:
+        """Nothing: one accelerometer is looked at."""
+        del calibrations
+        return None
+
+    def signals(self) -> Signals:
+        """The vehicle's streams."""
+        kept = self._kept
+        outputs = [s for s in kept if isinstance(s, Outputs)]
+        normalised = bool(outputs) and outputs[-1].normalised
+        air = [s for s in kept if isinstance(s, AirData)]
+        return Signals(
+            outputs=_stream(outputs, lambda s: s.values),
+            battery=_stream(
+                [s for s in kept if isinstance(s, Battery)],
+                lambda s: (s.voltage, math.nan if s.current is None else s.current),
+            ),
+            airspeed=_stream(
+                [s for s in air if s.airspeed is not None], lambda s: (s.airspeed or 0.0,)
+            ),
+            ekf_wind=_stream(
+                [s for s in air if s.wind_n is not None and s.wind_e is not None],
+                lambda s: (s.wind_n or 0.0, s.wind_e or 0.0),
+            ),
+            parameters=dict(self.parameters),
+            kind=self.kind,
+            normalised=normalised,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FlownRecording:
+    """A recording that was read: its sensor level's answer and its vehicle level's input."""
+
+    source: Reading
+    diagnosis: Diagnosis
+    signals: Signals
+    sensors: Sensors
+    batches: tuple[Batch, ...]
+    grounded: tuple[tuple[float, float], ...]
+    ground: float
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+        return self.source.recordings[0].path.name
+
+    @property
+    def autopilot(self) -> str:
+        """The kind of autopilot."""
+        return self.source.autopilot
+
+
+def flown(
+    path: str | Path, *, imu: int | None = None, progress: Callable[[float], None] | None = None
+) -> FlownRecording:
+    """Read a recording and ask its sensor level.
+
+    Raises:
+        RecordingError: a file that cannot be used.
+    """
+    wanted = imu or 1
+    collected = Flown(wanted)
+    source = read([path], collected, imu=imu, progress=progress)
+    if wanted in collected.imus:
+        diagnosis = collected.answer(wanted).diagnosis
+        batches = tuple(collected.recorded.calibrator.engine(wanted).batches)
+    else:
+        diagnosis = unanswered(source.vehicle.unanswered(wanted)).diagnosis
+        batches = ()
+    return FlownRecording(
+        source,
+        diagnosis,
+        collected.signals(),
+        sensors_of(diagnosis),
+        batches,
+        tuple(collected.grounded),
+        collected.ground,
+    )
+
+
+def sensors_of(diagnosis: Diagnosis) -> Sensors:
+    """What the sensor level has found, with what it leaves unknown of the force."""
+    c = diagnosis.calibration
+    timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
+    known = diagnosis.verdict is not Verdict.INSUFFICIENT
+    if not known:
+        scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
+        sigma = np.full(3, UNKNOWN_FORCE)
+    else:
+        scale, offset = np.array(c.scale), np.array(c.offset)
+        sigma = _force_sigma(c)
+    return Sensors(
+        scale,
+        offset,
+        sigma,
+        timing.get("gps_delay_s", 0.0),
+        max(timing.get("gps_smoothing_window_s", 0.0), 0.0),
+        timing.get("imu_delay_s", 0.0),
+    )
+
+
+def _force_sigma(c: Calibration) -> Array:
+    """(3,) of the calibrated force at the mean load, m/s^2."""
+    P = np.array(c.covariance)
+    out = np.empty(3)
+    for i in range(3):
+        by = np.array([c.load_mean[i] - c.offset[i], -c.scale[i]])
+        out[i] = by @ P[np.ix_([i, i + 3], [i, i + 3])] @ by
+    out = np.sqrt(np.maximum(out, 0.0))
+    good = np.isfinite(out) & (out > LEAST_FORCE)
+    floor: Array = np.where(np.isfinite(out), np.where(good, out, LEAST_FORCE), UNKNOWN_FORCE)
+    return floor
+
+
+def _stream(samples: Sequence[S], values: Callable[[S], tuple[float, ...]]) -> Stream:
+    """Samples as a stream in order of time; those of another width than most are left out."""
+    rows = [values(s) for s in samples]
+    if not rows:
+        return Stream()
+    widths = [len(r) for r in rows]
+    width = max(set(widths), key=widths.count)
+    t = np.array([s.t for s, r in zip(samples, rows, strict=True) if len(r) == width])
+    x = np.array([r for r in rows if len(r) == width], dtype=np.float64)
+    t, first = np.unique(t, return_index=True)
+    return Stream(t, x[first])
+
+
+def _averaged_over(samples: list[Sample]) -> int:
+    """How many inertial samples to average."""
+    t = [s.t for s in samples if isinstance(s, ImuSample)]
+    if len(t) < 100:
+        return 1
+    step = float(np.median(np.diff(t)))
+    return max(1, round(1.0 / (step * FASTEST_HZ))) if step > 0.0 else 1
+
+
+def _slower(samples: list[Sample], over: int) -> list[Sample]:
+    """Inertial samples as means over some."""
+    if over < 2:
+        return samples
+    out: list[Sample] = []
+    group: list[ImuSample] = []
+    for sample in samples:
+        if not isinstance(sample, ImuSample):
+            out.append(sample)
+            continue
+        group.append(sample)
+        if len(group) == over:
+            out.append(_mean(group))
+            group = []
+    return out
+
+
+def _mean(group: list[ImuSample]) -> ImuSample:
+    n, last = len(group), group[-1]
+    f = [sum(s.f_b[i] for s in group) / n for i in range(3)]
+    rates = [s.w_b for s in group if s.w_b is not None]
+    w = [sum(r[i] for r in rates) / len(rates) for i in range(3)] if rates else None
+    return ImuSample(
+        sum(s.t for s in group) / n,
+        last.imu,
+        (f[0], f[1], f[2]),
+        None if w is None else (w[0], w[1], w[2]),
+        last.temperature,
+        last.f_step,
+        last.w_step,
+        last.source,
+    )
+
+
+def _with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) -> list[Sample]:
+    """The samples, with the word that the vehicle has landed where it was on the ground."""
+    if not grounded:
+        return samples
+    out: list[Sample] = []
+    was: bool | None = None
+    for sample in samples:
+        if isinstance(sample, GpsFix):
+            now = any(a <= sample.t <= b for a, b in grounded)
+            if now is not was:
+                out.append(VehicleState(sample.t, landed=now))
+                was = now
+        if isinstance(sample, VehicleState) and sample.landed is not None and was is not None:
+            sample = VehicleState(sample.t, sample.armed, was, sample.kind)  # noqa: PLW2901
+        out.append(sample)
+    return out

@@ -1,0 +1,164 @@
+"""``onboard.match/1``: the answer of a match as other programs read it.
+
+Every number is finite; what is not known is ``null``.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from onboard.answers.document import finite
+from onboard.answers.explain_document import (
+    AmbiguityDocument,
+    NotTestableDocument,
+    WhereDocument,
+)
+from onboard.answers.match import Match
+from onboard.core.vehicle.records import Difference
+
+MATCH_SCHEMA = "onboard.match/1"
+
+
+class ValueDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One number, as the simulation has it and as the recording has it."""
+
+    simulation: float | None
+    real: float | None
+    sigma: float | None
+    unit: str
+
+
+class HeldOutDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Residual on flight that was not used, without and with."""
+
+    before: float | None
+    after: float | None
+
+
+class MatchedEffectDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One effect that was found."""
+
+    name: str
+    level: str
+    values: dict[str, ValueDocument]
+    share: float | None
+    where: list[WhereDocument]
+    rivals: list[str]
+    held_out: HeldOutDocument
+
+
+class WindDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """Wind of the real flight at its mean height, towards north and east, m/s."""
+
+    north: float | None
+    east: float | None
+    sigma_north: float | None
+    sigma_east: float | None
+    profile_exponent: float | None
+    turbulence_rms: float | None
+    height_m: float | None
+
+
+class MatchedRecordings(msgspec.Struct, frozen=True, kw_only=True):
+    """Names of the files."""
+
+    simulation: str | None
+    real: str
+
+
+class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """``onboard match --json``."""
+
+    vehicle: str
+    recordings: MatchedRecordings
+    verdict: str
+    note: str
+    flight_s: float | None
+    effects: list[MatchedEffectDocument]
+    wind: WindDocument | None
+    mismatch: dict[str, HeldOutDocument]
+    settings: dict[str, float]
+    frame: dict[str, float | list[float]]
+    ambiguous: list[AmbiguityDocument]
+    not_testable: list[NotTestableDocument]
+    schema: str = MATCH_SCHEMA
+
+    def to_json(self) -> bytes:
+        """Indented, ends with a line feed."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=2) + b"\n"
+
+
+def match_document(match: Match) -> MatchDocument:
+    """The document of a match."""
+    vehicle = match.vehicle
+    mismatch = {
+        axis: HeldOutDocument(before=finite(m.before), after=finite(m.after))
+        for axis, m in vehicle.mismatch.items()
+    }
+    mismatch["velocity_after_10s"] = HeldOutDocument(
+        before=finite(vehicle.alone_before), after=finite(vehicle.alone_after)
+    )
+    return MatchDocument(
+        vehicle=vehicle.vehicle,
+        recordings=MatchedRecordings(
+            simulation=None if match.simulation is None else match.simulation.name,
+            real=match.real.name,
+        ),
+        verdict=match.verdict.value,
+        note=vehicle.note,
+        flight_s=finite(vehicle.seconds),
+        effects=[_effect(d) for d in match.effects],
+        wind=_wind(match),
+        mismatch=mismatch,
+        settings={s.name: s.value for s in match.settings},
+        frame=dict(match.frame),
+        ambiguous=[
+            AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart)
+            for a in vehicle.ambiguous
+        ],
+        not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in match.not_testable],
+    )
+
+
+def _effect(d: Difference) -> MatchedEffectDocument:
+    return MatchedEffectDocument(
+        name=d.name,
+        level=d.level,
+        values={
+            key: ValueDocument(
+                simulation=finite(v.simulation),
+                real=finite(v.real),
+                sigma=finite(v.sigma),
+                unit=v.unit,
+            )
+            for key, v in d.values.items()
+        },
+        share=finite(d.share),
+        where=[
+            WhereDocument(
+                start_s=finite(p.start_s),
+                end_s=finite(p.end_s),
+                axis=p.axis,
+                regime=p.regime,
+                share=finite(p.share),
+            )
+            for p in d.where
+        ],
+        rivals=list(d.rivals),
+        held_out=HeldOutDocument(before=finite(d.held_out_before), after=finite(d.held_out_after)),
+    )
+
+
+def _wind(match: Match) -> WindDocument | None:
+    wind = match.vehicle.wind
+    if wind is None:
+        return None
+    return WindDocument(
+        north=finite(wind.north),
+        east=finite(wind.east),
+        sigma_north=finite(wind.sigma_north),
+        sigma_east=finite(wind.sigma_east),
+        profile_exponent=finite(wind.profile_exponent),
+        turbulence_rms=finite(wind.turbulence_rms),
+        height_m=finite(wind.height),
+    )

@@ -1,0 +1,31 @@
+"""Settings and frame files that a match hands back to the simulator; plain ASCII."""
+
+from __future__ import annotations
+
+import json
+
+from onboard.answers.match import Match
+from onboard.answers.match_words import number
+
+DIGITS = 7
+
+
+def settings_text(match: Match) -> str:
+    """``NAME,VALUE`` lines with a comment before each; only what is proven."""
+    lines = [f"# onboard match: {match.real.name}", f"# verdict {match.verdict.value}"]
+    if not match.settings:
+        lines.append("# nothing to change")
+    for s in match.settings:
+        sigma = f", sigma {number(s.sigma, s.sigma)}" if s.sigma > 0.0 else ""
+        lines.append(f"# {s.reason}{sigma}")
+        lines.append(f"{s.name},{_plain(s.value)}")
+    return "\n".join(lines) + "\n"
+
+
+def frame_text(match: Match) -> str:
+    """A JSON object for SITL's ``--model``."""
+    return json.dumps(dict(match.frame), indent=2) + "\n"
+
+
+def _plain(value: float) -> str:
+    return f"{value:.{DIGITS}g}"

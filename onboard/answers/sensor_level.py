@@ -1,0 +1,152 @@
+"""The sensor level in the story of a match: what differs from the sensors that SITL simulates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.estimate.result import Status
+from onboard.core.physics.finding import Finding
+from onboard.core.vehicle.records import Compared, Difference, Place
+
+SIMULATED_LAG_S: Final = 0.1
+"""SIM_GPS1_LAG_MS by default: the receiver of the nominal simulator is this late."""
+SIMULATED_PERIOD_S: Final = 0.2
+"""Its fixes are so far apart."""
+LAG_FLOOR_S: Final = 0.05
+WINDOW_FLOOR_S: Final = 0.15
+"""What timing must differ by to be an effect (contracts of ``explain``)."""
+SURE: Final = 2.0
+"""Sigmas by which it must exceed that."""
+TIMING_NAMES = ("gps_latency", "gps_smoothing")
+
+
+def simulated_window(lag: float) -> float:
+    """Averaging span, s, of SITL's receiver: it interpolates between the fixes around the lag.
+
+    A mean of two fixes a period apart with weights a and 1 - a has variance ``T^2 a (1 - a)``, an
+    average over a window ``w^2 / 12``.
+    """
+    share = (lag / SIMULATED_PERIOD_S) % 1.0
+    return SIMULATED_PERIOD_S * math.sqrt(12.0 * share * (1.0 - share))
+
+
+def sensor_differences(
+    real: Diagnosis, simulation: Diagnosis | None = None
+) -> tuple[Difference, ...]:
+    """What the sensors of the recording do that those of the simulation do not.
+
+    Args:
+        real: diagnosis of the real recording.
+        simulation: of the simulation's; None: SITL with its default settings.
+    """
+    if real.verdict is Verdict.INSUFFICIENT:
+        return ()
+    out = list(_timing(real, simulation))
+    theirs = {} if simulation is None else {e.name: e for e in simulation.effects}
+    for effect in real.effects:
+        if effect.name in TIMING_NAMES:
+            continue
+        found = _difference(effect, theirs.pop(effect.name, None))
+        if found is not None:
+            out.append(found)
+    for name, effect in theirs.items():
+        if name not in TIMING_NAMES:
+            out.append(_only_simulated(effect))
+    return tuple(out)
+
+
+def _timing(real: Diagnosis, simulation: Diagnosis | None) -> Iterable[Difference]:
+    lag = real.timing.get("gps_delay_s")
+    if lag is None or not math.isfinite(lag.sigma):
+        return
+    nominal, its_sigma = SIMULATED_LAG_S, 0.0
+    if simulation is not None and "gps_delay_s" in simulation.timing:
+        told = simulation.timing["gps_delay_s"]
+        nominal, its_sigma = told.value, told.sigma
+    sigma = math.hypot(lag.sigma, its_sigma)
+    if abs(lag.value - nominal) > LAG_FLOOR_S + SURE * sigma:
+        value = Compared(nominal, lag.value, sigma, "s")
+        yield _with_proof("gps_latency", {"delay": value}, real)
+    window = real.timing.get("gps_smoothing_window_s")
+    if window is None or not math.isfinite(window.sigma):
+        return
+    expected = simulated_window(lag.value)
+    its_sigma = 0.0
+    if simulation is not None and "gps_smoothing_window_s" in simulation.timing:
+        told = simulation.timing["gps_smoothing_window_s"]
+        # The lag that is handed back changes what the simulator averages over.
+        expected, its_sigma = max(expected, told.value), told.sigma
+    sigma = math.hypot(window.sigma, its_sigma)
+    if window.value - expected > WINDOW_FLOOR_S + SURE * sigma:
+        value = Compared(expected, window.value, sigma, "s")
+        yield _with_proof("gps_smoothing", {"window": value}, real)
+
+
+def _with_proof(name: str, values: Mapping[str, Compared], real: Diagnosis) -> Difference:
+    found = next((e for e in real.effects if e.name == name), None)
+    if found is None:
+        return Difference(name, "sensor", values)
+    return Difference(
+        name,
+        "sensor",
+        values,
+        found.share_of_mismatch,
+        _places(found),
+        tuple(c.name for c in found.confounders),
+        found.held_out_before,
+        found.held_out_after,
+    )
+
+
+def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
+    """One effect of both or of the real one alone; None if they agree."""
+    values: dict[str, Compared] = {}
+    apart = simulation is None
+    for name, q in real.unknowns.items():
+        other = None if simulation is None else simulation.unknowns.get(name)
+        value, sigma = (0.0, 0.0) if other is None else (other.value, other.sigma)
+        both = math.hypot(q.sigma, sigma)
+        values[name] = Compared(value, q.value, both, q.unit)
+        apart = apart or abs(q.value - value) > (SURE + 1.0) * both
+    if not apart:
+        return None
+    return Difference(
+        real.name,
+        "sensor",
+        values,
+        real.share_of_mismatch,
+        _places(real),
+        tuple(c.name for c in real.confounders),
+        real.held_out_before,
+        real.held_out_after,
+    )
+
+
+def _only_simulated(effect: Finding) -> Difference:
+    values = {n: Compared(q.value, 0.0, q.sigma, q.unit) for n, q in effect.unknowns.items()}
+    return Difference(effect.name, "sensor", values)
+
+
+def _places(effect: Finding) -> tuple[Place, ...]:
+    return tuple(Place(w.start_s, w.end_s, w.axis, w.regime, w.share) for w in effect.where)
+
+
+def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> dict[str, float]:
+    """SIM_ACC1_*: what makes the simulator's accelerometer err as this one does.
+
+    Only what is calibrated and differs surely from what the vehicle has in force.
+    """
+    c = real.calibration
+    if c.status is not Status.CALIBRATED or not c.parameters_known:
+        return {}
+    del parameters
+    out: dict[str, float] = {}
+    for i, axis in enumerate("XYZ"):
+        if abs(c.scale[i] - c.in_force_scale[i]) > 0.005 + SURE * c.scale_sigma[i]:
+            out[f"SIM_ACC1_SCAL_{axis}"] = c.scale[i]
+        if abs(c.offset[i] - c.in_force_offset[i]) > 0.02 + SURE * c.offset_sigma[i]:
+            out[f"SIM_ACC1_BIAS_{axis}"] = c.offset[i]
+    return out

@@ -1,0 +1,155 @@
+"""``onboard match``: what a real flight has that its simulation lacks, vehicle and sensors."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import click
+from rich.console import Console, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from onboard.answers.match import Match
+from onboard.answers.match import match as match_recordings
+from onboard.answers.match_document import match_document
+from onboard.answers.match_files import frame_text, settings_text
+from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
+from onboard.cli.progress import reading
+from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.core.diagnosis.records import Verdict
+from onboard.errors import RecordingError, UsageError
+
+EXAMPLES = """\
+\b
+onboard match flight.BIN
+onboard match simulation.BIN flight.BIN --json result.json
+onboard match flight.BIN --param sim.param --frame-out frame.json
+"""
+TWO = 2
+
+
+@click.command(epilog=EXAMPLES)
+@click.argument(
+    "logs", nargs=-1, required=True, metavar="[SIM] REAL", type=click.Path(path_type=Path)
+)
+@click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
+@click.option("--param", "param_file", metavar="FILE", help="Write settings of the simulator.")
+@click.option(
+    "--frame-out", "frame_file", metavar="FILE", help="Write a frame file that SITL loads."
+)
+@click.option(
+    "--frame", "given_frame", metavar="FILE", help="Compare with this frame file of SITL."
+)
+def match(
+    logs: tuple[Path, ...],
+    json_file: str | None,
+    param_file: str | None,
+    frame_file: str | None,
+    given_frame: str | None,
+) -> None:
+    """Make the simulator fly like the recording.
+
+    With one recording: what the vehicle has that ArduPilot's nominal airframe (or --frame)
+    lacks.  With two: what differs between the simulation's and the real one.  Says what, how sure
+    that is, and with which settings the simulation flies like the vehicle.
+    """
+    if len(logs) > TWO:
+        raise UsageError("match takes one recording, or a simulation's and a real one")
+    frame = None if given_frame is None else _frame(given_frame)
+    simulation = logs[0] if len(logs) == TWO else None
+    try:
+        with reading(logs, then="comparing vehicles") as progress:
+            result = match_recordings(logs[-1], simulation, frame=frame, progress=progress)
+    except ValueError as error:
+        raise UsageError(f"--frame {given_frame}: {error}") from None
+    if result.vehicle.series is None and result.verdict is Verdict.INSUFFICIENT:
+        raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
+    if json_file is not None:
+        write_json(match_document(result).to_json(), json_file)
+    if param_file is not None:
+        write_text(settings_text(result), param_file)
+    if frame_file is not None:
+        write_text(frame_text(result), frame_file)
+    if STANDARD_OUTPUT not in (json_file, param_file, frame_file):
+        console = Console(highlight=False)
+        for part in summary(result):
+            console.print(part)
+
+
+def _frame(file: str) -> Mapping[str, object]:
+    """Keys of a frame file.
+
+    Raises:
+        UsageError: it cannot be read, or is no JSON object.
+    """
+    try:
+        found = json.loads(Path(file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"--frame {file}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise UsageError(f"--frame {file}: no JSON ({error})") from None
+    if not isinstance(found, dict):
+        raise UsageError(f"--frame {file}: no JSON object")
+    return found
+
+
+def summary(result: Match) -> Iterator[RenderableType]:
+    """What a person reads in ten seconds, and then the numbers."""
+    vehicle = result.vehicle
+    names = [result.real.name]
+    if result.simulation is not None:
+        names.insert(0, result.simulation.name)
+    yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
+    yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
+    if result.effects:
+        yield from ("", _effects(result))
+    yield from ("", _facts(result))
+
+
+def _effects(result: Match) -> Table:
+    """One line a number: as the simulation has it, as the recording has it."""
+    table = Table(box=None, padding=(0, 1), show_edge=False, pad_edge=False)
+    for heading in ("effect", "number"):
+        table.add_column(heading)
+    for heading in ("simulation", "recording", "sigma"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for d in result.effects:
+        for k, (key, value) in enumerate(d.values.items()):
+            table.add_row("" if k else d.name, key, *compared(value))
+    return table
+
+
+def _facts(result: Match) -> Table:
+    vehicle = result.vehicle
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    wind = wind_sentence(result)
+    if wind:
+        table.add_row("Wind", wind)
+    for k, (axis, m) in enumerate(vehicle.mismatch.items()):
+        said = f"{axis}: {m.before:.3f} -> {m.after:.3f} m/s^2 RMS on flight not used in the fit"
+        table.add_row("" if k else "Force", said)
+    if math.isfinite(vehicle.alone_before):
+        said = f"{vehicle.alone_before:.2f} -> {vehicle.alone_after:.2f} m/s"
+        table.add_row("Alone", f"{said} velocity error after 10 s of the model alone")
+    for k, d in enumerate(d for d in result.effects if proof(d) and d.level == "vehicle"):
+        table.add_row("" if k else "Proof", f"{d.name}: {proof(d)} m/s^2 without and with it")
+    for k, a in enumerate(vehicle.ambiguous):
+        said = f"{' and '.join(a.names)}. To tell: {a.tell_apart}."
+        table.add_row("" if k else "Not told apart", said)
+    for k, s in enumerate(result.settings):
+        sigma = f"  (sigma {number(s.sigma, s.sigma)})" if s.sigma > 0.0 else ""
+        table.add_row("" if k else "Settings", f"{s.name} {number(s.value, s.sigma)}{sigma}")
+    reasons: dict[str, list[str]] = {}
+    for n in result.not_testable:
+        reasons.setdefault(n.why, []).append(n.name)
+    for k, (why, names) in enumerate(reasons.items()):
+        table.add_row("" if k else "Not tested", f"{', '.join(names)}: {why}")
+    if vehicle.note:
+        table.add_row("Note", vehicle.note)
+    return table

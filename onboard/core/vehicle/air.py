@@ -1,0 +1,61 @@
+"""A prediction in the making: the flight as the effects see it, one acting after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.flight import Flight
+
+
+class Air:
+    """What effects read and change on the way from a flight to a predicted force.
+
+    Attributes:
+        flight: what was recorded.
+        wind_n: (n, 3) towards north, east, down, m/s.
+        gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
+        gust_variance: of the air along each axis, m^2/s^2.
+        tilt: of the thrust forward and to the right, rad.
+        rho: (n,) density, kg/m^3.
+        commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
+            plane: throttle and rudder.  None where they were not recorded.
+        volts: (n,) of the battery; None where it was not recorded.
+        power: (n,) mean over the motors of the thrust's share of the largest; by thrust_curve.
+        thrust: (n,) specific force of the rotors from the commands, m/s^2; None without commands.
+        pull: (n,) specific force of the rotors from the accelerometer and z drag, m/s^2.
+        force_b: (n, 3 or 4) predicted specific force, m/s^2, and airspeed where there is one, m/s.
+        alpha, pressure, lift: (n,) of a plane: angle of attack (rad), specific force by coefficient
+            (m/s^2), coefficient of lift.
+    """
+
+    def __init__(self, flight: Flight, volts: Array | None = None, columns: int = 3) -> None:
+        """Begin with still, standard air and no force."""
+        n = len(flight)
+        self.flight = flight
+        self.wind_n = np.zeros((n, 3))
+        self.gust_n = np.zeros(3)
+        self.gust_variance = 0.0
+        self.tilt = (0.0, 0.0)
+        self.rho = flight.rho
+        self.commands: Array | None = flight.commands if flight.commands.shape[1] else None
+        self.volts = volts
+        self.power: Array | None = None
+        self.thrust: Array | None = None
+        self.pull = np.zeros(n)
+        self.force_b = np.zeros((n, columns))
+        self.alpha = self.pressure = self.lift = np.zeros(n)
+        self._u_b: Array | None = None
+
+    @property
+    def evenness(self) -> Array | float:
+        """(n,) mean root of the motors' thrusts over the root of the mean: 1 where all are one."""
+        return 1.0 if self.commands is None else self.commands[:, 2]
+
+    @property
+    def u_b(self) -> Array:
+        """(n, 3) velocity through the air, body axes, m/s; fixed when it is first asked for."""
+        if self._u_b is None:
+            moved = np.einsum("nij,nj->ni", self.flight.R_bn, self.wind_n + self.gust_n)
+            self._u_b = self.flight.v_b - moved
+        return self._u_b

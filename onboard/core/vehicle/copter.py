@@ -1,0 +1,177 @@
+"""The model of a copter: which effects, in which order, and what its outputs command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.body_drag import BodyDrag
+from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.ground_effect import GroundEffect
+from onboard.core.vehicle.effects.gust_drag import GustDrag
+from onboard.core.vehicle.effects.inflow import Inflow
+from onboard.core.vehicle.effects.motor_lag import MotorLag
+from onboard.core.vehicle.effects.rotor_drag import RotorDrag
+from onboard.core.vehicle.effects.sensor_offset import SensorOffset
+from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
+from onboard.core.vehicle.effects.thrust_scale import ThrustScale
+from onboard.core.vehicle.effects.thrust_tilt import ThrustTilt
+from onboard.core.vehicle.effects.vertical_drag import VerticalDrag
+from onboard.core.vehicle.effects.voltage_sag import VoltageSag
+from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.signals import Signals, Stream
+
+FULL_RANGE = (0.85, 1.05)
+"""The highest voltage flown, over the frame's full one, between which the battery is the frame's;
+else it is another battery, and what was flown is taken for full [physics]."""
+
+
+DENSITY_RANGE_M = 500.0
+"""Range of heights, m, over which the standard atmosphere loses 5 %: below, a density that is off
+looks like another thrust and another drag [physics]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Which of the forms of a model that no number tells apart.
+
+    Attributes:
+        profile_top: height from which the wind is constant, m.
+        by_components: whether rotors that lean drag as the simulator's do.
+        gusty: whether the air is turbulent, so that gusts act on the mean force, and commands
+            answer them.
+    """
+
+    profile_top: float = TOP_M
+    by_components: bool = False
+    gusty: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """How pulse widths become commands: motors' channels and the range between idle and full."""
+
+    motors: tuple[int, ...]
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, signals: Signals, frame: CopterAirframe) -> Outputs:
+        """By the vehicle's own MOT_ parameters, else by the frame's."""
+        get = signals.parameters.get
+        pwm = get("MOT_PWM_MIN", 0.0), get("MOT_PWM_MAX", 0.0)
+        low, high = pwm if 0.0 < pwm[0] < pwm[1] else (frame.pwmMin, frame.pwmMax)
+        least = get("MOT_SPIN_MIN", frame.spin_min)
+        most = get("MOT_SPIN_MAX", frame.spin_max)
+        if "PWM_MIN" in signals.parameters:  # PX4's: idle is within the curve
+            low, high = get("PWM_MIN", frame.pwmMin), get("PWM_MAX", frame.pwmMax)
+            least, most = 0.0, 1.0
+        if signals.normalised or not least < most:
+            low, high, least, most = 0.0, 1.0, 0.0, 1.0
+        return cls(signals.motors, low + least * (high - low), low + most * (high - low))
+
+    def commands(self, signals: Signals, expo: float) -> Stream:
+        """Mean, mean square and evenness of the commands (j, 3); empty where nothing moved.
+
+        Of the samples as they were logged: a mean of commands that were smoothed first would lose
+        their scatter, and with it some of the square.
+
+        Args:
+            signals: of the vehicle.
+            expo: of the thrust curve by which evenness is reckoned.
+        """
+        raw = signals.outputs.x
+        if not self.motors or not len(signals.outputs) or raw.shape[1] <= max(self.motors):
+            return Stream()
+        raw = raw[:, list(self.motors)]
+        known = np.isfinite(raw).all(axis=1)
+        if np.count_nonzero(known) < 2 or float(np.max(np.std(raw[known], axis=0))) <= 0.0:
+            return Stream()
+        c = np.clip((raw[known] - self.low) / (self.high - self.low), 0.0, 1.0)
+        power = (1.0 - expo) * c + expo * c * c
+        mean = np.maximum(np.mean(power, axis=1), 1e-6)
+        even = np.mean(np.sqrt(np.maximum(power, 0.0)), axis=1) / np.sqrt(mean)
+        columns = np.mean(c, axis=1), np.mean(c * c, axis=1), np.maximum(even, 0.1)
+        return Stream(signals.outputs.t[known], np.stack(columns, axis=1))
+
+
+def voltage_of(flight: Flight) -> Array | None:
+    """(n,) V; None where the battery is not measured."""
+    if flight.battery.shape[1] == 0:
+        return None
+    volts = flight.battery[:, 0]
+    return volts if float(np.median(volts)) > 1.0 and np.isfinite(volts).all() else None
+
+
+def full_voltage(flight: Flight, frame: CopterAirframe) -> float:
+    """Voltage at which the frame's thrust is meant, V."""
+    volts = voltage_of(flight)
+    if volts is None:
+        return frame.maxVoltage
+    most = float(np.percentile(volts, 99))
+    ours = FULL_RANGE[0] < most / frame.maxVoltage < FULL_RANGE[1]
+    return frame.maxVoltage if ours else most
+
+
+def flown_high(flight: Flight) -> bool:
+    """Whether heights differ by so much that density acts on its own."""
+    return float(np.ptp(flight.height)) > DENSITY_RANGE_M
+
+
+def copter_model(
+    flight: Flight,
+    frame: CopterAirframe,
+    force_sigma: Array,
+    variant: Variant = Variant(),
+) -> ForceModel:
+    """Every effect of a copter that this recording can speak of."""
+
+    def start(of: Flight) -> Air:
+        return Air(of, voltage_of(of))
+
+    still = start(flight)
+    everything: list[Effect] = [
+        Wind(),
+        WindProfile(variant.profile_top),
+        *([GustDrag()] if variant.gusty else []),
+        *([AirDensity()] if flown_high(flight) else []),
+        VerticalDrag(frame),
+        ThrustTilt(),
+        RotorDrag(frame, by_components=variant.by_components),
+        BodyDrag(frame),
+        MotorLag(),
+        ThrustCurve(frame),
+        VoltageSag(full_voltage(flight, frame)),
+        ThrustScale(frame),
+        GroundEffect(frame),
+        Inflow(frame),
+        SensorOffset(force_sigma),
+    ]
+    effects = tuple(e for e in everything if not e.missing(still))
+    axes = (0, 1, 2) if still.commands is not None else (0, 1)
+    return ForceModel(flight, effects, axes, start, instrumented=variant.gusty)
+
+
+def copter_missing(flight: Flight, frame: CopterAirframe) -> dict[str, str]:
+    """What this recording cannot speak of, and why, by effect."""
+    air = Air(flight, voltage_of(flight))
+    asked: list[Effect] = [
+        WindProfile(),
+        MotorLag(),
+        ThrustCurve(frame),
+        VoltageSag(full_voltage(flight, frame)),
+        ThrustScale(frame),
+        GroundEffect(frame),
+    ]
+    absent = {e.name: why for e in asked if (why := e.missing(air))}
+    if not flown_high(flight):
+        absent["air_density"] = "acts on thrust and drag alike at one height"
+    return absent

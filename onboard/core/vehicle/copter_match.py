@@ -1,0 +1,198 @@
+"""A copter's recording against an airframe: the record of the vehicle level."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.battery import fitted_battery
+from onboard.core.vehicle.copter import (
+    Outputs,
+    Variant,
+    copter_missing,
+    copter_model,
+    full_voltage,
+)
+from onboard.core.vehicle.copter_curves import copter_curves
+from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.ground_effect import GroundEffect
+from onboard.core.vehicle.effects.motor_lag import MotorLag
+from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
+from onboard.core.vehicle.effects.thrust_scale import ThrustScale
+from onboard.core.vehicle.effects.voltage_sag import VoltageSag
+from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import SURE
+from onboard.core.vehicle.matching import (
+    Matched,
+    ambiguous_of,
+    differences,
+    drifts_of,
+    is_explained,
+    matched,
+    mismatch_of,
+    not_testable_of,
+    numbers_of,
+    rms,
+    series_of,
+    wind_of,
+    windless,
+)
+from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
+from onboard.core.vehicle.signals import Signals
+
+MANOEUVRES = {
+    e.name: e.manoeuvre
+    for e in (AirDensity, GroundEffect, MotorLag, ThrustCurve, ThrustScale, VoltageSag, WindProfile)
+}
+
+RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
+    # ArduPilot's wind is constant from 60 m on, the open air's is not.
+    ("wind_profile", {"profile_top": math.inf}),
+    # ArduPilot's rotors that lean drag more on one axis.
+    ("thrust_tilt", {"by_components": True}),
+)
+"""Where an effect was found, another form of the model: that which predicts better is taken."""
+DIGITS = 6
+"""Of the numbers of a frame file: parameters are of single precision [data sheet]."""
+
+
+def match_copter(
+    flight: Flight, signals: Signals, frame: CopterAirframe, force_sigma: Array
+) -> VehicleMatch:
+    """What this flight has that the airframe lacks.
+
+    Args:
+        flight: with commands, if the recording has outputs.
+        signals: of the vehicle.
+        frame: to compare with.
+        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
+    """
+    variant = Variant()
+    found = matched(copter_model(flight, frame, force_sigma, variant))
+    if found.turbulence.found:
+        variant = replace(variant, gusty=True)
+        found = matched(copter_model(flight, frame, force_sigma, variant))
+    for name, change in RIVAL_FORMS:
+        if name in found.chosen.effects:
+            other_form = replace(variant, **change)
+            other = matched(copter_model(flight, frame, force_sigma, other_form))
+            if rms(other.held) < rms(found.held):
+                variant, found = other_form, other
+    before, after = drifts_of(found)
+    effects = tuple(
+        _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
+    )
+    absent = copter_missing(flight, frame)
+    untested = not_testable_of(found, absent, MANOEUVRES | _manoeuvres(found))
+    return VehicleMatch(
+        vehicle="copter",
+        effects=effects,
+        wind=wind_of(found),
+        mismatch=mismatch_of(found),
+        alone_before=before,
+        alone_after=after,
+        ambiguous=ambiguous_of(found),
+        not_testable=windless(untested, found),
+        numbers=numbers_of(found),
+        frame=_frame(found, signals, frame, effects),
+        curves=copter_curves(found, frame, signals),
+        series=series_of(found),
+        seconds=len(found.model.flight) * found.model.flight.step_s,
+        explained=is_explained(found),
+    )
+
+
+def _manoeuvres(m: Matched) -> dict[str, str]:
+    return {e.name: e.manoeuvre for e in m.model.effects if e.name}
+
+
+def _with_battery(
+    d: Difference, flight: Flight, signals: Signals, frame: CopterAirframe
+) -> Difference:
+    """Sag with the battery that would give way like this."""
+    if d.name != "voltage_sag":
+        return d
+    volts = flight.battery[:, 0]
+    values = dict(d.values)
+    values["lowest"] = Compared(frame.maxVoltage, float(np.min(volts)), 0.0, "V")
+    its = _battery(signals, flight, frame)
+    if its is not None:
+        nan = float("nan")
+        values["capacity"] = Compared(frame.battCapacityAh, its[0], nan, "Ah")
+        values["resistance"] = Compared(frame.refBatRes, its[1], nan, "ohm")
+    return replace(d, values=values)
+
+
+def _battery(signals: Signals, flight: Flight, frame: CopterAirframe) -> tuple[float, float] | None:
+    """Capacity and resistance from power-up to the end of the flight."""
+    b = signals.battery
+    if not len(b) or b.x.shape[1] < 2:
+        return None
+    before_end = (b.t <= flight.t[-1]) & (b.x[:, 0] > 1.0)
+    fit = fitted_battery(
+        b.t[before_end],
+        b.x[before_end, 0],
+        b.x[before_end, 1],
+        full_voltage(flight, frame),
+    )
+    return None if fit is None else (fit.capacity, fit.resistance)
+
+
+def _frame(
+    m: Matched, signals: Signals, frame: CopterAirframe, effects: tuple[Difference, ...]
+) -> dict[str, float | list[float]]:
+    """Keys of a frame file that flies like the recording: the given frame, and what was found."""
+    theta, model = m.fit.theta, m.model
+    names = {d.name for d in effects}
+    made = frame
+    if "thrust_scale" in names:
+        ratio = math.exp(float(theta[model.indices("thrust_scale")[0]]))
+        made = replace(made, hoverThrOut=made.hoverThrOut / ratio)
+    if "thrust_curve" in names:
+        made = replace(made, propExpo=float(theta[model.indices("thrust_curve")[0]]))
+    if names & {"thrust_scale", "thrust_curve", "voltage_sag"}:
+        made = _with_inflow(m, made)
+        made = _with_ranges(made, signals)
+    if names & {"rotor_drag", "body_drag"}:
+        c_m = float(theta[model.indices("rotor_drag")[0]])
+        made = made.with_drag(c_m, float(np.mean(theta[model.indices("body_drag")])))
+    if "voltage_sag" in names:
+        battery = _battery(signals, model.flight, frame)
+        if battery is not None:
+            made = replace(made, battCapacityAh=battery[0], refBatRes=battery[1])
+        made = replace(made, maxVoltage=full_voltage(model.flight, frame))
+    out: dict[str, float | list[float]] = {
+        k: float(f"{v:.{DIGITS}g}") for k, v in asdict(made).items()
+    }
+    if "thrust_tilt" in names:
+        x, y = theta[model.indices("thrust_tilt")].tolist()
+        for k in range(int(made.num_motors)):
+            out[f"motor{k + 1}_vector"] = [round(x, DIGITS), round(y, DIGITS), -1.0]
+    return out
+
+
+def _with_inflow(m: Matched, frame: CopterAirframe) -> CopterAirframe:
+    """The reference current whose outflow gives the inflow that was found, if it surely differs."""
+    k = m.model.index("inflow")
+    found, sigma = float(m.fit.theta[k]), float(m.fit.sigma[k])
+    if found <= 0.0 or abs(found - frame.inflow) < (SURE + 1.0) * sigma:
+        return frame
+    return replace(frame, refCurrent=frame.refCurrent * math.sqrt(frame.inflow / found))
+
+
+def _with_ranges(frame: CopterAirframe, signals: Signals) -> CopterAirframe:
+    """The vehicle's own range of outputs, where it has one."""
+    get = signals.parameters.get
+    low, high = get("MOT_PWM_MIN", 0.0), get("MOT_PWM_MAX", 0.0)
+    if 0.0 < low < high:
+        frame = replace(frame, pwmMin=low, pwmMax=high)
+    least, most = get("MOT_SPIN_MIN", frame.spin_min), get("MOT_SPIN_MAX", frame.spin_max)
+    if least < most and Outputs.of(signals, frame).motors:
+        frame = replace(frame, spin_min=least, spin_max=most)
+    return frame

@@ -1,0 +1,1 @@
+"""What an airframe may have that its model lacks: one effect, one file."""

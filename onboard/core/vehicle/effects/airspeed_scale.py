@@ -1,0 +1,48 @@
+"""An airspeed sensor that reads too much or too little."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
+from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
+
+FLOOR = 0.02
+"""Of the scale: a pitot tube's own error [data sheet]."""
+COLUMN = 3
+"""Of the prediction: after the three of the force."""
+
+
+def simulated_scale(rho: Array) -> float:
+    """What ArduPilot's simulator reads over the equivalent airspeed: it corrects density twice."""
+    return float(np.mean(np.sqrt(rho / SEA_LEVEL_DENSITY)))
+
+
+class AirspeedScale(Effect):
+    """The reading over the equivalent airspeed.
+
+    A right sensor reads one, the simulator's a little less (:func:`simulated_scale`): whatever is
+    between the two is nominal.
+    """
+
+    name = "airspeed_scale"
+    manoeuvre = "fly turns in the wind, with the airspeed sensor in the log"
+
+    def __init__(self, rho: Array) -> None:
+        """Nominally between the simulator's and a right one."""
+        self.simulated = simulated_scale(rho)
+        middle, half = 0.5 * (1.0 + self.simulated), 0.5 * abs(1.0 - self.simulated)
+        super().__init__([Unknown("scale", middle, 0.15, FLOOR + half, "1", doubt=0.003)])
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Predict the reading."""
+        speed = np.linalg.norm(air.u_b, axis=1)
+        air.force_b[:, COLUMN] += values[0] * speed * np.sqrt(air.rho / SEA_LEVEL_DENSITY)
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """Against the simulator's."""
+        return [Shown("over_equivalent", self.simulated, values[0], sigmas[0], "1")]

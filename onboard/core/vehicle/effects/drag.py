@@ -1,0 +1,38 @@
+"""Drag of a plane: of its profile, and induced by its lift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+
+FLOOR_SHARE = 0.1
+"""Of the nominal coefficients [use]."""
+
+
+class Drag(Effect):
+    """``c_drag_p + induced c_lift^2``, along the flow."""
+
+    name = "drag"
+    manoeuvre = "glide and climb at slow and at fast speeds"
+
+    def __init__(self, frame: PlaneAirframe) -> None:
+        """Nominally the file's."""
+        super().__init__(
+            [
+                Unknown("c_drag_p", frame.c_drag_p, 0.1, FLOOR_SHARE * frame.c_drag_p, "1", 0.003),
+                Unknown(
+                    "induced", frame.induced, 0.03, 2 * FLOOR_SHARE * frame.induced, "1", 0.005
+                ),
+            ]
+        )
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Add the drag; after the lift."""
+        drag = air.pressure * (values[0] + values[1] * air.lift**2)
+        air.force_b[:, 0] -= drag * np.cos(air.alpha)
+        air.force_b[:, 2] -= drag * np.sin(air.alpha)

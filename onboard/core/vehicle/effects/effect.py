@@ -1,0 +1,81 @@
+"""What all effects share: unknowns with a nominal value, and how they act on the prediction."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from onboard.core.vehicle.air import Air
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """One number of an effect.
+
+    Attributes:
+        name: in the document.
+        nominal: its value where the airframe is the nominal one.
+        plausible: standard deviation over the vehicles that fly: prior, and scale of steps.
+        floor: differences below do not matter.
+        unit: in the document.
+        doubt: what the form of the law itself is good for, as a standard deviation.
+        share: the same as a share of the value.
+    """
+
+    name: str
+    nominal: float
+    plausible: float
+    floor: float
+    unit: str
+    doubt: float = 0.0
+    share: float = 0.0
+
+    def doubted(self, value: float, sigma: float) -> float:
+        """A sigma of the fit with what the law is good for."""
+        return math.sqrt(sigma**2 + self.doubt**2 + (self.share * value) ** 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A number as people and other programs read it: nominal value, value, sigma, unit."""
+
+    name: str
+    nominal: float
+    value: float
+    sigma: float
+    unit: str
+
+
+class Effect(ABC):
+    """One piece of physics.
+
+    Attributes:
+        name: in the controlled vocabulary; empty for what is only estimated beside the effects.
+        unknowns: its numbers.
+        manoeuvre: what would show it, as an imperative.
+    """
+
+    name: str = ""
+    manoeuvre: str = ""
+
+    def __init__(self, unknowns: Sequence[Unknown]) -> None:
+        """Take the unknowns."""
+        self.unknowns = tuple(unknowns)
+
+    @abstractmethod
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Change the prediction by these values of the unknowns."""
+
+    def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
+        """The unknowns in the units of the document."""
+        return [
+            Shown(u.name, u.nominal, v, s, u.unit)
+            for u, v, s in zip(self.unknowns, values, sigmas, strict=True)
+        ]
+
+    def missing(self, air: Air) -> str:
+        """Why this recording cannot speak of it; empty where it can."""
+        del air
+        return ""

@@ -1,0 +1,50 @@
+"""Lift of a plane: linear in the angle of attack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+
+FLOOR_SHARE = 0.1
+"""Of the nominal coefficients: what moves a plane's attitude by less than half a degree [use]."""
+
+
+class Lift(Effect):
+    """``c_lift_0 + c_lift_a alpha``, across the flow."""
+
+    name = "lift"
+    manoeuvre = "fly slow and fast level legs, and turns of 45 degrees"
+
+    def __init__(self, frame: PlaneAirframe) -> None:
+        """Nominally the file's."""
+        super().__init__(
+            [
+                Unknown(
+                    "c_lift_0", frame.c_lift_0, 0.3, FLOOR_SHARE * abs(frame.c_lift_0), "1", 0.01
+                ),
+                Unknown(
+                    "c_lift_a",
+                    frame.c_lift_a,
+                    2.0,
+                    FLOOR_SHARE * abs(frame.c_lift_a),
+                    "1/rad",
+                    share=0.01,
+                ),
+            ]
+        )
+        self._frame = frame
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Add the lift, and keep its coefficient for the drag that it induces."""
+        u = air.u_b
+        speed = np.linalg.norm(u, axis=1)
+        air.alpha = np.arctan2(u[:, 2], u[:, 0])
+        air.pressure = self._frame.pressure(air.rho, speed)
+        air.lift = values[0] + values[1] * air.alpha
+        air.force_b[:, 0] += air.pressure * air.lift * np.sin(air.alpha)
+        air.force_b[:, 2] -= air.pressure * air.lift * np.cos(air.alpha)

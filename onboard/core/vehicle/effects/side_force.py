@@ -1,0 +1,44 @@
+"""Side force of a plane: by sideslip and rudder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+
+FLOOR_SHARE = 0.1
+"""Of the nominal coefficient of sideslip [use]."""
+RUDDER_FLOOR = 0.05
+"""Of the rudder's coefficient [use]."""
+RUDDER = 1
+"""Column of the commands."""
+
+
+class SideForce(Effect):
+    """``c_y_b beta + c_y_deltar rudder``."""
+
+    name = "side_force"
+    manoeuvre = "kick the rudder to both sides, or fly uncoordinated turns"
+
+    def __init__(self, frame: PlaneAirframe) -> None:
+        """Nominally the file's."""
+        floor = FLOOR_SHARE * abs(frame.c_y_b)
+        super().__init__(
+            [
+                Unknown("c_y_b", frame.c_y_b, 0.5, floor, "1/rad", share=0.02),
+                Unknown("c_y_deltar", frame.c_y_deltar, 0.2, RUDDER_FLOOR, "1", 0.02),
+            ]
+        )
+        self._constant = frame.c_y_0
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """Add the force; after the lift."""
+        u = air.u_b
+        coefficient = self._constant + values[0] * np.arctan2(u[:, 1], u[:, 0])
+        if air.commands is not None:
+            coefficient = coefficient + values[1] * air.commands[:, RUDDER]
+        air.force_b[:, 1] += air.pressure * coefficient

@@ -1,0 +1,259 @@
+"""Unknowns of a model by Gauss-Newton on whitened residuals, and the sums that are left of it.
+
+All inference after the fit (other choices of effects, held-out residuals, scatter between blocks)
+is algebra on the blocks' sums about the estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.limits import (
+    BLOCK_S,
+    FEWEST_BLOCKS,
+    INSTRUMENT_WINDOWS,
+    NOISE_ROUNDS,
+    ROUNDS,
+    SETTLED,
+    THRUST_AXIS,
+)
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
+from onboard.core.vehicle.windows import windows_of
+
+
+@dataclass(frozen=True, slots=True)
+class BlockSums:
+    """Sums of whitened rows about the estimate: ``N = sum h h^T``, ``b = sum h y``, ``s``."""
+
+    N: Array
+    b: Array
+    s: float
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A model with its unknowns found.
+
+    Attributes:
+        model: what was fitted.
+        theta: (m,) unknowns.
+        prior: (m,) weights of the prior, 1 / sigma^2.
+        blocks: sums about ``theta``.
+        inflation: (m,) by how much variances exceed what whitened rows promise.
+        noise: by axis.
+        residual: (n, k) measured less predicted, m/s^2.
+        jacobian: (n, k, m) of the prediction.
+        sensitivity: (n, k) to gusts, 1/s.
+        block: (n,) number of the block of each step.
+    """
+
+    model: ForceModel
+    theta: Array
+    prior: Array
+    blocks: tuple[BlockSums, ...]
+    inflation: Array
+    noise: tuple[AxisNoise, ...]
+    residual: Array
+    jacobian: Array
+    sensitivity: Array
+    block: Array
+
+    @property
+    def information(self) -> Array:
+        """(m, m) of all blocks and the prior."""
+        out: Array = sum((b.N for b in self.blocks), np.diag(self.prior))
+        return out
+
+    @property
+    def covariance(self) -> Array:
+        """(m, m), inflated."""
+        root = np.sqrt(self.inflation)
+        out: Array = np.linalg.inv(self.information) * np.outer(root, root)
+        return out
+
+    @property
+    def sigma(self) -> Array:
+        """(m,) standard deviations, with what the laws are good for."""
+        plain = np.sqrt(np.diag(self.covariance))
+        pairs = zip(self.model.unknowns, self.theta.tolist(), plain.tolist(), strict=True)
+        return np.array([u.doubted(v, s) for u, v, s in pairs])
+
+    @property
+    def scale(self) -> float:
+        """One inflation for tests of several unknowns: that of the blocks' scores."""
+        return float(np.median(self.inflation))
+
+
+def fitted(model: ForceModel, start: Array | None = None) -> Fit:
+    """Find unknowns and noise in turn.
+
+    Args:
+        model: to be fitted; all its unknowns are free, each within its prior.
+        start: (m,) where to begin; the nominal airframe if None.
+    """
+    theta = model.nominal if start is None else start.copy()
+    prior = 1.0 / model.plausible**2
+    noise: tuple[AxisNoise, ...] = tuple(AxisNoise(0.3) for _ in model.axes)
+    n = len(model.flight)
+    sensitivity = np.ones((n, len(model.axes)))
+    for turn in range(NOISE_ROUNDS):
+        theta = _settled(model, theta, prior, noise, sensitivity)
+        residual = model.measured() - model.predicted(theta)
+        sensitivity = model.sensitivity(theta)
+        windows = windows_of(model.flight)
+        noise = tuple(
+            fitted_noise(
+                windows.mean(residual[:, k]),
+                windows.mean(sensitivity[:, k]),
+                windows.piece,
+                windows.length_s,
+                gusts=turn == NOISE_ROUNDS - 1,
+            )
+            for k in range(len(model.axes))
+        )
+    theta = _settled(model, theta, prior, noise, sensitivity)
+    return summed(model, theta, prior, noise, sensitivity)
+
+
+def summed(
+    model: ForceModel,
+    theta: Array,
+    prior: Array,
+    noise: Sequence[AxisNoise],
+    sensitivity: Array,
+) -> Fit:
+    """Sums by block about ``theta`` (m,), and what their scatter says of the variances."""
+    residual = model.measured() - model.predicted(theta)
+    jacobian = model.jacobian(theta)
+    block = np.floor((model.flight.t - model.flight.t[0]) / BLOCK_S)
+    of_row = block[windows_of(model.flight).first]
+    rows = _rows(model, residual, jacobian, noise, sensitivity)
+    sums = []
+    for number in np.unique(of_row):
+        mine = of_row == number
+        y = np.concatenate([r[mine, 0] for r in rows])
+        h = np.concatenate([r[mine, 1:] for r in rows])
+        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y)))
+    return Fit(
+        model,
+        theta,
+        prior,
+        tuple(sums),
+        _inflation(sums, prior),
+        tuple(noise),
+        residual,
+        jacobian,
+        sensitivity,
+        block,
+    )
+
+
+def _settled(
+    model: ForceModel, theta: Array, prior: Array, noise: Sequence[AxisNoise], sensitivity: Array
+) -> Array:
+    """Gauss-Newton steps, halved where they lead uphill."""
+    measured, nominal = model.measured(), model.nominal
+
+    def cost(at: Array) -> float:
+        rows = _rows(model, measured - model.predicted(at), None, noise, sensitivity)
+        apart = at - nominal
+        return float(sum(np.sum(r[:, 0] ** 2) for r in rows) + prior @ (apart * apart))
+
+    now = cost(theta)
+    for _ in range(ROUNDS):
+        rows = _rows(
+            model, measured - model.predicted(theta), model.steps(theta), noise, sensitivity
+        )
+        N, b = np.diag(prior), prior * (nominal - theta)
+        for r in rows:
+            N = N + r[:, 1:].T @ r[:, 1:]
+            b = b + r[:, 1:].T @ r[:, 0]
+        step = np.linalg.solve(N, b)
+        sigma = np.sqrt(np.diag(np.linalg.inv(N)))
+        for _halving in range(6):
+            trial = theta + step
+            then = cost(trial)
+            # Regressors that are told from the past lead to no minimum of these squares.
+            if model.instrumented or then <= now + 1e-6:
+                theta, now = trial, then
+                break
+            step = 0.5 * step
+        else:
+            break
+        if np.max(np.abs(step) / sigma) < SETTLED:
+            break
+    return theta
+
+
+def _rows(
+    model: ForceModel,
+    residual: Array,
+    jacobian: Array | None,
+    noise: Sequence[AxisNoise],
+    sensitivity: Array,
+) -> list[Array]:
+    """For each axis (r, 1 + m): whitened residual and regressors, of means over windows."""
+    windows = windows_of(model.flight)
+    step = windows.length_s
+    out = []
+    for k, its in enumerate(noise):
+        rows = residual[:, k, None]
+        if jacobian is not None:
+            rows = np.hstack([rows, jacobian[:, k]])
+        sensitive = windows.mean(sensitivity[:, k])
+        made = whitened(windows.mean(rows), its, sensitive, windows.piece, step)
+        if jacobian is not None and model.instrumented and model.axes[k] == THRUST_AXIS:
+            made[:, 1:] = _instrumented(made[:, 1:], windows.piece)
+        out.append(made)
+    return out
+
+
+def _instrumented(rows: Array, piece: NDArray[np.int64]) -> Array:
+    """(r, m) regressors as far as their own past tells them (two-stage least squares).
+
+    An autopilot answers a gust at once: its commands are no longer independent of the disturbance,
+    and least squares would take the answer for the cause.  What the commands were before the gust
+    is independent of it.  J. D. Angrist and J.-S. Pischke, *Mostly Harmless Econometrics* (2009),
+    chapter 4.
+    """
+    past = []
+    for lag in INSTRUMENT_WINDOWS:
+        moved = np.zeros_like(rows)
+        moved[lag:] = rows[:-lag]
+        moved[np.concatenate([np.ones(lag, dtype=bool), piece[lag:] != piece[:-lag]])] = 0.0
+        past.append(moved)
+    instruments = np.hstack(past)
+    size = np.linalg.norm(instruments, axis=0)
+    instruments = instruments[:, size > 0.0] / size[size > 0.0]
+    told, *_ = np.linalg.lstsq(instruments, rows, rcond=1e-8)
+    out: Array = instruments @ told
+    return out
+
+
+def _inflation(blocks: Sequence[BlockSums], prior: Array) -> Array:
+    """(m,) variance of the estimate by the scatter of the blocks' scores, over that of the sums.
+
+    The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
+    Each unknown has its own, but none less than the mean of all: a few blocks know single ones
+    badly.
+    """
+    m = len(prior)
+    count = len(blocks)
+    if count < FEWEST_BLOCKS:
+        return np.ones(m)
+    inverse = np.linalg.inv(sum((b.N for b in blocks), np.diag(prior)))
+    scores = np.array([b.b for b in blocks])
+    robust = inverse @ (scores.T @ scores) @ inverse * count / (count - 1.0)
+    known = np.diag(inverse @ (np.linalg.inv(inverse) - np.diag(prior)) @ inverse)
+    ratio = np.diag(robust) / np.maximum(known, 1e-300)
+    told = np.diag(inverse) * prior < 0.5
+    mean = float(np.mean(ratio[told])) if told.any() else 1.0
+    out: Array = np.maximum(np.maximum(ratio, mean), 1.0)
+    return out

@@ -1,0 +1,174 @@
+"""A flight on an even grid: what the models predict from, and the force that they must predict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.atmosphere import density
+from onboard.core.vehicle.limits import CONTACT_M_S2, STEP_S
+from onboard.core.vehicle.signals import Signals, Stream
+from onboard.core.vehicle.spans import inside
+from onboard.core.vehicle.trajectory import Motion
+
+_BY_STEP = (
+    *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
+    *("outputs", "commands", "battery", "airspeed", "ekf_wind"),
+)
+"""Fields that have a value for each step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Means over steps of :data:`~onboard.core.vehicle.limits.STEP_S`; n steps in the air.
+
+    Attributes:
+        t: (n,) middle of each step, s.
+        piece: (n,) number of the uninterrupted piece that a step belongs to.
+        f_b: (n, 3) specific force measured, m/s^2.
+        w_b: (n, 3) rates, rad/s.
+        R_bn: (n, 3, 3) NED to body.
+        v_b: (n, 3) velocity over ground in body axes, m/s.
+        v_n: (n, 3) the same, NED.
+        height: (n,) above mean sea level, m.
+        ground: height of the ground, m.
+        rho: (n,) density of the standard atmosphere, kg/m^3.
+        outputs: (n, k) pulse widths (or commands), or empty (n, 0).
+        commands: (n, 3) of the motors: mean, mean square, and how evenly they share the thrust
+            (:meth:`onboard.core.vehicle.copter.Outputs.commands`); or empty (n, 0).
+        battery: (n, 2) voltage and current, or empty (n, 0).
+        airspeed: (n,) as reported; NaN where there is none.
+        ekf_wind: (n, 2) or empty (n, 0).
+        velocity_sigma: of the velocity, m/s.
+        attitude_sigma: of roll and pitch, rad.
+        step_s: length of a step, s.
+    """
+
+    t: Array
+    piece: NDArray[np.int64]
+    f_b: Array
+    w_b: Array
+    R_bn: Array
+    v_b: Array
+    v_n: Array
+    height: Array
+    ground: float
+    rho: Array
+    outputs: Array
+    commands: Array
+    battery: Array
+    airspeed: Array
+    ekf_wind: Array
+    velocity_sigma: float
+    attitude_sigma: float
+    step_s: float = STEP_S
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def mean_height(self) -> float:
+        """Mean height above the ground, m."""
+        return float(np.mean(self.height)) - self.ground
+
+    def kept(self, mask: Mask) -> Flight:
+        """The steps (n,) that are True."""
+        cut = {name: getattr(self, name)[mask] for name in _BY_STEP}
+        return replace(self, **cut)
+
+
+def flight_of(
+    pieces: Sequence[Motion],
+    signals: Signals,
+    commands: Stream,
+    grounded: list[tuple[float, float]],
+    ground: float,
+) -> Flight | None:
+    """Flight on the grid, without what was near the ground; None if nothing is left.
+
+    Args:
+        pieces: motion at the accelerometer's samples.
+        signals: of the vehicle.
+        commands: of a copter's motors, as in :class:`Flight`; empty where there are none.
+        grounded: spans to leave out, s.
+        ground: height of the ground, m.
+    """
+    parts: list[dict[str, Array]] = []
+    for number, m in enumerate(pieces):
+        part = _binned(m, signals, commands, number)
+        if part is not None:
+            parts.append(part)
+    if not parts:
+        return None
+    joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
+    hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
+    air = ~inside(joined["t"], grounded) & ~hit
+    if not air.any():
+        return None
+    flight = Flight(
+        ground=ground,
+        velocity_sigma=max(m.velocity_sigma for m in pieces),
+        attitude_sigma=max(m.attitude_sigma for m in pieces),
+        piece=joined["piece"].astype(np.int64),
+        t=joined["t"],
+        f_b=joined["f_b"],
+        w_b=joined["w_b"],
+        R_bn=joined["R_bn"],
+        v_b=joined["v_b"],
+        v_n=joined["v_n"],
+        height=joined["height"],
+        rho=joined["rho"],
+        outputs=joined["outputs"],
+        commands=joined["commands"],
+        battery=joined["battery"],
+        airspeed=joined["airspeed"],
+        ekf_wind=joined["ekf_wind"],
+    )
+    flight = flight.kept(air)
+    # What was cut out divides a piece: the noise's memory must not reach across.
+    breaks = np.diff(flight.t) > 1.5 * flight.step_s
+    piece = np.concatenate([[0], np.cumsum(breaks | (np.diff(flight.piece) != 0))])
+    flight.piece[:] = piece
+    return flight
+
+
+def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[str, Array] | None:
+    """Means of a piece's samples over the steps that have any."""
+    which = np.floor((m.t - m.t[0]) / STEP_S).astype(np.int64)
+    steps, first, counts = np.unique(which, return_index=True, return_counts=True)
+    if len(steps) < 3:
+        return None
+
+    def mean(x: Array) -> Array:
+        shape = (-1,) + (1,) * (x.ndim - 1)
+        out: Array = np.add.reduceat(x, first, axis=0) / counts.reshape(shape)
+        return out
+
+    R_bn = np.swapaxes(m.R_nb, -1, -2)
+    v_b = np.einsum("nij,nj->ni", R_bn, m.v_n)
+    height = mean(m.height)
+    n = len(steps)
+    streams = (signals.outputs, commands, signals.battery, signals.airspeed, signals.ekf_wind)
+    outputs, orders, battery, airspeed, wind = (
+        mean(s.at(m.t)) if s.covers(m.t) else np.zeros((n, 0)) for s in streams
+    )
+    return {
+        "t": m.t[0] + (steps + 0.5) * STEP_S,
+        "piece": np.full(n, float(number)),
+        "f_b": mean(m.f_b),
+        "w_b": mean(m.w_b),
+        "R_bn": mean(R_bn),
+        "v_b": mean(v_b),
+        "v_n": mean(m.v_n),
+        "height": height,
+        "rho": density(height),
+        "outputs": outputs,
+        "commands": orders,
+        "battery": battery,
+        "airspeed": airspeed[:, 0] if airspeed.shape[1] else np.full(n, np.nan),
+        "ekf_wind": wind,
+    }

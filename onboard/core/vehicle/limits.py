@@ -1,0 +1,109 @@
+"""Every number of this room that decides something, with where it comes from.
+
+[probability] a chance level, [physics] a bound of nature or of vehicles, [cost] processor time or
+memory, [use] what matters to whoever flies, [data sheet] what sensors promise.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# Flight on a grid (flight, trajectory, spans).
+
+STEP_S: Final = 0.1
+"""Step of the grid, s: the rate at which ordinary logs have outputs and battery [data sheet]."""
+FEWEST_STEPS: Final = 100
+"""Steps that a flight must have to be looked at: ten seconds [physics: unknowns by rows]."""
+MARGIN_S: Final = 3.0
+"""s of flight next to the ground that are left out: contact and ground effect are another
+physics [physics]."""
+GROUND_M: Final = 2.0
+"""Heights closer than this to where the vehicle stood are the ground, m [data sheet]."""
+STILL_M_S: Final = 0.3
+"""Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
+LEVEL_M_S: Final = 0.15
+"""Vertical speed of a vehicle that rolls, as a receiver shows it, m/s [data sheet]."""
+STILL_S: Final = 1.0
+"""s for which it must show it [probability: five fixes in a row]."""
+CONTACT_M_S2: Final = 40.0
+"""Specific force that no copter's rotors make, m/s^2: an impact [physics]."""
+ATTITUDE_WANDER: Final = (1e-4, 4e-4, 1.5e-3, 6e-3)
+"""Noise of the integrated rates, rad per sqrt(s), among which the likeliest is taken: from a good
+gyroscope's to coning at 25 samples a second [data sheet]."""
+VELOCITY_NOISE_M_S: Final = (0.02, 0.06, 0.2)
+"""White noise of a receiver's velocity, likewise, m/s [data sheet]."""
+LEVELS_FROM: Final = 400
+"""Fixes from which these are found [cost]."""
+FEWEST_FIXES: Final = 5
+"""Fewer are no piece of flight [physics]."""
+
+# Noise (noise).
+
+CORRELATION_S: Final = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0)
+"""Correlation times of the coloured disturbance that are tried, s: from the grid's own to half a
+block's [cost]."""
+WHITE_SHARES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+"""Shares of white noise in the variance of the disturbance that are tried [cost]."""
+GUST_LEVELS: Final = (0.0, 0.3, 1.0, 3.0, 10.0)
+"""Gust noise, as multiples of the force noise at the mean sensitivity, that is tried [cost]."""
+LEAST_NOISE_M_S2: Final = 0.005
+"""Noise that no force goes below, m/s^2: steps of logged numbers [data sheet]."""
+
+# Fit (fit).
+
+WINDOW_STEPS: Final = 5
+"""Steps whose mean is a row of the fit: half a second, in which an error of the velocity hardly
+changes, so that what follows is nearly a Markov process [physics]."""
+BLOCK_S: Final = 12.0
+"""Length of a block whose sums are kept, s: longer than the disturbance remembers [cost]."""
+FEWEST_BLOCKS: Final = 5
+"""Fewer blocks do not tell the scatter between them [probability]."""
+FOLDS: Final = 8
+"""Folds of the cross-validation [cost]."""
+INSTRUMENT_WINDOWS: Final = (2, 4)
+"""Windows ago of which commands are told from: longer than a gust that an autopilot answers at once
+lasts, shorter than a manoeuvre [physics]."""
+THRUST_AXIS: Final = 2
+"""Body axis along which the commands act."""
+ROUNDS: Final = 6
+"""Gauss-Newton steps at the most [cost]."""
+SETTLED: Final = 0.02
+"""Sigmas that a step may move and count as no move [cost]."""
+NOISE_ROUNDS: Final = 3
+"""Times that noise and unknowns are found in turn [cost]."""
+OUTLYING: Final = 5.0
+"""Robust sigmas past which a step is no part of what the model describes (stall, gust front,
+contact): 6e-7 of normal ones [probability]."""
+
+STALL_SHARE: Final = 0.85
+"""Of the angle of stall: up to it lift is a straight line to a per cent [physics]."""
+
+# Decisions (choices).
+
+FALSE_ALARM: Final = 1e-3
+"""Probability that a recording of the nominal airframe shows any given effect by chance; divided
+by the number of effects that are tried [probability]."""
+SURE: Final = 2.0
+"""Sigmas by which a difference must exceed what matters [probability: one in 44]."""
+TESTABLE: Final = 3.0
+"""Sigmas in the largest plausible size that make an effect testable [probability]."""
+ALIKE: Final = 0.7
+"""Correlation of two effects' unknowns past which each explains half of the other
+[probability]."""
+AMBIGUOUS: Final = 10.0
+"""Fall of chi-square within which two effects cannot be told apart (Kass and Raftery, 1995)
+[probability]."""
+TURBULENCE_FLOOR_M_S: Final = 0.3
+"""Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
+
+# What is shown (flown_alone, curves).
+
+ALONE_S: Final = 10.0
+"""s for which the model flies on alone [use]."""
+ALONE_EVERY_S: Final = 4.0
+"""s between the starts of such flights [cost]."""
+CURVE_BINS: Final = 24
+"""Points of a curve with its data [cost]."""
+MOST_OUTLYING: Final = 0.1
+"""Share of steps past which they are no outliers but flight that the model fails on
+[probability]."""

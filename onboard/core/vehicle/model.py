@@ -1,0 +1,142 @@
+"""A model of the specific force: effects in a row, their unknowns as one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.flight import Flight
+
+DIFFERENCE = 1e-3
+"""Step of a difference quotient, in plausible sizes: forces are smooth [cost]."""
+
+GUST = 0.1
+"""Gust of the difference quotient, m/s [cost]."""
+
+
+Start: TypeAlias = Callable[[Flight], Air]
+"""Makes the still air that a prediction for a flight begins with."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForceModel:
+    """What predicts the force of one flight.
+
+    Attributes:
+        flight: n steps.
+        effects: in the order in which they act.
+        axes: body axes that it predicts.
+        start: makes the air.
+        instrumented: whether the vehicle's commands answer what acts along z (see
+            :func:`onboard.core.vehicle.fit.fitted`).
+    """
+
+    flight: Flight
+    effects: tuple[Effect, ...]
+    axes: tuple[int, ...]
+    start: Start
+    instrumented: bool = False
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Of all effects, in a row."""
+        return tuple(u for e in self.effects for u in e.unknowns)
+
+    @property
+    def nominal(self) -> Array:
+        """(m,) values of the nominal airframe."""
+        return np.array([u.nominal for u in self.unknowns])
+
+    @property
+    def plausible(self) -> Array:
+        """(m,) prior standard deviations."""
+        return np.array([u.plausible for u in self.unknowns])
+
+    def indices(self, name: str) -> list[int]:
+        """Places of an effect's unknowns; empty if it is not in the model."""
+        out: list[int] = []
+        at = 0
+        for effect in self.effects:
+            if effect.name == name:
+                out += range(at, at + len(effect.unknowns))
+            at += len(effect.unknowns)
+        return out
+
+    def index(self, unknown: str) -> int:
+        """Place of an unknown by its own name, of the first effect that has it.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for k, u in enumerate(self.unknowns):
+            if u.name == unknown:
+                return k
+        raise KeyError(unknown)
+
+    @property
+    def beside(self) -> list[int]:
+        """Places of what is only estimated beside the effects."""
+        return self.indices("")
+
+    def air(self, theta: Array, gust: Array | None = None) -> Air:
+        """The prediction at unknowns (m,), in air that also moves by ``gust`` (3,), m/s."""
+        air = self.start(self.flight)
+        if gust is not None:
+            air.gust_n = gust
+        at = 0
+        for effect in self.effects:
+            n = len(effect.unknowns)
+            effect.act(air, theta[at : at + n].tolist())
+            at += n
+        return air
+
+    def predicted(self, theta: Array) -> Array:
+        """(n, k) force along the axes, m/s^2."""
+        out: Array = self.air(theta).force_b[:, list(self.axes)]
+        return out
+
+    def gust_slope(self, theta: Array) -> Array:
+        """(n, k, 3) change of the force by a gust towards north, east, down, 1/s."""
+        here = self.predicted(theta)
+        columns = [
+            (self.air(theta, gust).force_b[:, list(self.axes)] - here) / GUST
+            for gust in GUST * np.eye(3)
+        ]
+        return np.stack(columns, axis=-1)
+
+    def sensitivity(self, theta: Array) -> Array:
+        """(n, k) change of the force by a gust of 1 m/s from anywhere, 1/s."""
+        out: Array = np.sqrt(np.sum(self.gust_slope(theta) ** 2, axis=-1))
+        return out
+
+    def measured(self) -> Array:
+        """(n, k) what the accelerometer says."""
+        every = np.hstack([self.flight.f_b, self.flight.airspeed[:, None]])
+        out: Array = every[:, list(self.axes)]
+        return out
+
+    def steps(self, theta: Array) -> Array:
+        """(n, k, m) derivatives by one-sided differences: good enough to step by."""
+        here, columns = self.predicted(theta), []
+        for j, size in enumerate(self.plausible):
+            there = theta.copy()
+            there[j] += DIFFERENCE * size
+            columns.append((self.predicted(there) - here) / (DIFFERENCE * size))
+        return np.stack(columns, axis=-1)
+
+    def jacobian(self, theta: Array) -> Array:
+        """(n, k, m) derivatives by central differences."""
+        columns = []
+        for j, size in enumerate(self.plausible):
+            h = DIFFERENCE * size
+            up, down = theta.copy(), theta.copy()
+            up[j] += h
+            down[j] -= h
+            columns.append((self.predicted(up) - self.predicted(down)) / (2.0 * h))
+        return np.stack(columns, axis=-1)

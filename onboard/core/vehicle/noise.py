@@ -1,0 +1,153 @@
+"""The disturbance that no model describes: coloured, so that rows must be whitened to be counted.
+
+Per axis a first-order Gauss-Markov process (gusts, errors of the velocity, what is not modelled)
+plus white noise (vibration), times a size that may grow with the sensitivity to gusts.  Levels are
+chosen by likelihood.  The whitened rows are the innovations of the steady-state Kalman filter
+(B. D. O. Anderson and J. B. Moore, *Optimal Filtering*, 1979, chapter 4), which for this process is
+a recursion of first order, here solved by doubling so that it needs no loop over time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.limits import (
+    CORRELATION_S,
+    GUST_LEVELS,
+    LEAST_NOISE_M_S2,
+    WHITE_SHARES,
+)
+from onboard.core.vehicle.recursion import accumulated, starts_of
+
+
+@dataclass(frozen=True, slots=True)
+class AxisNoise:
+    """Noise of the force along one axis.
+
+    Attributes:
+        force: standard deviation that is there always, m/s^2.
+        gust: standard deviation of the air's velocity that acts by the sensitivity, m/s.
+        correlation_s: of the coloured part, s.
+        white: share of white noise in the variance.
+    """
+
+    force: float
+    gust: float = 0.0
+    correlation_s: float = 1.0
+    white: float = 1.0
+
+    def size(self, sensitivity: Array) -> Array:
+        """(n,) standard deviation, m/s^2; ``sensitivity`` (n,) is m/s^2 per m/s of gust."""
+        out: Array = np.sqrt(self.force**2 + (self.gust * sensitivity) ** 2)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Recursion:
+    """``e_k = y_k - phi y_(k-1) + decay e_(k-1)``, variance of e over that of y."""
+
+    phi: float
+    decay: float
+    variance: float
+
+
+def _recursion(step_s: float, correlation_s: float, white: float) -> _Recursion:
+    """The steady-state filter of a process of variance one."""
+    phi = math.exp(-step_s / correlation_s)
+    coloured, r = 1.0 - white, white
+    q = coloured * (1.0 - phi * phi)
+    # Riccati's equation of the scalar state: P^2 + P (r - phi^2 r - q) - q r = 0.
+    half = 0.5 * (r * (1.0 - phi * phi) - q)
+    P = -half + math.sqrt(half * half + q * r)
+    s = P + r
+    gain = P / s if s > 0.0 else 1.0
+    return _Recursion(phi, phi * (1.0 - gain), s)
+
+
+def whitened(
+    rows: Array, noise: AxisNoise, sensitivity: Array, piece: NDArray[np.int64], step_s: float
+) -> Array:
+    """(n, m) rows of unit variance, if the noise is as it says.
+
+    Args:
+        rows: (n, m) residual and regressors, m/s^2 (per unit).
+        noise: of this axis.
+        sensitivity: (n,) m/s^2 per m/s of gust.
+        piece: (n,) number of the uninterrupted piece; the recursion begins anew with each.
+        step_s: s.
+    """
+    scaled = rows / noise.size(sensitivity)[:, None]
+    rec = _recursion(step_s, noise.correlation_s, noise.white)
+    starts = starts_of(piece)
+    root = math.sqrt(rec.variance)
+    z = scaled.copy()
+    z[1:] -= rec.phi * scaled[:-1]
+    z[starts] = scaled[starts]
+    out: Array = accumulated(z, rec.decay, starts) / root
+    # The first of a piece has nothing before it: it is as large as the process.
+    out[starts] = scaled[starts]
+    return out
+
+
+def fitted_noise(
+    residual: Array,
+    sensitivity: Array,
+    piece: NDArray[np.int64],
+    step_s: float,
+    *,
+    gusts: bool = False,
+) -> AxisNoise:
+    """The likeliest noise of a residual (n,), m/s^2.
+
+    Args:
+        residual: what the model leaves of the force.
+        sensitivity: (n,) m/s^2 per m/s of gust.
+        piece: (n,) number of the uninterrupted piece.
+        step_s: s.
+        gusts: whether noise may grow with the sensitivity.
+    """
+    best = AxisNoise(1.0)
+    best_score = -math.inf
+    for level in GUST_LEVELS if gusts else (0.0,):
+        for tau in CORRELATION_S:
+            for white in WHITE_SHARES:
+                score, trial = _scored(residual, sensitivity, piece, step_s, (level, tau, white))
+                if score > best_score:
+                    best_score, best = score, trial
+    return best
+
+
+def gust_evidence(
+    residual: Array, sensitivity: Array, piece: NDArray[np.int64], step_s: float, noise: AxisNoise
+) -> tuple[float, float]:
+    """Twice the log-likelihood that a gust level adds, and that level, m/s."""
+    shape = noise.correlation_s, noise.white
+    none, _ = _scored(residual, sensitivity, piece, step_s, (0.0, *shape))
+    trials = [_scored(residual, sensitivity, piece, step_s, (g, *shape)) for g in GUST_LEVELS]
+    score, trial = max(trials, key=lambda x: x[0])
+    return 2.0 * (score - none), trial.gust
+
+
+def _scored(
+    residual: Array,
+    sensitivity: Array,
+    piece: NDArray[np.int64],
+    step_s: float,
+    shape: tuple[float, float, float],
+) -> tuple[float, AxisNoise]:
+    """Log-likelihood with the overall size profiled out, and the noise of that size."""
+    level, tau, white = shape
+    mean = float(np.mean(sensitivity)) or 1.0
+    unit = AxisNoise(1.0, level / mean, tau, white)
+    e = whitened(residual[:, None], unit, sensitivity, piece, step_s)[:, 0]
+    n = len(e)
+    size = max(math.sqrt(float(e @ e) / n), LEAST_NOISE_M_S2)
+    log_size = n * math.log(size) + float(np.sum(np.log(unit.size(sensitivity))))
+    log_step = 0.5 * n * math.log(_recursion(step_s, tau, white).variance)
+    score = -log_size - log_step - 0.5 * float(e @ e) / size**2
+    return score, AxisNoise(size, size * level / mean, tau, white)

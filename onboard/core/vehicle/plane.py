@@ -1,0 +1,121 @@
+"""The model of a plane: which effects, in which order, and what its outputs command."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
+from onboard.core.vehicle.effects.drag import Drag
+from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.lift import Lift
+from onboard.core.vehicle.effects.propulsion import Propulsion
+from onboard.core.vehicle.effects.sensor_offset import SensorOffset
+from onboard.core.vehicle.effects.servo_lag import ServoLag
+from onboard.core.vehicle.effects.side_force import SideForce
+from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import STALL_SHARE
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION, Signals, Stream
+
+MIDDLE_US, HALF_US = 1500.0, 500.0
+"""Pulse width of a surface at rest, and to its end."""
+FULL_S = 0.9
+"""Share of the readings that an airspeed sensor must have [cost]."""
+LEAST_AIRSPEED_M_S = 5.0
+"""Airspeed that planes fly at at least, m/s [physics]."""
+
+
+def plane_commands(signals: Signals) -> Stream:
+    """Throttle (0 to 1) and rudder (-1 to 1) as (j, 2); empty without a throttle."""
+    raw = signals.outputs.x
+    throttle = signals.channels_of(THROTTLE_FUNCTION)
+    if not throttle or not len(signals.outputs):
+        return Stream()
+    k = throttle[0]
+    get = signals.parameters.get
+    low, high = get(f"SERVO{k + 1}_MIN", 1000.0), get(f"SERVO{k + 1}_MAX", 2000.0)
+    if not low < high or float(np.std(raw[:, k])) <= 0.0:
+        return Stream()
+    share = np.clip((raw[:, k] - low) / (high - low), 0.0, 1.0)
+    rudder = signals.channels_of(RUDDER_FUNCTION)
+    turned = np.zeros(len(raw))
+    if rudder:
+        turned = np.where(raw[:, rudder[0]] > 0.0, raw[:, rudder[0]] - MIDDLE_US, 0.0) / HALF_US
+    return Stream(signals.outputs.t, np.stack([share, turned], axis=1))
+
+
+def has_airspeed(flight: Flight) -> bool:
+    """Whether there is an airspeed sensor that read something."""
+    known = np.isfinite(flight.airspeed)
+    return bool(
+        np.mean(known) > FULL_S and float(np.median(flight.airspeed[known])) > LEAST_AIRSPEED_M_S
+    )
+
+
+def unstalled(flight: Flight, frame: PlaneAirframe, wind_n: Array) -> Flight:
+    """The flight without what is near or past the stall, or too slow to be flight, by this wind."""
+    u = flight.v_b - np.einsum("nij,j->ni", flight.R_bn, wind_n)
+    speed = np.linalg.norm(u, axis=1)
+    alpha = np.arctan2(u[:, 2], u[:, 0])
+    good = (np.abs(alpha) < STALL_SHARE * frame.alpha_stall) & (speed > LEAST_AIRSPEED_M_S)
+    if good.all():
+        return flight
+    out = flight.kept(good)
+    breaks = (np.diff(out.t) > 1.5 * out.step_s) | (np.diff(out.piece) != 0)
+    return replace(out, piece=np.concatenate([[0], np.cumsum(breaks)]))
+
+
+def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> ForceModel:
+    """Every effect of a plane that this recording can speak of."""
+    sensor = has_airspeed(flight)
+
+    def start(of: Flight) -> Air:
+        return Air(of, columns=COLUMN + 1)
+
+    still = start(flight)
+    everything: list[Effect] = [
+        Wind(),
+        WindProfile(),
+        *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),
+        ServoLag(),
+        Lift(frame),
+        Drag(frame),
+        SideForce(frame),
+        Propulsion(frame),
+        *([AirspeedScale(flight.rho)] if sensor else []),
+        SensorOffset(force_sigma),
+    ]
+    effects = tuple(e for e in everything if not e.missing(still))
+    if still.commands is None:
+        # Without the throttle nothing can be said along x.
+        axes: tuple[int, ...] = (1, 2)
+    else:
+        axes = (0, 1, 2)
+    return ForceModel(flight, effects, (*axes, COLUMN) if sensor else axes, start)
+
+
+DENSITY_RANGE_M = 500.0
+"""As of a copter: range of heights over which density acts on its own, m [physics]."""
+
+
+def plane_missing(flight: Flight) -> dict[str, str]:
+    """What this recording cannot speak of, and why, by effect."""
+    absent: dict[str, str] = {}
+    air = Air(flight)
+    if why := WindProfile().missing(air):
+        absent["wind_profile"] = why
+    if air.commands is None:
+        absent["thrust_scale"] = absent["drag"] = "no throttle output in the recording"
+    if not has_airspeed(flight):
+        absent["airspeed_scale"] = "no airspeed sensor in the recording"
+    if float(np.ptp(flight.height)) <= DENSITY_RANGE_M:
+        absent["air_density"] = "acts on lift and drag alike at one height"
+    return absent

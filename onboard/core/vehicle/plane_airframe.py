@@ -1,0 +1,76 @@
+"""A plane as ArduPilot's simulator describes it: linear coefficients.
+
+Names, defaults and meaning are those of the coefficient files that the simulator loads (facts of
+libraries/SITL/SIM_Plane in ArduPilot 4.7-dev).  Its dynamic pressure is that of the *equivalent*
+airspeed times the density once more; coefficients are meant in that convention, so that a file that
+is handed back flies alike at the same height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
+
+MASS_KG = 2.0
+HOVER_THROTTLE = 0.7
+"""Throttle that carries the nominal plane's weight; neither is in the coefficient file."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneAirframe:
+    """Keys of a coefficient file that act on the force; m^2, m, rad."""
+
+    s: float = 0.45
+    b: float = 1.88
+    c: float = 0.24
+    c_lift_0: float = 0.56
+    c_lift_a: float = 6.9
+    oswald: float = 0.9
+    alpha_stall: float = 0.4712
+    c_drag_p: float = 0.1
+    c_y_0: float = 0.0
+    c_y_b: float = -0.98
+    c_y_deltar: float = -0.2
+
+    @classmethod
+    def of(cls, given: Mapping[str, object]) -> PlaneAirframe:
+        """The default plane with the numbers of a file in their places.
+
+        Raises:
+            ValueError: a key that should be a number is none, or cannot be.
+        """
+        known = {f.name for f in fields(cls)}
+        numbers: dict[str, float] = {}
+        for name, value in given.items():
+            if name not in known:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ValueError(f"{name} is not a number")  # noqa: TRY004 - of a file
+            numbers[name] = float(value)
+        made = replace(cls(), **numbers)
+        for name in ("s", "b", "oswald"):
+            if not getattr(made, name) > 0.0:
+                raise ValueError(f"{name} must be positive")
+        return made
+
+    @property
+    def induced(self) -> float:
+        """Induced drag over the square of lift: ``1 / (pi e AR)``."""
+        return 1.0 / (math.pi * self.oswald * self.b**2 / self.s)
+
+    @property
+    def full_thrust(self) -> float:
+        """Specific force at full throttle, m/s^2."""
+        return STANDARD_GRAVITY / HOVER_THROTTLE
+
+    def pressure(self, rho: Array, speed: Array) -> Array:
+        """(n,) specific force by coefficient, m/s^2: dynamic pressure times area by mass."""
+        out: Array = 0.5 * rho * (rho / SEA_LEVEL_DENSITY) * np.square(speed) * self.s / MASS_KG
+        return out

@@ -1,0 +1,97 @@
+"""A plane's recording against an airframe: the record of the vehicle level."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.propulsion import Propulsion
+from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import FEWEST_STEPS
+from onboard.core.vehicle.matching import (
+    Matched,
+    ambiguous_of,
+    differences,
+    drifts_of,
+    is_explained,
+    matched,
+    mismatch_of,
+    not_testable_of,
+    numbers_of,
+    series_of,
+    wind_of,
+    windless,
+)
+from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.plane_curves import plane_curves
+from onboard.core.vehicle.records import Difference, VehicleMatch
+
+MANOEUVRES = {e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, WindProfile)}
+DIGITS = 6
+
+
+def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> VehicleMatch | None:
+    """What this flight has that the airframe lacks; None if it never flew as a plane does.
+
+    Args:
+        flight: with throttle and rudder, if the recording has outputs.
+        frame: to compare with.
+        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
+    """
+    flying = unstalled(flight, frame, np.zeros(3))
+    if len(flying) < FEWEST_STEPS:
+        return None
+    found = matched(plane_model(flying, frame, force_sigma))
+    places = found.model.indices("wind")
+    wind = np.append(found.fit.theta[places], 0.0)
+    flying = unstalled(flight, frame, wind)
+    if len(flying) >= FEWEST_STEPS and float(np.linalg.norm(wind)) > 1.0:
+        # What was stalled could only be told with the wind.
+        found = matched(plane_model(flying, frame, force_sigma))
+    before, after = drifts_of(found)
+    effects = differences(found)
+    manoeuvres = MANOEUVRES | {e.name: e.manoeuvre for e in found.model.effects if e.name}
+    untested = not_testable_of(found, plane_missing(flying), manoeuvres)
+    return VehicleMatch(
+        vehicle="plane",
+        effects=effects,
+        wind=wind_of(found),
+        mismatch=mismatch_of(found),
+        alone_before=before,
+        alone_after=after,
+        ambiguous=ambiguous_of(found),
+        not_testable=windless(untested, found),
+        numbers=numbers_of(found),
+        frame=_coefficients(found, frame, effects),
+        curves=plane_curves(found, frame),
+        series=series_of(found),
+        seconds=len(found.model.flight) * found.model.flight.step_s,
+        explained=is_explained(found),
+    )
+
+
+def _coefficients(
+    m: Matched, frame: PlaneAirframe, effects: tuple[Difference, ...]
+) -> dict[str, float | list[float]]:
+    """Keys of a coefficient file: those given, and what was found in their places."""
+    names = {d.name for d in effects}
+    made = frame
+    if "lift" in names:
+        c_lift_0, c_lift_a = m.fit.theta[m.model.indices("lift")].tolist()
+        made = replace(made, c_lift_0=c_lift_0, c_lift_a=c_lift_a)
+    if "drag" in names:
+        c_drag_p, induced = m.fit.theta[m.model.indices("drag")].tolist()
+        made = replace(made, c_drag_p=c_drag_p)
+        if induced > 0.0:
+            made = replace(made, oswald=1.0 / (math.pi * induced * made.b**2 / made.s))
+    if "side_force" in names:
+        c_y_b, c_y_deltar = m.fit.theta[m.model.indices("side_force")].tolist()
+        made = replace(made, c_y_b=c_y_b, c_y_deltar=c_y_deltar)
+    return {k: float(f"{v:.{DIGITS}g}") for k, v in asdict(made).items()}

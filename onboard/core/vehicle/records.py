@@ -1,0 +1,169 @@
+"""What a match says: frozen records behind ``onboard match`` and everything a report draws.
+
+Numbers are SI, times are seconds on the recording's clock unless they are said to be since its
+start; names are the controlled vocabulary of effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from onboard.core.diagnosis.records import Ambiguity, NotTestable, Verdict
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import NAN
+
+EMPTY = np.zeros(0)
+__all__ = ["Ambiguity", "NotTestable", "Verdict"]
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One number: as the simulation has it, as the recording has it, and how sure that is.
+
+    ``sigma`` is that of the recording's, or of the difference where both are measured; differences
+    below ``floor`` do not matter.
+    """
+
+    simulation: float
+    real: float
+    sigma: float
+    unit: str
+    floor: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an effect acts: seconds since the start, body axis, kind of flight, share of it."""
+
+    start_s: float
+    end_s: float
+    axis: str
+    regime: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One effect that was found.
+
+    ``held_out_*`` is the RMS of the force that the model leaves on flight that was not used,
+    without and with the effect, m/s^2 (whitened RMS for effects of the sensor level).
+    """
+
+    name: str
+    level: str
+    values: Mapping[str, Compared]
+    share: float = NAN
+    where: tuple[Place, ...] = ()
+    rivals: tuple[str, ...] = ()
+    held_out_before: float = NAN
+    held_out_after: float = NAN
+
+
+@dataclass(frozen=True, slots=True)
+class WindEstimate:
+    """Wind of the real flight at its mean height, towards north and east, m/s.
+
+    ``series_*`` are estimates of blocks of flight: times (b,) s since the start, heights above
+    ground (b,) m, components (b, 2) and their sigmas (b, 2); ``ekf`` (b, 2) is the autopilot's own
+    (NaN where it has none).
+    """
+
+    north: float
+    east: float
+    sigma_north: float
+    sigma_east: float
+    height: float
+    profile_exponent: float | None = None
+    profile_sigma: float = NAN
+    turbulence_rms: float | None = None
+    series_t: Array = field(default_factory=lambda: EMPTY)
+    series_height: Array = field(default_factory=lambda: EMPTY)
+    series: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    series_sigma: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    ekf: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A law with the data that it was found from.
+
+    ``x`` (k,) in ``x_unit``; ``data`` (k,) and its scatter ``spread`` (k,), ``fitted`` (k,) and
+    ``nominal`` (k,) in ``y_unit``.
+    """
+
+    name: str
+    x_label: str
+    x_unit: str
+    y_label: str
+    y_unit: str
+    x: Array
+    data: Array
+    spread: Array
+    fitted: Array
+    nominal: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ForceSeries:
+    """Force along body axes at ``t`` (n,) s since the start: (n, k) each, m/s^2.
+
+    ``after`` is predicted by unknowns of the other parts of the flight.
+    """
+
+    t: Array
+    axes: tuple[str, ...]
+    measured: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True, slots=True)
+class AxisMismatch:
+    """RMS on flight not used in the fit, m/s^2: of the nominal model, and of what was found."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleMatch:
+    """The vehicle level of one recording against an airframe.
+
+    Attributes:
+        vehicle: ``copter`` or ``plane``.
+        effects: found, the strongest first.
+        wind: of the flight; None where nothing could be said.
+        mismatch: by axis.
+        alone_before: RMS of the velocity that the nominal model gains or loses in ten seconds
+            alone, m/s.
+        alone_after: the same of the model that was found.
+        ambiguous: what cannot be told apart.
+        not_testable: what this flight could not have shown.
+        numbers: every unknown of the model, ``effect.unknown`` to value, sigma and nominal.
+        frame: keys for the simulator's frame or coefficient file.
+        curves: drag, thrust and sag with their data.
+        series: forces over time.
+        seconds: of flight that was used.
+        explained: whether what is left is within what the sensors explain.
+        note: a sentence for the reader; may be empty.
+    """
+
+    vehicle: str
+    effects: tuple[Difference, ...] = ()
+    wind: WindEstimate | None = None
+    mismatch: Mapping[str, AxisMismatch] = field(default_factory=dict)
+    alone_before: float = NAN
+    alone_after: float = NAN
+    ambiguous: tuple[Ambiguity, ...] = ()
+    not_testable: tuple[NotTestable, ...] = ()
+    numbers: Mapping[str, Compared] = field(default_factory=dict)
+    frame: Mapping[str, float | list[float]] = field(default_factory=dict)
+    curves: tuple[Curve, ...] = ()
+    series: ForceSeries | None = None
+    seconds: float = 0.0
+    explained: bool = True
+    note: str = ""

@@ -1,0 +1,61 @@
+"""Recursions of first order over a flight, without a loop over time.
+
+``y_k = z_k + a y_(k-1)`` is a sum of shifted copies with weights 1, a, a^2 ...; doubling adds them
+in as many turns as the length has binary digits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array, Mask
+
+NEGLIGIBLE = 1e-12
+
+
+def accumulated(z: Array, factor: float, starts: Mask | None = None) -> Array:
+    """``y_k = z_k + factor y_(k-1)`` along the first axis of z (n, ...), y_(-1) = 0.
+
+    Args:
+        z: (n, ...).
+        factor: at most one in size.
+        starts: (n,) where the sum begins anew; nowhere but at the first if None.
+    """
+    out = z.copy()
+    weight = np.full(len(z), factor)
+    if starts is not None:
+        weight[starts] = 0.0
+    shape = (-1,) + (1,) * (z.ndim - 1)
+    shift = 1
+    while shift < len(out) and factor > NEGLIGIBLE:
+        out[shift:] += weight[shift:].reshape(shape) * out[:-shift]
+        weight[shift:] *= weight[:-shift].copy()
+        shift, factor = 2 * shift, factor * factor
+    return out
+
+
+def starts_of(piece: NDArray[np.int64]) -> Mask:
+    """(n,) where an uninterrupted piece begins, by its number (n,)."""
+    out: Mask = np.concatenate([[True], np.diff(piece) != 0])
+    return out
+
+
+def lagged(x: Array, tau: float, piece: NDArray[np.int64], step_s: float) -> Array:
+    """A signal x (n, k) behind a low-pass of first order; exact for straight lines between steps.
+
+    Args:
+        x: the signal.
+        tau: time constant, s.
+        piece: (n,) number of the uninterrupted piece; each begins settled.
+        step_s: s.
+    """
+    decay = math.exp(-step_s / tau)
+    slope = tau / step_s * (1.0 - decay)
+    starts = starts_of(piece)
+    drive = np.empty_like(x)
+    drive[1:] = (1.0 - slope) * x[1:] + (slope - decay) * x[:-1]
+    drive[starts] = x[starts]
+    return accumulated(drive, decay, starts)

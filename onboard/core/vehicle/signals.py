@@ -1,0 +1,86 @@
+"""What a recording says of the vehicle beside its motion: outputs, battery, airspeed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+
+EMPTY = np.zeros(0)
+MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
+"""SERVOn_FUNCTION of motors 1 to 12."""
+THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A signal at its own times: ``t`` (n,) s on the boot clock, ``x`` (n, k)."""
+
+    t: Array = field(default_factory=lambda: EMPTY)
+    x: Array = field(default_factory=lambda: np.zeros((0, 1)))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def at(self, t: Array) -> Array:
+        """(m, k) values at times (m,) by straight lines, the ends held."""
+        out = np.empty((len(t), self.x.shape[1]))
+        for j in range(self.x.shape[1]):
+            out[:, j] = np.interp(t, self.t, self.x[:, j])
+        return out
+
+    def covers(self, t: Array) -> bool:
+        """Whether there are samples for most of the times (m,)."""
+        if len(self) < 2 or len(t) == 0:
+            return False
+        inside = (t >= self.t[0] - 1.0) & (t <= self.t[-1] + 1.0)
+        return bool(np.mean(inside) > 0.8)
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """Streams of one recording that only the vehicle level looks at.
+
+    Attributes:
+        outputs: pulse widths by channel, microseconds; or 0 to 1 where ``normalised``.
+        battery: voltage (V) and current (A, NaN where it is not measured).
+        airspeed: as the autopilot reports it, m/s.
+        ekf_wind: the autopilot's own estimate, towards north and east, m/s.
+        parameters: in force last, by name.
+        kind: of vehicle: ``copter``, ``plane`` or another word; empty where nobody says.
+        normalised: whether outputs are commands of the motors already.
+    """
+
+    outputs: Stream = field(default_factory=Stream)
+    battery: Stream = field(default_factory=Stream)
+    airspeed: Stream = field(default_factory=Stream)
+    ekf_wind: Stream = field(default_factory=Stream)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    kind: str = ""
+    normalised: bool = False
+
+    def channels_of(self, *functions: int) -> tuple[int, ...]:
+        """Indices of the channels that have one of these SERVOn_FUNCTIONs, in that order."""
+        width = self.outputs.x.shape[1] if len(self.outputs) else 0
+        named = {
+            int(self.parameters.get(f"SERVO{n + 1}_FUNCTION", -1.0)): n
+            for n in reversed(range(width))
+        }
+        return tuple(named[f] for f in functions if f in named)
+
+    @property
+    def motors(self) -> tuple[int, ...]:
+        """Channels of the motors; all that move where the recording has no parameters."""
+        if not len(self.outputs):
+            return ()
+        if self.normalised:
+            moving = np.std(np.nan_to_num(self.outputs.x), axis=0) > 0.0
+            return tuple(np.flatnonzero(moving).tolist())
+        if any(name.startswith("SERVO") for name in self.parameters):
+            return self.channels_of(*MOTOR_FUNCTIONS)
+        return tuple(
+            np.flatnonzero(np.std(np.nan_to_num(self.outputs.x), axis=0) > 5.0).tolist()[:8]
+        )

@@ -1,0 +1,57 @@
+"""When the vehicle was in the air: what the motion and the outputs say, whatever the flags say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.limits import GROUND_M, LEVEL_M_S, MARGIN_S, STILL_M_S, STILL_S
+
+
+def grounded_spans(
+    t: Array, v_n: Array, height: Array, *, rolls: bool = False
+) -> list[tuple[float, float]]:
+    """Intervals (s) in which a vehicle stands on the ground, with a margin to either side.
+
+    A hover is still, too: only what is as low as the lowest such place counts.
+
+    Args:
+        t: (n,) times of fixes, s.
+        v_n: (n, 3) velocity, m/s; NaN down where it is not measured.
+        height: (n,) m.
+        rolls: whether it may move on the ground: then what is level and lowest is the ground.
+    """
+    if len(t) < 2:
+        return []
+    slow = np.linalg.norm(np.nan_to_num(v_n), axis=1) < STILL_M_S
+    runs = [(i, j) for i, j in _runs(slow) if t[j - 1] - t[i] >= STILL_S]
+    if rolls:
+        level = np.abs(np.nan_to_num(v_n[:, 2])) < LEVEL_M_S
+        low = height < float(np.min(height)) + GROUND_M
+        runs += [(i, j) for i, j in _runs(level & low) if t[j - 1] - t[i] >= STILL_S]
+    if not runs:
+        return []
+    levels = [float(np.median(height[i:j])) for i, j in runs]
+    lowest = min(levels)
+    # A flight that is recorded in parts may begin in a hover: nothing was lower then either.
+    if float(np.percentile(height, 1)) < lowest - GROUND_M:
+        return []
+    return [
+        (float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S)
+        for (i, j), level_m in zip(runs, levels, strict=True)
+        if level_m < lowest + GROUND_M
+    ]
+
+
+def inside(t: Array, spans: list[tuple[float, float]]) -> Mask:
+    """(n,) whether times lie in one of the spans."""
+    out = np.zeros(len(t), dtype=bool)
+    for start, end in spans:
+        out |= (t >= start) & (t <= end)
+    return out
+
+
+def _runs(flags: Mask) -> list[tuple[int, int]]:
+    """First and last (excluded) of those in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

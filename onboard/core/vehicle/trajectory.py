@@ -1,0 +1,188 @@
+"""Velocity and force of a flight: the accelerometer carries the motion, GPS holds it to the truth.
+
+The receiver's velocity is late and averaged; the integrated specific force is neither, but drifts.
+So the difference of the two, both averaged alike, is what a smoother
+(:mod:`onboard.core.vehicle.smoother`) finds the errors of velocity and attitude from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.inputs.segments import Batch
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
+from onboard.core.vehicle.limits import (
+    ATTITUDE_WANDER,
+    FEWEST_FIXES,
+    LEVELS_FROM,
+    VELOCITY_NOISE_M_S,
+)
+from onboard.core.vehicle.smoother import (
+    BIAS,
+    PSI,
+    Levels,
+    Steps,
+    V,
+    likelihood,
+    smoothed,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What the sensor level has found, to be undone here.
+
+    Attributes:
+        scale: (3,) and
+        offset: (3,) of the accelerometer: ``f_s = scale (raw - offset)``.
+        force_sigma: (3,) what they leave unknown of the force at the loads flown, m/s^2.
+        gps_delay: lateness of the receiver's velocity, s.
+        gps_window: averaging span of it, s.
+        attitude_delay: lateness of the recorded attitude, s.
+    """
+
+    scale: Array
+    offset: Array
+    force_sigma: Array
+    gps_delay: float = 0.0
+    gps_window: float = 0.0
+    attitude_delay: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One uninterrupted piece of flight at the accelerometer's samples.
+
+    Attributes:
+        t: (n,) s.
+        f_b: (n, 3) specific force, m/s^2.
+        w_b: (n, 3) rates, rad/s.
+        R_nb: (n, 3, 3) attitude.
+        v_n: (n, 3) velocity, m/s.
+        height: (n,) above mean sea level, m.
+        velocity_sigma: of the velocity, m/s.
+        attitude_sigma: of roll and pitch, rad.
+    """
+
+    t: Array
+    f_b: Array
+    w_b: Array
+    R_nb: Array
+    v_n: Array
+    height: Array
+    velocity_sigma: float
+    attitude_sigma: float
+
+
+def motions(batches: Sequence[Batch], sensors: Sensors) -> list[Motion]:
+    """The flight as pieces without gaps."""
+    runs: list[list[Batch]] = []
+    for batch in batches:
+        if batch.fresh or not runs:
+            runs.append([])
+        runs[-1].append(batch)
+    made = (_motion(run, sensors) for run in runs)
+    return [m for m in made if m is not None]
+
+
+def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
+    parts = []
+    for k, batch in enumerate(run):
+        s = batch.segment
+        start = -np.inf if k == 0 else run[k - 1].fixes.t[-1]
+        end = np.inf if k == len(run) - 1 else batch.fixes.t[-1]
+        own = (s.t > start) & (s.t <= end)
+        t = s.t[own]
+        if len(t) == 0:
+            continue
+        R, _ = s.attitude_at(t + sensors.attitude_delay, sensors.attitude_delay)
+        f_b = (sensors.scale * (s.raw_s[own] - sensors.offset)) @ s.R_bs.T
+        parts.append((t, f_b, s.w_b[own], R))
+    if not parts:
+        return None
+    t, f_b, w_b, R = (np.concatenate(x) for x in zip(*parts, strict=True))
+    keep = np.concatenate([[True], np.diff(t) > 1e-6])
+    t, f_b, w_b, R = t[keep], f_b[keep], w_b[keep], R[keep]
+    if len(t) < 20:
+        return None
+    f_n = np.einsum("nij,nj->ni", R, f_b)
+    v_n = _integral(t, f_n + np.array([0.0, 0.0, STANDARD_GRAVITY]))
+    fix_t, fix_v, fix_h = _fixes(run)
+    true_t = fix_t - sensors.gps_delay
+    inner = (true_t >= t[0]) & (true_t <= t[-1])
+    if np.count_nonzero(inner) < FEWEST_FIXES:
+        return None
+    true_t, fix_v, fix_h = true_t[inner], fix_v[inner], fix_h[inner]
+    half = sensors.gps_window / np.sqrt(12.0)
+    # What the receiver averages over is averaged here, too: two points have the same variance.
+    average = 0.5 * (_at(true_t + half, t, v_n) + _at(true_t - half, t, v_n))
+    steps = _steps(true_t, t, f_n, w_b, R, fix_v - average)
+    errors = smoothed(steps, _levels(steps))
+    v_n = v_n + _at(t, true_t, errors.x[:, V])
+    R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
+    return Motion(
+        t,
+        f_b,
+        w_b - _at(t, true_t, errors.x[:, BIAS]),
+        R,
+        v_n,
+        np.interp(t, true_t, fix_h),
+        float(np.max(errors.sigma[V])),
+        float(np.max(errors.sigma[PSI][:2])),
+    )
+
+
+def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Array) -> Steps:
+    """What the smoother goes over, from the samples at ``t`` (n,) to the fixes at ``at`` (k,)."""
+    h = np.diff(t)
+    mean_rate = 0.5 * (w_b[1:] + w_b[:-1])
+    by_gyro = R[:-1] @ rotation_from_vector(mean_rate * h[:, None])
+    beyond = vector_from_rotation(np.swapaxes(by_gyro, -1, -2) @ R[1:])
+    turned = np.zeros_like(f_n)
+    turned[1:] = np.cumsum(np.einsum("nij,nj->ni", R[1:], beyond), axis=0)
+    impulse = _at(at, t, _integral(t, f_n))
+    turned_at = _at(at, t, turned)
+    nearest = np.clip(np.searchsorted(t, at), 0, len(t) - 1)
+    return Steps(
+        np.diff(at, prepend=at[0]),
+        np.diff(impulse, axis=0, prepend=impulse[:1]),
+        np.diff(turned_at, axis=0, prepend=turned_at[:1]),
+        R[nearest],
+        measured,
+    )
+
+
+def _levels(steps: Steps) -> Levels:
+    """The likeliest noise, of the first minute or two."""
+    sample = steps.until(LEVELS_FROM)
+    trials = [Levels(a, v) for a in ATTITUDE_WANDER for v in VELOCITY_NOISE_M_S]
+    return max(trials, key=lambda levels: likelihood(sample, levels))
+
+
+def _integral(t: Array, x: Array) -> Array:
+    """(n, 3) integral of x (n, 3) from the first sample on, by trapezes."""
+    out = np.zeros_like(x)
+    out[1:] = np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t)[:, None], axis=0)
+    return out
+
+
+def _at(at: Array, t: Array, x: Array) -> Array:
+    """(m, 3) values of x (n, 3) by straight lines."""
+    return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
+
+
+def _fixes(run: Sequence[Batch]) -> tuple[Array, Array, Array]:
+    """Times (n,), velocities (n, 3) and heights (n,); NaN where GPS is not to be believed."""
+    t = np.concatenate([b.fixes.t for b in run])
+    v = np.concatenate([np.where(b.trusted[:, None], b.fixes.v_n, np.nan) for b in run])
+    h = np.concatenate([b.fixes.height for b in run])
+    t, first = np.unique(t, return_index=True)
+    v, h = v[first].copy(), h[first]
+    if not np.isfinite(v[:, 2]).any() and len(t) > 10:
+        v[5:-5, 2] = -(h[10:] - h[:-10]) / (t[10:] - t[:-10])
+    return t, v, h

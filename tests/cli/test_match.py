@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from onboard.cli.main import run
+from onboard.core.vehicle.airframe import CopterAirframe
+from tests.recordings.dataflash_writer import modern_log
+
+
+@pytest.fixture
+def log(tmp_path) -> Path:
+    path = tmp_path / "short.BIN"
+    path.write_bytes(bytes(modern_log(6)))
+    return path
+
+
+def failed(capsys) -> str:
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err
+
+
+def test_a_recording_of_which_nothing_can_be_said_is_one_line_and_status_2(log, capsys):
+    assert run(["match", str(log)]) == 2
+    assert "short.BIN" in failed(capsys)
+
+
+def test_three_recordings_are_one_too_many(log, capsys):
+    assert run(["match", str(log), str(log), str(log)]) == 2
+    assert "match takes one recording" in failed(capsys)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [("{", "no JSON"), ("[1]", "no JSON object"), ('{"mass": "x"}', "mass")]
+)
+def test_a_frame_that_cannot_be_used_is_named(log, tmp_path, capsys, content, said):
+    frame = tmp_path / "frame.json"
+    frame.write_text(content)
+    assert run(["match", str(log), "--frame", str(frame)]) == 2
+    message = failed(capsys)
+    assert said in message
+    assert "frame.json" in message
+
+
+@pytest.mark.recordings
+@pytest.mark.slow
+def test_a_flight_in_wind_with_another_frame_as_the_nominal_one(recordings, tmp_path, capsys):
+    flight = recordings / "frames" / "e02.BIN"
+    if not flight.exists():
+        pytest.skip("no recordings of other airframes")
+    frame, param, made, answer = (
+        tmp_path / n for n in ("in.json", "s.param", "out.json", "a.json")
+    )
+    frame.write_text(json.dumps({"mdrag_coef": 0.4}))
+    arguments = ["--frame", str(frame), "--param", str(param), "--frame-out", str(made)]
+    assert run(["match", str(flight), *arguments, "--json", str(answer)]) == 0
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    document = json.loads(answer.read_text())
+    assert document["schema"] == "onboard.match/1"
+    assert document["recordings"] == {"simulation": None, "real": "e02.BIN"}
+    # What differs from *this* frame: the drag, too.
+    assert {e["name"] for e in document["effects"]} == {"wind", "rotor_drag", "body_drag"}
+    assert document["wind"]["north"] == pytest.approx(-3.0, abs=0.15)
+    assert document["wind"]["east"] == pytest.approx(5.196, abs=0.15)
+    assert document["mismatch"]["x"]["after"] < 0.1
+    assert document["settings"]["SIM_WIND_DIR"] == pytest.approx(300.0, abs=1.0)
+    settings = dict(
+        line.split(",") for line in param.read_text().splitlines() if not line.startswith("#")
+    )
+    assert float(settings["SIM_WIND_SPD"]) == pytest.approx(6.0, abs=0.1)
+    found = CopterAirframe.of(json.loads(made.read_text()))
+    assert found.mdrag_coef == pytest.approx(0.2, rel=0.05)
+
+
+@pytest.mark.recordings
+@pytest.mark.slow
+def test_two_recordings_differ_only_in_what_differs(recordings, tmp_path):
+    simulation, real = (recordings / "frames" / n for n in ("e03.BIN", "e11.BIN"))
+    if not real.exists():
+        pytest.skip("no recordings of other airframes")
+    answer = tmp_path / "a.json"
+    assert run(["match", str(simulation), str(real), "--json", str(answer)]) == 0
+    document = json.loads(answer.read_text())
+    assert document["recordings"] == {"simulation": "e03.BIN", "real": "e11.BIN"}
+    found = {e["name"]: e for e in document["effects"]}
+    assert set(found) == {"gps_latency", "rotor_drag", "body_drag"}
+    value = found["rotor_drag"]["values"]["mcoef"]
+    assert value["simulation"] == pytest.approx(0.559, rel=0.03)
+    assert value["real"] == pytest.approx(0.497, rel=0.03)

@@ -1,0 +1,151 @@
+"""Flights whose force is known, by formulas written apart from the product's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.vehicle.flight import Flight
+
+G = 9.80665
+STEP = 0.1
+
+
+def smooth(rng, n, scale, correlation_s=2.0):
+    """(n,) a smooth random signal of this standard deviation."""
+    width = int(4 * correlation_s / STEP)
+    kernel = np.hanning(2 * width + 1)
+    x = np.convolve(rng.normal(size=n + 2 * width), kernel, mode="valid")
+    return scale * x / x.std()
+
+
+def flight_with(t, R, v_n, height, f_b, *, commands=None, volts=None, airspeed=None, ground=580.0):
+    n = len(t)
+    R_bn = np.swapaxes(R, -1, -2)
+    battery = np.zeros((n, 0)) if volts is None else np.stack([volts, np.full(n, 10.0)], axis=1)
+    return Flight(
+        t=t,
+        piece=np.zeros(n, dtype=np.int64),
+        f_b=f_b,
+        w_b=np.zeros((n, 3)),
+        R_bn=R_bn,
+        v_b=np.einsum("nij,nj->ni", R_bn, v_n),
+        v_n=v_n,
+        height=height,
+        ground=ground,
+        rho=1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559,
+        outputs=np.zeros((n, 0)),
+        commands=np.zeros((n, 0)) if commands is None else commands,
+        battery=battery,
+        airspeed=np.full(n, np.nan) if airspeed is None else airspeed,
+        ekf_wind=np.zeros((n, 0)),
+        velocity_sigma=0.01,
+        attitude_sigma=1e-3,
+    )
+
+
+def copter_flight(
+    *,
+    seed=1,
+    seconds=240.0,
+    wind=(0.0, 0.0),
+    exponent=0.0,
+    c_m=0.24833,
+    area=0.058108,
+    tilt=(0.0, 0.0),
+    ratio=1.0,
+    expo=0.65,
+    volts=None,
+    sag=0.0,
+    noise=0.01,
+    still=False,
+):
+    """A copter that manoeuvres: four motors that share the thrust, thrust by a known command."""
+    rng = np.random.default_rng(seed)
+    n = int(seconds / STEP)
+    t = 50.0 + STEP * np.arange(n)
+    size = 0.0 if still else 1.0
+    v_n = np.stack(
+        [size * smooth(rng, n, 4.0), size * smooth(rng, n, 4.0), size * smooth(rng, n, 1.2)], axis=1
+    )
+    roll, pitch = size * smooth(rng, n, 0.2), size * smooth(rng, n, 0.2)
+    yaw = size * 3.0 * smooth(rng, n, 1.0, 6.0)
+    R = rotation_from_euler(roll, pitch, yaw)
+    height = 620.0 + size * smooth(rng, n, 12.0, 8.0)
+    above = np.clip(height - 580.0, 0.5, 60.0)
+    factor = (above / np.clip(np.mean(height) - 580.0, 0.5, 60.0)) ** exponent
+    w_n = np.zeros((n, 3))
+    w_n[:, :2] = factor[:, None] * np.asarray(wind)
+    u = np.einsum("nji,nj->ni", R, v_n - w_n)
+    rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
+    command = 0.6 + size * np.clip(smooth(rng, n, 0.06), -0.2, 0.2)
+    power = (1 - expo) * command + expo * command**2
+    voltage = np.full(n, 12.6) if volts is None else np.linspace(*volts, n)
+    rho_ref = 1.225 * (1 - 0.0065 * 593.0 / 288.15) ** 4.2559
+    outflow = 2 * 29.3 * 12.09 / (3.0 * G)
+    thrust = ratio * G / 0.39 * rho / rho_ref * power * (voltage / 12.6) ** (2 * sag)
+    thrust = thrust - G / outflow**2 * rho / rho_ref * np.maximum(-u[:, 2], 0.0) ** 2
+    linear = c_m * np.sqrt(rho / 1.225 * np.maximum(thrust, 0.5) / G)
+    f_b = -linear[:, None] * u - 0.5 * (rho * area)[:, None] * np.abs(u) * u
+    f_b[:, 0] += tilt[0] * thrust
+    f_b[:, 1] += tilt[1] * thrust
+    f_b[:, 2] -= thrust
+    f_b = f_b + noise * np.stack([smooth(rng, n, 1.0, 1.0) for _ in range(3)], axis=1)
+    commands = np.stack([command, command**2, np.ones(n)], axis=1)
+    return flight_with(
+        t, R, v_n, height, f_b, commands=commands, volts=None if volts is None else voltage
+    )
+
+
+def plane_flight(
+    *,
+    seed=1,
+    seconds=240.0,
+    wind=(0.0, 0.0),
+    c_lift_0=0.56,
+    c_drag_p=0.1,
+    c_y_b=-0.98,
+    reading=None,
+):
+    """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``."""
+    rng = np.random.default_rng(seed)
+    n = int(seconds / STEP)
+    t = 50.0 + STEP * np.arange(n)
+    speed, yaw = 24.0 + smooth(rng, n, 3.0, 4.0), np.cumsum(smooth(rng, n, 0.25, 5.0)) * STEP
+    alpha, beta = -0.03 + smooth(rng, n, 0.02), smooth(rng, n, 0.03)
+    pitch = smooth(rng, n, 0.1, 4.0)
+    R = rotation_from_euler(smooth(rng, n, 0.4, 4.0), pitch, yaw)
+    x = speed / np.sqrt(1 + np.tan(alpha) ** 2 + np.tan(beta) ** 2)
+    u = np.stack([x, x * np.tan(beta), x * np.tan(alpha)], axis=1)
+    v_n = np.einsum("nij,nj->ni", R, u) + np.array([*wind, 0.0])
+    height = 700.0 + smooth(rng, n, 10.0, 8.0)
+    rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
+    q = 0.5 * rho * rho / 1.225 * speed**2 * 0.45 / 2.0
+    lift = c_lift_0 + 6.9 * alpha
+    drag = c_drag_p + lift**2 / (np.pi * 0.9 * 1.88**2 / 0.45)
+    throttle = 0.5 + np.clip(smooth(rng, n, 0.15), -0.4, 0.4)
+    rudder = smooth(rng, n, 0.15)
+    decay = np.exp(-STEP / 0.14)
+    late = np.empty((2, n))
+    for row, command in zip(late, (throttle, rudder), strict=True):
+        state = command[0]
+        for k in range(n):
+            # Straight lines between the steps: the exact answer of a low-pass to a ramp.
+            before = command[k - 1] if k else command[0]
+            slope = (command[k] - before) / STEP
+            state = decay * (state - before + slope * 0.14) + command[k] - slope * 0.14
+            row[k] = state
+    f_b = np.stack(
+        [
+            G / 0.7 * late[0] + q * (lift * np.sin(alpha) - drag * np.cos(alpha)),
+            q * (c_y_b * beta - 0.2 * late[1]),
+            -q * (lift * np.cos(alpha) + drag * np.sin(alpha)),
+        ],
+        axis=1,
+    )
+    f_b = f_b + np.stack([smooth(rng, n, 0.05, 1.0) for _ in range(3)], axis=1)
+    airspeed = None
+    if reading is not None:
+        airspeed = reading * speed * np.sqrt(rho / 1.225) + 0.2 * rng.normal(size=n)
+    commands = np.stack([throttle, rudder], axis=1)
+    return flight_with(t, R, v_n, height, f_b, commands=commands, airspeed=airspeed)

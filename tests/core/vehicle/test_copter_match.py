@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.copter_match import match_copter
+from onboard.core.vehicle.signals import Signals
+from tests.core.vehicle.flights import copter_flight
+
+pytestmark = pytest.mark.slow
+SIGMA = np.array([0.003, 0.003, 0.01])
+
+
+def matched(flight):
+    return match_copter(flight, Signals(kind="copter"), CopterAirframe(), SIGMA)
+
+
+def names(match):
+    return {d.name for d in match.effects}
+
+
+def within(match, key, truth, sigmas=4.0):
+    number = match.numbers[key]
+    assert abs(number.real - truth) < sigmas * number.sigma, (key, number, truth)
+
+
+def test_the_nominal_airframe_in_still_air_is_clean():
+    match = matched(copter_flight())
+    assert names(match) == set()
+    assert match.explained
+    within(match, "rotor_drag.mcoef", 0.24833)
+    within(match, "body_drag.x", 0.058108)
+
+
+def test_a_wind_is_found_and_is_taken_for_nothing_else():
+    match = matched(copter_flight(wind=(-3.0, 5.2), seed=2))
+    assert names(match) == {"wind"}
+    assert match.wind is not None
+    assert match.wind.north == pytest.approx(-3.0, abs=0.1)
+    assert match.wind.east == pytest.approx(5.2, abs=0.1)
+    assert match.mismatch["x"].after < 0.05 < match.mismatch["x"].before
+    assert match.alone_after < 0.2 * match.alone_before
+
+
+def test_a_wind_that_grows_with_height_is_told_from_a_uniform_one():
+    match = matched(copter_flight(wind=(4.0, -3.0), exponent=0.5, seed=3))
+    assert names(match) == {"wind", "wind_profile"}
+    within(match, "wind_profile.exponent", 0.5)
+
+
+def test_both_drags_are_found_with_their_sizes():
+    match = matched(copter_flight(c_m=0.45, area=0.03, seed=4))
+    assert names(match) == {"rotor_drag", "body_drag"}
+    within(match, "rotor_drag.mcoef", 0.45)
+    within(match, "body_drag.x", 0.03)
+    # A frame file with them has just these.
+    frame = CopterAirframe.of({k: v for k, v in match.frame.items() if isinstance(v, float)})
+    assert frame.rotor_drag == pytest.approx(0.45, rel=0.03)
+    assert frame.body_drag == pytest.approx(0.03, rel=0.05)
+
+
+def test_thrust_that_leans_is_no_offset_of_the_accelerometer():
+    match = matched(copter_flight(tilt=(0.05, 0.0), seed=5))
+    assert names(match) == {"thrust_tilt"}
+    within(match, "thrust_tilt.x", 0.05)
+
+
+def test_thrust_by_mass_and_its_curve_are_told_apart():
+    assert names(matched(copter_flight(ratio=0.8, seed=6))) == {"thrust_scale"}
+    assert names(matched(copter_flight(expo=0.2, seed=7))) == {"thrust_curve"}
+
+
+def test_a_battery_that_gives_way_is_seen_in_the_thrust():
+    match = matched(copter_flight(volts=(12.6, 9.5), sag=1.0, seed=8))
+    assert names(match) == {"voltage_sag"}
+    within(match, "voltage_sag.share", 1.0)
+
+
+def test_without_outputs_the_sides_are_told_and_the_thrust_is_not_tested():
+    flight = copter_flight(wind=(4.0, 0.0), seed=9)
+    match = matched(flight.kept(np.ones(len(flight), dtype=bool)).__class__(
+        **{f: getattr(flight, f) for f in flight.__slots__ if f != "commands"},
+        commands=np.zeros((len(flight), 0)),
+    ))  # fmt: skip
+    assert names(match) == {"wind"}
+    assert {"thrust_scale", "thrust_curve", "motor_lag"} <= {n.name for n in match.not_testable}
+
+
+def test_a_hover_says_little_and_says_so():
+    match = matched(copter_flight(still=True, seconds=60.0, seed=10))
+    assert names(match) == set()
+    assert {"rotor_drag", "body_drag"} <= {n.name for n in match.not_testable}
+
+
+def test_sigmas_cover_the_truth_over_many_flights():
+    misses = []
+    for seed in range(12):
+        numbers = matched(copter_flight(wind=(2.0, -1.0), seconds=120.0, seed=100 + seed)).numbers
+        for key, truth in (("wind.north", 2.0), ("wind.east", -1.0), ("thrust_curve.expo", 0.65)):
+            misses.append(abs(numbers[key].real - truth) / numbers[key].sigma)
+    assert np.mean(np.array(misses) < 2.0) >= 0.85
+    assert max(misses) < 5.0

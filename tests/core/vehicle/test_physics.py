@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.atmosphere import density
+from onboard.core.vehicle.battery import CELL_V, CHARGE_PERCENT, fitted_battery
+from onboard.core.vehicle.flown_alone import drift_alone
+from onboard.core.vehicle.gusts import positive_square, signed_square
+from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
+from onboard.core.vehicle.recursion import accumulated, lagged
+from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
+from onboard.core.vehicle.spans import grounded_spans
+from tests.core.vehicle.flights import copter_flight
+
+
+def test_the_default_frame_has_the_drag_that_the_simulator_prints():
+    frame = CopterAirframe()
+    assert frame.rotor_drag == pytest.approx(0.2483, abs=2e-4)
+    assert 1.0 / frame.body_drag == pytest.approx(17.21, abs=0.01)
+
+
+@pytest.mark.parametrize(("c_m", "area"), [(0.25, 0.06), (0.5, 0.04), (0.1, 0.01), (0.25, 0.0)])
+def test_a_frame_with_drag_gives_that_drag(c_m, area):
+    frame = CopterAirframe().with_drag(c_m, area)
+    assert frame.rotor_drag == pytest.approx(c_m, rel=0.01)
+    assert frame.body_drag == pytest.approx(area, abs=1e-3)
+
+
+def test_momentum_drag_cannot_be_more_than_the_whole():
+    frame = CopterAirframe.of({"mdrag_coef": 5.0})
+    assert frame.body_drag == 0.0
+    assert frame.rotor_drag < CopterAirframe().rotor_drag * 25.0
+
+
+@pytest.mark.parametrize("given", [{"mass": "heavy"}, {"mass": 0.0}, {"disc_area": -1.0}])
+def test_a_frame_that_makes_no_sense_is_refused(given):
+    with pytest.raises(ValueError, match=r"mass|disc_area"):
+        CopterAirframe.of(given)
+
+
+def test_density_of_the_standard_atmosphere():
+    assert density(0.0) == pytest.approx(1.225)
+    assert density(1000.0) == pytest.approx(1.1117, abs=2e-4)
+    assert density(5000.0) == pytest.approx(0.7364, abs=5e-4)
+
+
+def test_whitened_noise_is_white_and_its_level_is_found():
+    rng = np.random.default_rng(1)
+    n, step, tau = 6000, 0.5, 2.5
+    phi = np.exp(-step / tau)
+    x = np.zeros(n)
+    for k in range(1, n):
+        x[k] = phi * x[k - 1] + np.sqrt(1 - phi**2) * rng.normal()
+    y = 0.3 * (np.sqrt(0.75) * x + 0.5 * rng.normal(size=n))
+    piece, ones = np.zeros(n, dtype=np.int64), np.ones(n)
+    e = whitened(y[:, None], AxisNoise(0.3, 0.0, tau, 0.25), ones, piece, step)[:, 0]
+    assert np.var(e) == pytest.approx(1.0, abs=0.06)
+    for lag in (1, 2, 5):
+        assert abs(np.mean(e[lag:] * e[:-lag])) < 0.05
+    found = fitted_noise(y, ones, piece, step)
+    assert found.correlation_s == 2.5
+    assert found.white == 0.25
+    assert found.force == pytest.approx(0.3, rel=0.1)
+
+
+def test_noise_that_grows_with_sensitivity_is_told_from_noise_that_does_not():
+    rng = np.random.default_rng(2)
+    sensitivity = 0.3 + np.abs(rng.normal(size=4000))
+    y = 1.5 * sensitivity * rng.normal(size=4000)
+    piece = np.zeros(4000, dtype=np.int64)
+    found = fitted_noise(y, sensitivity, piece, 0.1, gusts=True)
+    assert found.gust == pytest.approx(1.5, rel=0.15)
+    flat = fitted_noise(1.5 * rng.normal(size=4000), sensitivity, piece, 0.1, gusts=True)
+    assert flat.gust < 0.3
+
+
+def test_recursions_are_those_of_a_loop():
+    rng = np.random.default_rng(3)
+    z = rng.normal(size=(137, 2))
+    y = np.zeros(2)
+    slow = []
+    for row in z:
+        y = row + 0.83 * y
+        slow.append(y)
+    assert np.allclose(accumulated(z, 0.83), slow)
+
+
+def test_a_lag_shifts_a_ramp_by_its_time_constant():
+    t = 0.1 * np.arange(200)
+    out = lagged(t[:, None], 0.3, np.zeros(200, dtype=np.int64), 0.1)[:, 0]
+    assert out[100:] == pytest.approx(t[100:] - 0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize("u", [-4.0, -0.5, 0.0, 1.0, 6.0])
+def test_squares_in_gusts_are_those_of_many_gusts(u):
+    g = 2.0 * np.random.default_rng(4).normal(size=400_000)
+    assert signed_square(np.array([u]), 4.0)[0] == pytest.approx(
+        np.mean(np.abs(u + g) * (u + g)), abs=0.08
+    )
+    assert positive_square(np.array([u]), 4.0)[0] == pytest.approx(
+        np.mean(np.maximum(0.0, u + g) ** 2), abs=0.08
+    )
+
+
+def test_a_battery_is_known_from_how_it_gives_way():
+    t = np.arange(0.0, 300.0, 0.1)
+    amperes = 25.0 + 8.0 * np.sin(t / 7.0)
+    left = 100.0 * (1.0 - np.cumsum(amperes * 0.1) / 3600.0 / 3.0)
+    volts = np.interp(left, CHARGE_PERCENT, CELL_V) / CELL_V[-1] * 12.6 - 0.03 * amperes
+    found = fitted_battery(t, volts, amperes, 12.6)
+    assert found is not None
+    assert found.capacity == pytest.approx(3.0, rel=0.05)
+    assert found.resistance == pytest.approx(0.03, rel=0.1)
+
+
+def test_the_ground_is_found_but_a_hover_is_not_the_ground():
+    t = np.arange(0.0, 100.0, 0.2)
+    height = np.interp(t, [0, 10, 20, 60, 70, 100], [580, 580, 600, 600, 580, 580])
+    v = np.stack([0 * t, 0 * t, -np.gradient(height, t)], axis=1)
+    spans = grounded_spans(t, v, height)
+    assert spans[0][0] <= 0.0
+    assert 9.0 < spans[0][1] < 15.0
+    assert all(not a <= 40.0 <= b for a, b in spans)
+    assert any(a < 75.0 and b >= 99.0 for a, b in spans)
+
+
+def test_a_model_without_error_does_not_drift_alone():
+    flight = copter_flight(seconds=40.0)
+    n = len(flight)
+    none, slope = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    assert drift_alone(flight, none, slope) == 0.0
+    push = none + np.array([0.1, 0.0, 0.0])
+    level = drift_alone(copter_flight(seconds=40.0, still=True), push, slope)
+    assert level == pytest.approx(1.0, rel=1e-6)
+
+
+def test_a_tilt_of_the_attitude_is_found_from_the_velocity():
+    n, dt = 300, 0.2
+    rng = np.random.default_rng(5)
+    f_n = np.zeros((n, 3)) + np.array([0.0, 0.0, -9.81])
+    tilt = np.array([0.01, -0.02, 0.0])
+    # What is integrated with a tilted attitude lacks tilt x force.
+    lost = np.cumsum(np.cross(tilt, f_n) * dt, axis=0)
+    measured = lost - lost[0] + 0.02 * rng.normal(size=(n, 3))
+    dts = np.full(n, dt)
+    dts[0] = 0.0
+    steps = Steps(
+        dts,
+        f_n * dts[:, None],
+        np.zeros((n, 3)),
+        np.broadcast_to(rotation_from_vector(np.zeros(3)), (n, 3, 3)).copy(),
+        measured,
+    )
+    out = smoothed(steps, Levels(1e-4, 0.02))
+    assert np.mean(out.x[:, PSI], axis=0)[:2] == pytest.approx(tilt[:2], abs=2e-3)
