@@ -22,9 +22,10 @@ HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 
 # Refinement (engine).
 
-ROUNDS: Final = 4
-"""Rounds of a refinement: latency is found to a millisecond in two or three [cost]."""
-NOISE_ROUNDS: Final = 3
+ROUNDS: Final = 6
+"""Rounds of a refinement: latency is found to a millisecond in two or three, noise levels of a real
+flight to a tenth in six [cost]."""
+NOISE_ROUNDS: Final = ROUNDS - 1
 """Rounds that may begin a search for noise levels; each search takes two, and moves a level by a
 factor of four at the most [cost]."""
 SETTLED_LOG_RATIO: Final = 0.15

@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.estimate.limits import SETTLED_LOG_RATIO
-from onboard.core.filter.noise import NoiseLevels, distance, line_search, stencil, stepped
+from onboard.core.filter.noise import (
+    ESTIMATED,
+    NoiseLevels,
+    distance,
+    line_search,
+    stencil,
+    stepped,
+)
 
 
 class NoiseSearch:
@@ -17,6 +24,7 @@ class NoiseSearch:
         """Take the number of passes, from the first on, that may begin a stencil."""
         self._rounds = rounds
         self._target: NoiseLevels | None = None
+        self._moving: Sequence[str] = ESTIMATED
         self._members: tuple[NoiseLevels, ...] | None = None
 
     def members(self, turn: int, levels: NoiseLevels) -> tuple[NoiseLevels, ...] | None:
@@ -25,7 +33,7 @@ class NoiseSearch:
         if self._target is not None:
             self._members = line_search(levels, self._target)
         elif turn < self._rounds:
-            self._members = stencil(levels)
+            self._members = stencil(levels, self._moving)
         return self._members
 
     def better(self, levels: NoiseLevels, log_likelihoods: Sequence[float]) -> NoiseLevels:
@@ -35,7 +43,12 @@ class NoiseSearch:
             return levels
         if target is not None:
             return self._members[int(np.argmax(log_likelihoods))]
-        found = stepped(levels, log_likelihoods)
+        found = stepped(levels, log_likelihoods, self._moving)
+        self._moving = [
+            name
+            for name in self._moving
+            if abs(np.log(getattr(found, name) / getattr(levels, name))) >= SETTLED_LOG_RATIO
+        ]
         if distance(levels, found) >= SETTLED_LOG_RATIO:
             self._target = found
         return levels

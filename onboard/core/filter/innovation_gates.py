@@ -22,6 +22,7 @@ from onboard.core.filter.limits import (
     RECOVERY_FIXES,
     RECOVERY_S,
     RECOVERY_SIGMAS,
+    TAIL,
 )
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.maths.arrays import Array
@@ -31,6 +32,38 @@ GATES = (
     ("h", "height", GATE_HEIGHT),
     ("a", "attitude", GATE_ATTITUDE),
 )
+
+
+def _nis(r: Array, h: Array, C: Array) -> float:
+    """Normalised innovation squared of whitened ``r`` (n,), the estimate's uncertainty included."""
+    return float(r @ np.linalg.solve(np.eye(len(r)) + h @ C @ h.T, r))
+
+
+def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float]:
+    """By what factor the variance of velocity and height is larger than it is taken for.
+
+    Args:
+        kinds: one letter for each of the r innovations: ``v``, ``h``, ``a``, in this order.
+        innovations: (r,) whitened, at the estimate.
+        h: (r, m) their regressors.
+        C: (m, m) covariance of the estimate.
+
+    Returns:
+        By kind, what is in the tail of its distribution (:data:`~onboard.core.filter.limits.TAIL`).
+    """
+    out: dict[str, float] = {}
+    squares = innovations * innovations
+    for kind in "vh":
+        n = kinds.count(kind)
+        if n == 0:
+            continue
+        at = kinds.index(kind)
+        here = slice(at, at + n)
+        if squares[here].sum() > TAIL[n]:
+            nis = _nis(innovations[here], h[here], C)
+            if nis > TAIL[n]:
+                out[kind] = nis / TAIL[n]
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +122,8 @@ class InnovationGates:
             at += n
             nis = sum(squares[here])
             if nis > limit:
-                r, D = innovations[here], h[here]
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
-                nis = float(r @ np.linalg.solve(np.eye(n) + D @ C @ D.T, r))
+                nis = _nis(innovations[here], h[here], C)
             if nis > limit:
                 if kind != "v":
                     return GateRefusal(name, self._outlasts(name, t))

@@ -8,10 +8,11 @@ velocity, height (of which only the component down counts) and attitude: (7, m +
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from onboard.core.filter.state import MEASURED
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import skew
 
@@ -88,6 +89,7 @@ class Epoch:
         ned: (7, m + 1) what it has in NED: in column 0 velocity and height.
         along_velocity: (m,) regressors of the position as multiples of the velocity, s per unit.
         trusted: whether the receiver is to be believed.
+        noise: (7,) variances beside those of the levels.
     """
 
     t: float
@@ -99,6 +101,7 @@ class Epoch:
     ned: Array
     along_velocity: Array
     trusted: bool
+    noise: Array = field(default_factory=lambda: np.zeros(MEASURED))
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +112,8 @@ class WhitenedInnovations:
         t: time of the epoch, s.
         y: (B, r) whitened innovations at ``theta = 0``, dimensionless.
         h: (B, r, m) their regressors: at ``theta`` they are ``y - h theta``.
-        log_det: (B,) log determinant of the covariance before whitening.
+        log_det: (B,) log determinant of the covariance before whitening, and what else is taken off
+            twice the log-likelihood.
         velocities: how many of the r are of velocity: they come first.
         height: whether one of height follows; the rest are of attitude.
         innovation: (v,) velocity innovation of member 0 at the current estimate, NED, m/s.

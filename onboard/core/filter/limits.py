@@ -10,9 +10,14 @@ from typing import Final
 
 # Innovation gates (innovation_gates).
 
-GATE_VELOCITY: Final = 30.0
-"""Normalised innovation squared of velocity past which a fix is refused [probability: 1.4e-6 with
-three degrees of freedom, 3e-7 with two]."""
+GATE_VELOCITY: Final = 64.0
+"""Normalised innovation squared of velocity past which a fix is refused: eight sigmas, which no
+honest receiver is off by [probability: 8e-14 if it were Gaussian; real ones have tails, which are
+taken for what they are up to here]."""
+TAIL: Final = {1: 6.63, 2: 9.21, 3: 11.34}
+"""Normalised innovation squared, by degrees of freedom, past which a velocity or a height is in the
+tail of its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger
+as the figure is, so that it pulls no more than one at the edge does (Huber, 1964)."""
 GATE_HEIGHT: Final = 30.0
 """The same of height [probability: 4e-8 with one degree of freedom; tuned]."""
 GATE_ATTITUDE: Final = 60.0
@@ -66,9 +71,13 @@ LAZY_EPOCHS: Final = 5
 COLOUR_TIME_S: Final = 3.0
 """Of the GPS velocity: receivers filter over a second or two, multipath lasts some seconds
 [tuned]."""
-ATTITUDE_TIME_S: Final = 10.0
-"""Of the recorded attitude: an EKF that weighs GPS against gyroscopes forgets a tilt error in some
-tens of seconds [tuned]."""
+ATTITUDE_TIME_S: Final = 30.0
+"""Of the recorded attitude: an EKF learns the accelerometer's bias, and forgets the tilt that it
+took it for, in some tens of seconds [physics]."""
+
+STAMP_JITTER_S: Final = 8e-4
+"""s; by how much a recorded attitude's stamp may be off beside a constant delay: whole milliseconds
+(0.29) and the autopilot's loop of 2.5 ms (0.72), uniform both [physics]."""
 
 # The search for noise levels (noise).
 
@@ -81,17 +90,20 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "force_walk": (0.01, 3.0),
     "tilt_walk": (1e-4, 0.03),
     "bias_walk": (1e-5, 3e-4),
-    "attitude": (0.01, 0.2),
-    "heading": (0.015, 0.5),
+    "attitude": (0.02, 0.3),
+    "heading": (0.015, 0.6),
+    "attitude_white": (1e-4, 0.03),
 }
 """Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
 No sensor on a small vehicle is better than the lower ends [data sheet]; a noiseless simulation must
 not make the filter believe that timing, interpolation and filters are modelled to the last digit.
 
-The recorded attitude's are no such formality [tuned].  An EKF errs with the manoeuvre, and
-smoothly: the likelihood sees how smooth its error is, not how large, and runs to whatever end there
-is.  With half the tilt's end, flights of ArduPilot's SITL err 2.4 times as much, beyond 5 sigma."""
+The slow error of the recorded attitude is no such formality.  Its lower end is what EKF3 says of
+itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
+[physics].  The likelihood would have less, for it sees how smooth this error is, not how large:
+with 10 mrad, flights that hover err by 2.3 sigma in x and y offset, each towards what the EKF was
+levelled with."""
 STENCIL_FACTOR: Final = 2.0
 """Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
 LINE_SHARES: Final = (0.25, 0.5, 1.0)

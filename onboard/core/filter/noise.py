@@ -36,18 +36,21 @@ class NoiseLevels:
         attitude: Gauss-Markov error of the recorded tilt (correlation time
             :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
         heading: the same of the recorded heading, rad.
+        attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
+            (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
     """
 
     velocity: float = 0.05
-    velocity_colour: float = 0.02
+    velocity_colour: float = 0.05
     vertical: float = 1.0
     height: float = 0.2
     height_walk: float = 0.05
-    force_walk: float = 0.02
+    force_walk: float = 0.04
     tilt_walk: float = 3e-4
     bias_walk: float = 3e-5
-    attitude: float = 0.01
+    attitude: float = 0.02
     heading: float = 0.03
+    attitude_white: float = 5e-4
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -66,6 +69,7 @@ ESTIMATED = (
     "bias_walk",
     "attitude",
     "heading",
+    "attitude_white",
 )
 
 
@@ -81,19 +85,21 @@ def _triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
     return lower, upper
 
 
-def stencil(centre: NoiseLevels) -> tuple[NoiseLevels, ...]:
-    """The centre, then two other values of each level in :data:`ESTIMATED`, one level at a time."""
+def stencil(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[NoiseLevels, ...]:
+    """The centre, then two other values of each level in ``names``, one level at a time."""
     return (
         centre,
         *(
             replace(centre, **{name: value})
-            for name in ESTIMATED
+            for name in names
             for value in _triple(getattr(centre, name), LIMITS[name])
         ),
     )
 
 
-def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels:
+def stepped(
+    centre: NoiseLevels, log_likelihood: Sequence[float], names: Sequence[str] = ESTIMATED
+) -> NoiseLevels:
     """Next centre from the log-likelihoods of :func:`stencil`: a parabola in each log-level.
 
     A step is at most :data:`STENCIL_FACTOR` squared; where the likelihood is flat or convex, it
@@ -101,7 +107,7 @@ def stepped(centre: NoiseLevels, log_likelihood: Sequence[float]) -> NoiseLevels
     """
     longest = 2.0 * float(np.log(STENCIL_FACTOR))
     levels = centre
-    for i, name in enumerate(ESTIMATED):
+    for i, name in enumerate(names):
         here = getattr(centre, name)
         x = np.log(np.array(_triple(here, LIMITS[name])) / here)
         rise = np.array(log_likelihood[1 + 2 * i : 3 + 2 * i]) - log_likelihood[0]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import Epoch, Step, steps
-from onboard.core.filter.limits import LONGEST_STEP_S
+from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -138,6 +138,9 @@ def _epochs(
     ned[:, V, 1:] = c.velocity_ned
     ned[:, H, 1:] = -c.position_ned[:, 2]
     ned[:, PSI, 1:] = c.attitude_ned
+    noise = np.zeros((n, MEASURED))
+    rate = np.linalg.norm(around.now.w_b, axis=1)
+    noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
     return [
         Epoch(
             float(around.now.t[e]),
@@ -149,6 +152,7 @@ def _epochs(
             ned[e],
             c.along_velocity[e],
             bool(trusted[e]),
+            noise[e],
         )
         for e in range(len(fixes))
     ]

@@ -42,7 +42,7 @@ class Variances:
             self.settled[i, V] = q.velocity_colour**2 * velocity
             self.reading[i, V] = q.velocity**2 * velocity
             self.reading[i, H] = q.height**2
-            self.reading[i, PSI] = q.attitude**2
+            self.reading[i, PSI] = q.attitude_white**2
             if attitude:
                 self.walk[i, PSI] = q.tilt_walk**2
                 self.walk[i, BIAS] = q.bias_walk**2

@@ -12,7 +12,13 @@ from onboard.core.maths.arrays import Array
 
 
 def whitened(
-    made: Whitening, kinds: str, t: float, theta: Array, refused: Sequence[str], off: Array
+    made: Whitening,
+    kinds: str,
+    t: float,
+    theta: Array,
+    refused: Sequence[str],
+    off: Array,
+    unlikely: Array,
 ) -> WhitenedInnovations:
     """What the epoch at ``t`` gives.
 
@@ -23,6 +29,7 @@ def whitened(
         theta: (m,) current estimate.
         refused: names of what the gates refused before.
         off: innovation of a velocity that was refused, m/s, or empty.
+        unlikely: (B,) what the refused takes off twice the log-likelihood.
     """
     n, m1 = kinds.count("v"), made.E.shape[1]
     first, regressors = made.E[:n, 0], made.E[:n, 1:]
@@ -30,7 +37,7 @@ def whitened(
         t=t,
         y=made.W[:, :, 0],
         h=made.W[:, :, 1:m1],
-        log_det=made.log_det,
+        log_det=made.log_det + unlikely,
         velocities=n,
         height="h" in kinds,
         innovation=first - regressors @ theta,
@@ -42,14 +49,14 @@ def whitened(
 
 
 def nothing(
-    members: int, m: int, t: float, refused: Sequence[str], off: Array
+    members: int, m: int, t: float, refused: Sequence[str], off: Array, unlikely: Array
 ) -> WhitenedInnovations:
-    """All that the epoch at ``t`` (s) has measured was refused."""
+    """All that the epoch at ``t`` (s) has measured was refused: see :func:`whitened`."""
     return WhitenedInnovations(
         t=t,
         y=np.zeros((members, 0)),
         h=np.zeros((members, 0, m)),
-        log_det=np.zeros(members),
+        log_det=unlikely,
         velocities=0,
         height=False,
         innovation=np.zeros(0),

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.filter.innovation_gates import InnovationGates
+from onboard.core.filter.innovation_gates import InnovationGates, tails
 from onboard.core.filter.innovations import Epoch, Step, WhitenedInnovations
 from onboard.core.filter.kernel import (
     Process,
@@ -201,25 +201,58 @@ class WhiteningFilter:
             return None
         refused: list[str] = []
         off = np.zeros(0)
+        unlikely = np.zeros(len(self.bank))
         z = self._measured(epoch, theta)
+        white = self._variances.reading + epoch.noise
         while kinds:
-            made = self._kernel.whiten(self._carried, z, reading(kinds), self._variances.reading)
+            made = self._kernel.whiten(self._carried, z, reading(kinds), white)
             refusal = None
             if self._gates is not None:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                 refusal = self._gates.judge(epoch.t, kinds, made.E, y, h, theta, covariance)
             if refusal is None:
+                if self._gates is not None:
+                    made = self._in_tail(made, z, kinds, white, theta, covariance)
                 self._take(made, kinds, theta)
-                return whitened(made, kinds, epoch.t, theta, refused, off)
+                return whitened(made, kinds, epoch.t, theta, refused, off, unlikely)
             refused.append(refusal.name)
+            letter = _LETTER[refusal.name]
+            if letter != "a":  # another attitude is another reference, not noise
+                only = letter * kinds.count(letter)
+                unlikely += self._surprise(z, only, white, theta, covariance)
             if refusal.renewed:
                 self._renew(refusal.name)
-            letter = _LETTER[refusal.name]
             if letter == "v":
                 n = kinds.count("v")
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
             kinds = kinds.replace(letter, "")
-        return nothing(len(self.bank), self.m, epoch.t, refused, off)
+        return nothing(len(self.bank), self.m, epoch.t, refused, off, unlikely)
+
+    def _in_tail(
+        self, made: Whitening, z: Array, kinds: str, white: Array, theta: Array, covariance: Array
+    ) -> Whitening:
+        """The same innovations, with more noise for what is in the tail of its distribution."""
+        y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
+        wider = tails(kinds, y - h @ theta, h, covariance)
+        if not wider:
+            return made
+        white = white.copy()
+        for kind, factor in wider.items():
+            white[:, reading(kind * kinds.count(kind)).number] *= factor
+        return self._kernel.whiten(self._carried, z, reading(kinds), white)
+
+    def _surprise(
+        self, z: Array, kinds: str, white: Array, theta: Array, covariance: Array
+    ) -> Array:
+        """What a refused measurement takes off twice the log-likelihood of each member, (B,).
+
+        Levels must not become likelier by making the gate refuse more.
+        """
+        made = self._kernel.whiten(self._carried, z, reading(kinds), white)
+        made = self._in_tail(made, z, kinds, white, theta, covariance)
+        y = made.W[:, :, 0] - made.W[:, :, 1 : self._m1] @ theta
+        out: Array = made.log_det + (y * y).sum(axis=1)
+        return out
 
     def expected_velocity(
         self, epoch: Epoch, theta: Array, covariance: Array

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.filter import innovation_gates
-from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates
+from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates, tails
 from onboard.core.filter.limits import (
     GATE_ATTITUDE,
     GATE_HEIGHT,
@@ -14,6 +14,7 @@ from onboard.core.filter.limits import (
     PATIENCE_S,
     RECOVERY_FIXES,
     RECOVERY_S,
+    TAIL,
 )
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.maths.chi_square import survival
@@ -57,16 +58,27 @@ def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name)
 
 
 def test_the_limits_have_the_probabilities_that_are_claimed():
-    assert survival(GATE_VELOCITY, 3) == pytest.approx(1.4e-6, rel=0.05)
-    assert survival(GATE_VELOCITY, 2) == pytest.approx(3e-7, rel=0.05)
+    assert survival(GATE_VELOCITY, 3) == pytest.approx(8.2e-14, rel=0.05)
+    for free, limit in TAIL.items():
+        assert survival(limit, free) == pytest.approx(0.01, rel=0.01)
     assert survival(GATE_HEIGHT, 1) == pytest.approx(4.3e-8, rel=0.05)
     assert survival(GATE_ATTITUDE, 3) == pytest.approx(5.9e-13, rel=0.05)
 
 
 def test_an_uncertain_estimate_widens_the_gate():
-    y, h = np.array([8.0, 0.0, 0.0]), np.eye(3, 2)
+    y, h = np.array([9.0, 0.0, 0.0]), np.eye(3, 2)
     assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h) == GateRefusal("velocity")
     assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h, 10.0 * np.eye(2)) is None
+
+
+def test_what_is_in_the_tail_is_brought_to_its_edge():
+    h, C = np.zeros((7, 2)), np.zeros((2, 2))
+    y = np.array([0.0, 6.0, 0.0, 5.0, 9.0, 9.0, 9.0])
+    wider = tails("vvvhaaa", y, h, C)
+    # So much more variance makes the normalised square that of the edge; attitude has no tail.
+    assert wider == {"v": pytest.approx(36.0 / TAIL[3]), "h": pytest.approx(25.0 / TAIL[1])}
+    assert tails("vvvhaaa", 0.5 * y, h, C) == {}
+    assert tails("h", y[3:4], np.eye(1, 2), 10.0 * np.eye(2)) == {}
 
 
 def test_the_first_impossible_kind_is_named():

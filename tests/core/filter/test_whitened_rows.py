@@ -38,7 +38,7 @@ GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 def quiet(velocity):
     """Noise of GPS velocity alone."""
     none = 1e-12
-    return NoiseLevels(velocity, none, 1.0, 1.0, none, none, none, none, none, none)
+    return NoiseLevels(velocity, none, 1.0, 1.0, *(none,) * 7)
 
 
 def manoeuvres(t):
@@ -152,6 +152,7 @@ LEVELS = NoiseLevels(
     bias_walk=1e-4,
     attitude=0.01,
     heading=0.03,
+    attitude_white=4e-3,
 )
 DT, SUB = 0.01, 10
 START_SIGMA = 0.02
@@ -172,7 +173,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     theta = np.ones(1)
 
     def epoch(t):
-        read = rotation_from_vector(error + levels.attitude * normal(size=3)) @ R
+        read = rotation_from_vector(error + levels.attitude_white * normal(size=3)) @ R
         ned = np.zeros((7, 2))
         ned[:3, 0] = v + colour + levels.velocity * normal(size=3)
         ned[3, 0] = h + wander + levels.height * normal()
@@ -260,7 +261,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 4)
+        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 5)
         for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
     )
     made = Pass(
