@@ -105,7 +105,8 @@ def _cluster_factor(
     It is the ratio of clustered to expected variance of each calibration parameter: their mean
     while all could be one noise, else the largest, for an offset that changes half-way shows in
     that offset alone.  What is expected of a block is less than its information, because the fit
-    has followed it.  1 while there are fewer than
+    has followed it.  A number that the data hardly move is as uncertain as the prior whatever they
+    say of it: its ratio counts for the share of its variance that comes from the data.  1 while there are fewer than
     :data:`~onboard.core.estimate.limits.FEWEST_BLOCKS`.
     """
     if len(blocks) < FEWEST_BLOCKS or "six" not in model.slices:
@@ -125,7 +126,10 @@ def _cluster_factor(
     # Blocks that say nothing of a number do not count for it (Satterthwaite 1946).
     blocks_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
     beyond = ratio > by_chance(blocks_that_count)
-    return float(ratio[beyond].max() if beyond.any() else ratio.mean())
+    if not beyond.any():
+        return float(ratio.mean())
+    from_data = np.minimum(sum_expected / np.diag(back[:, six]), 1.0)
+    return float((1.0 + (ratio - 1.0) * from_data)[beyond].max())
 
 
 def by_chance(n: Array) -> Array:

@@ -6,6 +6,7 @@ nothing), or *tuned* (on simulated flights: to be derived).
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 # Innovation gates (innovation_gates).
@@ -18,6 +19,15 @@ TAIL: Final = {1: 6.63, 2: 9.21, 3: 11.34}
 """Normalised innovation squared, by degrees of freedom, past which a velocity or a height is in the
 tail of its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger
 as the figure is, so that it pulls no more than one at the edge does (Huber, 1964)."""
+_FAULTY: Final = 2.0 * math.log(1e3)
+ANYTHING: Final = {
+    "vvv": _FAULTY + 6.0 * math.log(60.0),
+    "vv": _FAULTY + 4.0 * math.log(60.0),
+    "h": _FAULTY + 2.0 * math.log(200.0),
+    "aaa": _FAULTY + 2.0 * math.log(8.0 * math.pi**2),
+}
+"""Minus twice the log-likelihood of a measurement that may be anything: one of a thousand is, and
+then it is anywhere within 30 m/s, 100 m, all rotations [physics]."""
 GATE_HEIGHT: Final = 30.0
 """The same of height [probability: 4e-8 with one degree of freedom; tuned]."""
 GATE_ATTITUDE: Final = 60.0

@@ -33,6 +33,7 @@ from onboard.core.filter.kernel import (
     innovations,
 )
 from onboard.core.filter.limits import (
+    ANYTHING,
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
     RENEWED_ATTITUDE_VAR,
@@ -217,9 +218,7 @@ class WhiteningFilter:
                 return whitened(made, kinds, epoch.t, theta, refused, off, unlikely)
             refused.append(refusal.name)
             letter = _LETTER[refusal.name]
-            if letter != "a":  # another attitude is another reference, not noise
-                only = letter * kinds.count(letter)
-                unlikely += self._surprise(z, only, white, theta, covariance)
+            unlikely += self._surprise(z, letter * kinds.count(letter), white, theta)
             if refusal.renewed:
                 self._renew(refusal.name)
             if letter == "v":
@@ -241,17 +240,15 @@ class WhiteningFilter:
             white[:, reading(kind * kinds.count(kind)).number] *= factor
         return self._kernel.whiten(self._carried, z, reading(kinds), white)
 
-    def _surprise(
-        self, z: Array, kinds: str, white: Array, theta: Array, covariance: Array
-    ) -> Array:
+    def _surprise(self, z: Array, kinds: str, white: Array, theta: Array) -> Array:
         """What a refused measurement takes off twice the log-likelihood of each member, (B,).
 
-        Levels must not become likelier by making the gate refuse more.
+        It is noise, or anything at all, whichever is likelier.  Had it no say, levels would become
+        likelier by making the gate refuse more.
         """
         made = self._kernel.whiten(self._carried, z, reading(kinds), white)
-        made = self._in_tail(made, z, kinds, white, theta, covariance)
         y = made.W[:, :, 0] - made.W[:, :, 1 : self._m1] @ theta
-        out: Array = made.log_det + (y * y).sum(axis=1)
+        out: Array = np.minimum(made.log_det + (y * y).sum(axis=1), ANYTHING[kinds])
         return out
 
     def expected_velocity(
