@@ -23,7 +23,7 @@ from onboard.core.diagnosis.limits import (
 )
 from onboard.core.diagnosis.refusals import Refused
 from onboard.core.filter.innovations import Epoch, WhitenedInnovations
-from onboard.core.filter.limits import COLOUR_TIME_S, GATE_VELOCITY
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELOCITY
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
@@ -211,11 +211,13 @@ def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Arr
     What goes on growing the second before or after is no jump: that is an inertia that is lost.
     """
     n = _of_a_second(t)
+    # What a tilt that GPS has corrected until then grows by.
+    tilt = levels.attitude * np.sqrt(2.0 * MEAN_S / ATTITUDE_TIME_S)
     variance = (
         2.0 * levels.velocity**2 / n
         + 2.0 * levels.velocity_colour**2 * (1.0 - np.exp(-MEAN_S / COLOUR_TIME_S))
         + levels.force_walk**2 * MEAN_S
-        + (STANDARD_GRAVITY * levels.attitude * MEAN_S) ** 2
+        + (STANDARD_GRAVITY * tilt * MEAN_S) ** 2
     )
     sigma = float(np.sqrt(variance))
     jump = np.zeros_like(y)

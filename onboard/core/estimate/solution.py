@@ -106,8 +106,8 @@ def _cluster_factor(
     while all could be one noise, else the largest, for an offset that changes half-way shows in
     that offset alone.  What is expected of a block is less than its information, because the fit
     has followed it.  A number that the data hardly move is as uncertain as the prior whatever they
-    say of it: its ratio counts for the share of its variance that comes from the data.  1 while there are fewer than
-    :data:`~onboard.core.estimate.limits.FEWEST_BLOCKS`.
+    say of it: its ratio counts for the share of its variance that comes from the data.  1 while
+    there are fewer than :data:`~onboard.core.estimate.limits.FEWEST_BLOCKS`.
     """
     if len(blocks) < FEWEST_BLOCKS or "six" not in model.slices:
         return 1.0

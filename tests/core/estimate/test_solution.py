@@ -88,7 +88,8 @@ def test_the_cluster_robust_factor_is_that_of_the_hat_matrix():
             score = inverse[j] @ h[rows].T
             found += float(score @ (y - h @ theta)[rows]) ** 2
             expected += float(score @ left[np.ix_(rows, rows)] @ score)
-        ratio[j] = found / expected
+        # What the prior holds is no less certain for it: only the data's share of the variance is.
+        ratio[j] = 1.0 + (found / expected - 1.0) * min(expected / inverse[j, j], 1.0)
     assert np.argmax(ratio) == 4
     got = solve(blocks_of(h, y, count), MODEL)
     assert got.variance_inflation == pytest.approx(ratio.max(), rel=1e-6)
