@@ -11,10 +11,9 @@ from typing import Final
 
 # Innovation gates (innovation_gates).
 
-GATE_VELOCITY: Final = 64.0
-"""Normalised innovation squared of velocity past which a fix is refused: eight sigmas, which no
-honest receiver is off by [probability: 8e-14 if it were Gaussian; real ones have tails, which are
-taken for what they are up to here]."""
+GATE_VELOCITY: Final = 30.0
+"""Normalised innovation squared of velocity past which a fix is refused [probability: 1.4e-6 with
+three degrees of freedom, 3e-7 with two]."""
 TAIL: Final = {1: 6.63, 2: 9.21, 3: 11.34}
 """Normalised innovation squared, by degrees of freedom, past which a velocity or a height is in the
 tail of its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger

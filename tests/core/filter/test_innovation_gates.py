@@ -58,7 +58,8 @@ def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name)
 
 
 def test_the_limits_have_the_probabilities_that_are_claimed():
-    assert survival(GATE_VELOCITY, 3) == pytest.approx(8.2e-14, rel=0.05)
+    assert survival(GATE_VELOCITY, 3) == pytest.approx(1.4e-6, rel=0.05)
+    assert survival(GATE_VELOCITY, 2) == pytest.approx(3e-7, rel=0.05)
     for free, limit in TAIL.items():
         assert survival(limit, free) == pytest.approx(0.01, rel=0.01)
     assert survival(GATE_HEIGHT, 1) == pytest.approx(4.3e-8, rel=0.05)
@@ -66,7 +67,7 @@ def test_the_limits_have_the_probabilities_that_are_claimed():
 
 
 def test_an_uncertain_estimate_widens_the_gate():
-    y, h = np.array([9.0, 0.0, 0.0]), np.eye(3, 2)
+    y, h = np.array([8.0, 0.0, 0.0]), np.eye(3, 2)
     assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h) == GateRefusal("velocity")
     assert judged(InnovationGates(LEVELS), 0.0, "vvv", y, h, 10.0 * np.eye(2)) is None
 

@@ -45,7 +45,7 @@ def offset_of(made, result):
     return np.linalg.solve(sums.N + prior, sums.b + prior @ made.model.prior)[3:]
 
 
-@pytest.mark.parametrize("sigmas", [6.0, 7.5])
+@pytest.mark.parametrize("sigmas", [4.2, 5.2])
 def test_a_fix_in_the_tail_pulls_no_more_than_one_at_the_edge(sigmas):
     """Influence is bounded: the same fix twice as far out moves the offset by little more."""
     rng = np.random.default_rng(1)
@@ -57,7 +57,7 @@ def test_a_fix_in_the_tail_pulls_no_more_than_one_at_the_edge(sigmas):
     assert moved[0] < 1.2 * moved[1]
 
 
-@pytest.mark.parametrize("outliers", [6.0, 40.0], ids=["in-the-tail", "refused"])
+@pytest.mark.parametrize("outliers", [4.0, 40.0], ids=["in-the-tail", "refused"])
 def test_outliers_do_not_carry_the_level_away(outliers):
     """Two of a hundred fixes are far off: neither half the true level nor twice it is likelier.
 
@@ -69,5 +69,5 @@ def test_outliers_do_not_carry_the_level_away(outliers):
     noise[far, 0] += outliers * SIGMA
     bank = tuple(levels(SIGMA * factor) for factor in (1.0, 0.5, 2.0))
     made, result = flown(noise, bank, beta_sigma=1e-6)
-    assert bool(result.refused) == (outliers > 8.0)
+    assert bool(result.refused.get("velocity", 0) > 3) == (outliers > 8.0)
     assert np.argmax(made.log_likelihoods()) == 0
