@@ -58,6 +58,14 @@ MOST_WAITING: Final = 4
 STRANGER: Final = 0.01
 """Probability with which another sensor may pass for this one [probability]."""
 
+# Flights of one accelerometer (merged_flights).
+
+BY_CHANCE: Final = 1e-3
+"""Probability below which flights that scatter so contradict each other [probability]."""
+MOST_ODD_FLIGHTS: Final = 2
+"""Flights that may have erred among others that agree; more are looked for only before a change of
+the sensor [cost: three of 30 flights are 4060 sets]."""
+
 # Solution.
 
 FOLDS: Final = 8

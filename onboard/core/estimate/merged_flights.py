@@ -1,0 +1,255 @@
+"""Several flights of one accelerometer: what each says, whether they agree, what they say together.
+
+Noise, timing, antenna and attitude errors are a flight's own: each flight is solved by itself, and
+what is left of it for the others is a Gaussian of the six numbers, the prior taken out,
+
+    N_i = P_i^-1 - P_0^-1,    b_i = N_i x_i,        x = (sum N_i + P_0^-1)^-1 (sum b_i + P_0^-1 x_0).
+
+With equal noise that is the solution of all samples together.
+
+*Agreement.*  Flights differ in directions that both of them know: those of the eigenvectors of
+``P_a + P_b``, in units of the prior, whose eigenvalue is at most twice :data:`PRIOR_SHARE` squared.
+Flight a is given values of its own in these directions, and shares the others, with their prior,
+with b; what the separate values gain is chi-square with as many degrees of freedom as there are
+such directions.  A set of flights is compared one by one, each with the sum of those before it: the
+gains are independent and add up.  A set that scatters more than one in a thousand does by chance
+contradicts itself.
+
+*Who counts.*  The answer is about the sensor as it is after the last flight.  A consistent set
+counts if it has that flight and at least one more, and if the flights left out are either all from
+before it (the sensor may have changed since) or fewer than half (they erred).  If there is no such
+set, or several of which none has the others in it, nobody can say which flights are right, and none
+counts: of two flights neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
+
+import numpy as np
+
+from onboard.core.estimate.joint import FLOOR, without_prior
+from onboard.core.estimate.limits import BY_CHANCE, MOST_ODD_FLIGHTS, PRIOR_SHARE
+from onboard.core.estimate.result import Calibration
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.chi_square import survival
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSix:
+    """What one flight alone says of scale (1) and beta (m/s^2), sensor axes.
+
+    Attributes:
+        information: (6, 6) of its data, without prior and floor.
+        vector: (6,) that times the values that the flight asks for.
+        floored: (6, 6) the same with the floors in the sigmas: what is compared.
+        floored_vector: (6,) what goes with it.
+    """
+
+    information: Array
+    vector: Array
+    floored: Array
+    floored_vector: Array
+
+    def of_raw(self, applied: SixParameters) -> FlightSix:
+        """The same of the raw sensor, if the samples were not raw but ``applied`` to it."""
+        s, beta = np.array(applied.scale), applied.as_linear()[3:]
+        back = np.linalg.inv(np.block([[np.diag(s), np.zeros((3, 3))], [np.diag(beta), np.eye(3)]]))
+        return FlightSix(
+            back.T @ self.information @ back,
+            back.T @ self.vector,
+            back.T @ self.floored @ back,
+            back.T @ self.floored_vector,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known before any flight: (6,) scale and beta, and (6,) their sigmas."""
+
+    center: Array
+    sigma: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Apart:
+    """How far flights are from each other: chi-square and its degrees of freedom."""
+
+    chi_square: float
+    dof: int
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a larger chi-square; 1 where nothing can be compared."""
+        return survival(self.chi_square, self.dof) if self.dof else 1.0
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether chance does not explain it."""
+        return not self.p_value >= BY_CHANCE
+
+
+@dataclass(frozen=True, slots=True)
+class Reconciled:
+    """Which of some flights count.
+
+    Attributes:
+        counted: indices of the flights that agree and count; empty if nobody can say.
+        contradicted: indices of those that are named for a contradiction.
+        apart: each flight against the others that count; against all others if none does.
+        scatter: of all flights.
+        earlier: the contradicted ones were all flown before those that count.
+    """
+
+    counted: tuple[int, ...]
+    contradicted: tuple[int, ...]
+    apart: tuple[Apart, ...]
+    scatter: Apart
+    earlier: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """What flights say together, scale (1) and beta (m/s^2).
+
+    Attributes:
+        estimate: (6,) posterior.
+        covariance: (6, 6) of it, without floor.
+        information: (6, 6) of the flights alone.
+        inflation: factor on the variance of all flights, at least 1: their scatter over its due.
+    """
+
+    estimate: Array
+    covariance: Array
+    information: Array
+    inflation: float
+
+
+def flight_six(c: Calibration) -> FlightSix | None:
+    """What a flight says without its prior; None if it has no covariance."""
+    six, P = np.array(c.scale + c.offset), np.array(c.covariance, dtype=np.float64)
+    in_force = SixParameters(c.in_force_scale, c.in_force_offset)
+    sigma = np.array(c.prior_sigma)
+    found = [without_prior(c.imu, in_force, sigma, six, x) for x in (P - np.diag(FLOOR**2), P)]
+    bare, floored = found
+    if bare is None or floored is None:
+        return None
+    return FlightSix(
+        bare.information,
+        bare.vector + bare.information @ bare.before,
+        floored.information,
+        floored.vector + floored.information @ floored.before,
+    )
+
+
+def merged(flights: Sequence[FlightSix], prior: Prior) -> Merged:
+    """The flights (at least one) together, whether they agree or not.
+
+    Where they scatter more than they should, as all of them could be by chance, their variances are
+    taken to be larger by that factor, as it is done with the blocks of one flight.
+    """
+    scatter = scatter_of([_in_units(f, prior) for f in flights])
+    inflation = max(1.0, scatter.chi_square / scatter.dof) if scatter.dof else 1.0
+    information = np.sum([f.information for f in flights], axis=0) / inflation
+    vector = np.sum([f.vector for f in flights], axis=0) / inflation
+    unit = prior.sigma
+    inverse = np.linalg.inv(information * np.outer(unit, unit) + np.eye(6))
+    change = inverse @ (unit * (vector - information @ prior.center))
+    covariance = inverse * np.outer(unit, unit)
+    return Merged(
+        prior.center + unit * change, (covariance + covariance.T) / 2, information, inflation
+    )
+
+
+def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:
+    """Which flights agree and count, and which are named for a contradiction.
+
+    Args:
+        flights: at least one, in the order in which they were flown.
+        prior: of the six.
+    """
+    said = [_in_units(f, prior) for f in flights]
+    every = tuple(range(len(said)))
+    scatter = scatter_of(said)
+    counted = every if not scatter.contradicted else _counting(said)
+    others = counted or every
+    apart = tuple(_against(said, i, others) for i in every)
+    if counted:
+        odd = tuple(i for i in every if i not in counted)
+    else:
+        odd = tuple(i for i in every if apart[i].contradicted)
+        odd = odd or (min(every, key=lambda i: apart[i].p_value),)
+    earlier = bool(odd) and bool(counted) and max(odd) < min(counted)
+    return Reconciled(counted, odd, apart, scatter, earlier)
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Information (6, 6) and vector (6,) in units of the prior, about its centre."""
+
+    N: Array
+    b: Array
+
+    def __add__(self, other: Normal) -> Normal:
+        """Both together."""
+        return Normal(self.N + other.N, self.b + other.b)
+
+
+def apart_of(a: Normal, b: Normal) -> Apart:
+    """What separate values gain in the directions that both know."""
+    one = np.eye(6)
+    size, V = np.linalg.eigh(np.linalg.inv(a.N + one) + np.linalg.inv(b.N + one))
+    both = size <= 2.0 * PRIOR_SHARE**2
+    if not np.any(both):
+        return Apart(0.0, 0)
+    U, rest = V[:, both], V[:, ~both]
+    shared = a.N + b.N + rest @ rest.T
+    solved = np.linalg.solve(shared, np.column_stack([a.N @ U, a.b + b.b]))
+    S = U.T @ a.N @ U - U.T @ a.N @ solved[:, :-1]
+    s = U.T @ a.b - U.T @ a.N @ solved[:, -1]
+    return Apart(float(s @ np.linalg.solve((S + S.T) / 2, s)), int(np.sum(both)))
+
+
+def scatter_of(said: Sequence[Normal]) -> Apart:
+    """Each with all before it, added up."""
+    chi_square, dof = 0.0, 0
+    so_far = said[0]
+    for one in said[1:]:
+        apart = apart_of(one, so_far)
+        chi_square, dof = chi_square + apart.chi_square, dof + apart.dof
+        so_far = so_far + one
+    return Apart(chi_square, dof)
+
+
+def _in_units(f: FlightSix, prior: Prior) -> Normal:
+    b = f.floored_vector - f.floored @ prior.center
+    return Normal(f.floored * np.outer(prior.sigma, prior.sigma), b * prior.sigma)
+
+
+def _against(said: Sequence[Normal], i: int, others: Sequence[int]) -> Apart:
+    rest = [said[j] for j in others if j != i]
+    return apart_of(said[i], reduce(lambda a, b: a + b, rest)) if rest else Apart(0.0, 0)
+
+
+def _counting(said: Sequence[Normal]) -> tuple[int, ...]:
+    """The one consistent set that counts; empty if there is none, or no telling which."""
+    found: list[tuple[int, ...]] = []
+    for chosen in _sets(len(said)):  # larger ones first
+        within = any(set(chosen) <= set(larger) for larger in found)
+        if not within and not scatter_of([said[i] for i in chosen]).contradicted:
+            found.append(chosen)
+    return found[0] if len(found) == 1 else ()
+
+
+def _sets(count: int) -> Iterator[tuple[int, ...]]:
+    """Sets with the last flight that may count, larger ones first, not all of them."""
+    for left_out in range(1, count - 1):
+        yield tuple(range(left_out, count))
+        if 2 * left_out < count and left_out <= MOST_ODD_FLIGHTS:
+            for odd in combinations(range(count - 1), left_out):
+                if max(odd) >= left_out:
+                    yield tuple(i for i in range(count) if i not in odd)
