@@ -28,6 +28,7 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.determined import determine
+from onboard.core.estimate.merged_flights import Apart
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.physics.catalogue import bearing_of, phrase_of
 from onboard.core.physics.effect import Bearing
@@ -48,11 +49,13 @@ class Answer:
         missing: why the numbers must not be written by themselves, in words; empty if nothing
             that was found forbids it.
         modelled: what is missing is modelled beside the six, so a person may accept them.
+        flights: what it was merged from, one for each recording; empty for a single one.
     """
 
     diagnosis: Diagnosis
     missing: str = ""
     modelled: bool = False
+    flights: tuple[FlightAnswer, ...] = ()
 
     @property
     def imu(self) -> int:
@@ -63,6 +66,27 @@ class Answer:
     def calibration(self) -> Calibration:
         """The numbers, their sigmas and their status."""
         return self.diagnosis.calibration
+
+
+@dataclass(frozen=True, slots=True)
+class FlightAnswer:
+    """What one of several recordings says of an accelerometer by itself, and what becomes of it.
+
+    Attributes:
+        name: of the recording.
+        given: its answer; None where the accelerometer did not fly in it.
+        apart: its difference from the other flights that count.
+        counted: whether it is in the merged answer.
+        contradicted: whether it is named for contradicting other flights.
+        why: it does not count, in words; empty if it does.
+    """
+
+    name: str
+    given: Answer | None
+    apart: Apart
+    counted: bool = False
+    contradicted: bool = False
+    why: str = ""
 
 
 def answer(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Answer:

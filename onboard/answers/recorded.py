@@ -19,10 +19,12 @@ from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.comparison import Comparison, compare
+from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.kernel import prefer_compiled
 from onboard.core.inputs.samples import Sample
+from onboard.core.inputs.segments import Batch
 
 PAUSE_S = 10.0
 """Between two recordings."""
@@ -45,6 +47,7 @@ class Recorded:
         self.chronicle = Chronicle(self.calibrator) if watched else None
         self._reader = self.chronicle or self.calibrator
         self._answers: dict[int, Answer] = {}
+        self._engines: dict[int, Engine] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
 
     @property
@@ -96,17 +99,24 @@ class Recorded:
             self._answers[imu] = self._asked(imu)
         return self._answers[imu]
 
+    def engine(self, imu: int) -> Engine | None:
+        """Whose sums gave the answer; None where there is no diagnosis."""
+        return self._engines.get(imu)
+
     def compared(self, calibrations: Sequence[Calibration]) -> Comparison | None:
         """What the accelerometers say of each other; None if there is nothing to compare.
 
         Args:
             calibrations: of the accelerometers, as the answers have them.
         """
-        flights = {imu: self.calibrator.engine(imu).batches for imu in self.imus}
         try:
-            return compare(calibrations, flights)
+            return compare(calibrations, (self.kept(),))
         except (ArithmeticError, ValueError):  # numbers that no model fits
             return None
+
+    def kept(self) -> Mapping[int, Sequence[Batch]]:
+        """The flight that each accelerometer has kept."""
+        return {imu: self.calibrator.engine(imu).batches for imu in self.imus}
 
     def _asked(self, imu: int) -> Answer:
         plain = self.calibrator.calibration(imu)
@@ -117,6 +127,7 @@ class Recorded:
             why = f"the flight could not be diagnosed ({error})"
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+        self._engines[imu] = found.engine
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine)
         return given

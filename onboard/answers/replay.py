@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
 import numpy as np
 
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
 from onboard.answers.compared import accelerometers_document, remarks
 from onboard.answers.document import (
+    FlightsDocument,
     RecordingDocument,
     ReplayDocument,
     advice_document,
+    flight_document,
     imu_document,
 )
 from onboard.answers.recorded import unanswered
@@ -42,7 +45,7 @@ class Reader(Protocol):
         """Take a sample."""
 
     def restart(self) -> object:
-        """Another recording of the same vehicle begins: states are forgotten, sums stay."""
+        """Another recording of the same vehicle begins."""
 
     def finish(self) -> object:
         """Process what is pending: there are no more recordings."""
@@ -53,7 +56,7 @@ class Reader(Protocol):
 
 
 class Estimator(Reader, Protocol):
-    """What replay needs of :class:`onboard.answers.recorded.Recorded`."""
+    """What replay needs of a recording, or of several (:mod:`onboard.answers.flights`)."""
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -143,7 +146,20 @@ class Replay:
                 for c, advice in zip(self.calibrations, self.advice, strict=True)
             ],
             accelerometers=accelerometers_document(self.comparison),
+            flights=self._flights(),
         )
+
+    def _flights(self) -> list[FlightsDocument] | msgspec.UnsetType:
+        """Each recording by itself; unset for a single one."""
+        if not any(a.flights for a in self.answers):
+            return msgspec.UNSET
+        return [
+            FlightsDocument(
+                file=str(recording.path),
+                imus=[flight_document(a.imu, a.flights[i]) for a in self.answers if a.flights],
+            )
+            for i, recording in enumerate(self.recordings)
+        ]
 
 
 def replay(
@@ -185,7 +201,7 @@ def read(
     imu: int | None = None,
     progress: Progress | None = None,
 ) -> Reading:
-    """Feed files, one after the other, to one reader: its sums add up over the flights.
+    """Feed files, one after the other, to one reader.
 
     Args:
         paths: at least one recording, all of the same vehicle.

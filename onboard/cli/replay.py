@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from onboard.answers.flights import Flights, distinct
 from onboard.answers.recorded import Recorded
 from onboard.answers.replay import replay as replay_recordings
 from onboard.cli.progress import reading
@@ -52,17 +53,25 @@ def replay(
 ) -> None:
     """Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
 
-    Several LOGs of one vehicle are merged: what a single flight does not show, several may.
+    Several LOGs of one vehicle, in the order in which they were flown, are merged: what a single
+    flight does not show, several may.  Each keeps its own noise and timing, and flights that
+    contradict each other are named, not averaged.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    recorded = Recorded(() if imu is None else (imu,), watched=report_file is not None)
+    wanted, watched = () if imu is None else (imu,), report_file is not None
+    recorded: Recorded | Flights
+    if len(logs) == 1:
+        recorded = Recorded(wanted, watched=watched)
+    else:
+        recorded = Flights(distinct(logs), wanted, watched=watched)
     with reading(logs, then="comparing models") as progress:
         result = replay_recordings(logs, recorded, imu=imu, progress=progress)
-    if report_file is not None and recorded.chronicle is not None:
+    drawn = recorded.chronicle
+    if report_file is not None and drawn is not None:
         # jinja2 only when it is wanted.
         from onboard.report.replay import replay_html
 
-        write_text(replay_html(result, recorded.chronicle), report_file)
+        write_text(replay_html(result, drawn), report_file)
     if param_file is not None:
         from onboard.report.parameters import calibration_text, is_qgc
 

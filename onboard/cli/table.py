@@ -14,6 +14,7 @@ from onboard.answers.advice import Advice
 from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import about_six
+from onboard.cli.flights_table import flights
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
 from onboard.core.maths.accelerometer import parameter_names
@@ -32,10 +33,14 @@ KNOWN_STYLE = {YES: "green", ROUGHLY: "cyan", TOGETHER: "cyan"}
 def replay_report(result: Replay) -> Iterator[RenderableType]:
     """What a replay prints, part by part."""
     yield _recordings(result)
-    for calibration, advice in zip(result.calibrations, result.advice, strict=True):
+    for answer, advice in zip(result.answers, result.advice, strict=True):
+        calibration = answer.calibration
         yield Text()
         yield _headline(calibration)
         yield _six(calibration, result.autopilot, advice)
+        if answer.flights:
+            yield from flights(answer.flights)
+            yield Text()
         yield _sentences(_about(calibration, result.autopilot, advice))
     if result.comparison is not None:
         yield Text()

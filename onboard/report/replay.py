@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from markupsafe import Markup
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from onboard.answers import words
 from onboard.answers.advice import Advice
-from onboard.answers.chronicle import FREE_S, Chronicle, Course, Curve, Figures, Span
+from onboard.answers.chronicle import FREE_S, Course, Curve, Figures, Span
 from onboard.answers.compared import common_cause
 from onboard.answers.knowledge import ALL_SIX, determined, knowledge, seen
 from onboard.answers.replay import Replay
@@ -22,9 +22,30 @@ from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
+from onboard.report.flight_rows import flight_rows
 from onboard.report.page import render
 
 Array = NDArray[np.float64]
+
+
+class Drawn(Protocol):
+    """What stood before the calibrators of a recording, or of several."""
+
+    @property
+    def duration_s(self) -> float:
+        """Where the drawn time ends, s."""
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """Trust over time."""
+
+    @property
+    def speed(self) -> Curve:
+        """Speed over ground that GPS reported, m/s."""
+
+    def figures(self, imu: int) -> Figures:
+        """The figures of one accelerometer."""
+
 
 TEMPLATE = "replay.html.j2"
 SIGMAS = 2.0
@@ -40,7 +61,7 @@ HEADLINES = {
 }
 
 
-def replay_html(result: Replay, chronicle: Chronicle) -> str:
+def replay_html(result: Replay, chronicle: Drawn) -> str:
     """The page of one replay.
 
     Args:
@@ -71,8 +92,9 @@ def replay_html(result: Replay, chronicle: Chronicle) -> str:
         trust_chart=_trust_chart(chronicle),
         trust=_trust(chronicle),
         imus=[
-            _imu(c, chronicle.figures(c.imu), result.autopilot, chronicle, advice)
-            for c, advice in zip(result.calibrations, result.advice, strict=True)
+            _imu(a.calibration, chronicle.figures(a.imu), result.autopilot, chronicle, advice)
+            | {"flights": flight_rows(a.flights)}
+            for a, advice in zip(result.answers, result.advice, strict=True)
         ],
         free=f"{FREE_S:.0f}",
         pairs=_pairs(result.comparison),
@@ -119,7 +141,7 @@ def _joint(result: Replay) -> list[dict[str, Any]]:
 
 
 def _imu(
-    c: Calibration, f: Figures, autopilot: str, chronicle: Chronicle, advice: Advice | None
+    c: Calibration, f: Figures, autopilot: str, chronicle: Drawn, advice: Advice | None
 ) -> dict[str, Any]:
     what, sure, do = _sentences(c, f, advice)
     return {
@@ -268,7 +290,7 @@ def _six_charts(course: Course) -> list[Markup]:
     return charts
 
 
-def _residual_chart(f: Figures, chronicle: Chronicle) -> Markup:
+def _residual_chart(f: Figures, chronicle: Drawn) -> Markup:
     every = np.concatenate([f.before.y, f.after.y])
     known = every[np.isfinite(every)]
     top = 1.1 * float(np.percentile(known, 99.5)) if len(known) else 1.0
@@ -305,7 +327,7 @@ def _fits(c: Calibration) -> list[dict[str, Any]]:
     ]
 
 
-def _trust_chart(chronicle: Chronicle) -> Markup:
+def _trust_chart(chronicle: Drawn) -> Markup:
     speed = chronicle.speed
     top = 1.1 * float(speed.y.max()) if len(speed.y) else 1.0
     return line_chart(
@@ -322,7 +344,7 @@ def _bands(spans: tuple[Span, ...]) -> list[Band]:
     return [Band(s.start, s.end, "untrusted") for s in spans if s.reason]
 
 
-def _trust(chronicle: Chronicle) -> dict[str, Any]:
+def _trust(chronicle: Drawn) -> dict[str, Any]:
     spans = chronicle.spans
     doubts = [s for s in spans if s.reason]
     longest = sorted(doubts, key=lambda s: -s.seconds)[:MOST_SPANS]

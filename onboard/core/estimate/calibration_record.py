@@ -35,7 +35,11 @@ from onboard.core.estimate.result import (
 from onboard.core.estimate.solution import Solution, fitted_rms, held_out
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.parameters import ParametersInForce
-from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
+from onboard.core.maths.accelerometer import (
+    SixParameters,
+    parameters_jacobian,
+    parameters_of,
+)
 from onboard.core.maths.arrays import Array, vector3
 
 
@@ -205,23 +209,48 @@ def _judged(
             "sensor's axes cannot be separated from here. "
         )
         return replace(made, status=Status.INVALID, note=note + made.note)
-    if not engine.moving:
-        note = "hovering or standing: fly fast, brake hard, turn both ways. "
-        return replace(made, note=note + made.note)
-    if solution.variance_inflation > CONTRADICTION:
-        note = (
-            "the flight contradicts itself: something is missing from the model, "
-            "see onboard explain. "
-        )
-        return replace(made, note=note + made.note)
-    if engine.trusted_s < engine.settings.minimum_s or not _good_enough(
-        made, engine.settings.needs
-    ):
+    if doubt := doubt_of(engine, solution):
+        return replace(made, note=f"{doubt}. {made.note}")
+    if engine.trusted_s < engine.settings.minimum_s or not good_enough(made, engine.settings.needs):
         return made
     return replace(made, status=Status.CALIBRATED)
 
 
-def _good_enough(made: Calibration, needs: Needs) -> bool:
+def doubt_of(engine: Engine, solution: Solution) -> str:
+    """Why the sigmas of a flight may not be believed, in words; empty if they may."""
+    if not engine.moving:
+        return "hovering or standing: fly fast, brake hard, turn both ways"
+    if solution.variance_inflation > CONTRADICTION:
+        return (
+            "the flight contradicts itself: something is missing from the model, "
+            "see onboard explain"
+        )
+    return ""
+
+
+def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Calibration:
+    """The same with its residuals against other parameters than those in force in the flight.
+
+    Args:
+        made: the calibration of ``engine``.
+        engine: has its sums.
+        in_force: what the estimate is to be better than.
+
+    Raises:
+        KeyError: no flight was processed.
+    """
+    residuals = _residuals(engine, _solved(engine, made.imu), in_force.as_linear())
+    return replace(
+        made,
+        whitened_rms_before=residuals.fitted[0],
+        held_out_before=residuals.held_out[0],
+        velocity_rms_before=residuals.velocity[0],
+        predictive_gain=residuals.predictive_gain,
+        dead_reckoning=residuals.dead_reckoning,
+    )
+
+
+def good_enough(made: Calibration, needs: Needs) -> bool:
     """Whether the force over the loads flown is known as well as from numbers known well enough.
 
     That takes no number by itself: a hover knows the z axis at one load, and flies at no other.

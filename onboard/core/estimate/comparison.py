@@ -13,7 +13,7 @@ from onboard.core.estimate.joint import Joint, Single, disagreement, joint, sing
 from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.relative import Relative, relative_of
 from onboard.core.estimate.result import Calibration, Status
-from onboard.core.estimate.shared_windows import shared_windows
+from onboard.core.estimate.shared_windows import one_after_another, shared_windows
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Vector3, vector3
 from onboard.core.maths.chi_square import survival
@@ -73,24 +73,28 @@ class Comparison:
 
 def compare(
     calibrations: Sequence[Calibration],
-    batches: Mapping[int, Sequence[Batch]],
+    flights: Sequence[Mapping[int, Sequence[Batch]]],
     needs: Needs | None = None,
 ) -> Comparison | None:
     """Compare the accelerometers of one vehicle; None if no two of them share enough flight.
 
     Args:
         calibrations: of each by itself; they stay as they are.
-        batches: the flight of each, by accelerometer.
+        flights: what each accelerometer kept of each of some flights, by accelerometer.
         needs: smaller common changes of an offset than its target are not worth a word.
     """
-    usable = [c for c in calibrations if c.status is not Status.INVALID and c.imu in batches]
+    usable = [c for c in calibrations if c.status is not Status.INVALID and _flew(c.imu, flights)]
     singles = {s.imu: s for s in map(single, usable) if s is not None}
     pairs: list[PairDifference] = []
     relatives: list[Relative] = []
     for a, b in combinations(singles.values(), 2):
+        if not any({a.imu, b.imu} <= f.keys() for f in flights):
+            continue
         relative = relative_of(
             (a.imu, b.imu),
-            shared_windows(batches[a.imu], batches[b.imu]),
+            one_after_another(
+                [shared_windows(f[a.imu], f[b.imu]) for f in flights if {a.imu, b.imu} <= f.keys()]
+            ),
             np.concatenate([a.before, b.before]),
             np.concatenate([a.prior_sigma, b.prior_sigma]),
         )
@@ -107,6 +111,10 @@ def compare(
     common = common_changes(found, least) if known else ()
     vertical = int(np.argmax(np.abs(relatives[0].mean_force)))
     return Comparison(tuple(pairs), found, common, vertical)
+
+
+def _flew(imu: int, flights: Sequence[Mapping[int, Sequence[Batch]]]) -> bool:
+    return any(imu in flight for flight in flights)
 
 
 def _difference(relative: Relative, a: Single, b: Single) -> PairDifference:

@@ -3,7 +3,7 @@
 Noise, timing, antenna and attitude errors are a flight's own: each flight is solved by itself, and
 what is left of it for the others is a Gaussian of the six numbers, the prior taken out,
 
-    N_i = P_i^-1 - P_0^-1,    b_i = N_i x_i,        x = (sum N_i + P_0^-1)^-1 (sum b_i + P_0^-1 x_0).
+    N_i = P_i^-1 - P_0^-1,    b_i = N_i x_i,    x = (sum N_i + P_0^-1)^-1 (sum b_i + P_0^-1 x_0).
 
 With equal noise that is the solution of all samples together.
 

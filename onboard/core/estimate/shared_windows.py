@@ -11,11 +11,11 @@ vibration, and the mean of ``dw/dt`` over a window is a difference of two rates.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.estimate.limits import FEWEST_IN_WINDOW, SHARED_WINDOW_S
+from onboard.core.estimate.limits import APART_S, FEWEST_IN_WINDOW, SHARED_WINDOW_S
 from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array, Mask
 
@@ -59,6 +59,20 @@ def shared_windows(a: Sequence[Batch], b: Sequence[Batch]) -> SharedWindows:
         none = np.zeros((0, 3))
         return SharedWindows(np.zeros(0), none, none, none, np.zeros((0, 3, 3)))
     columns = zip(*parts, strict=True)
+    return SharedWindows(*(np.concatenate(column) for column in columns))
+
+
+def one_after_another(flights: Sequence[SharedWindows]) -> SharedWindows:
+    """Windows of several flights (at least one), each flight a little after the one before."""
+    shifted, last = [], 0.0
+    for windows in flights:
+        if len(windows):
+            t = windows.t - windows.t[0] + last
+            shifted.append(replace(windows, t=t))
+            last = float(t[-1]) + APART_S
+    if len(shifted) < 2:
+        return next((w for w in flights if len(w)), flights[0])
+    columns = zip(*((w.t, w.raw_a, w.raw_b, w.lever, w.swing) for w in shifted), strict=True)
     return SharedWindows(*(np.concatenate(column) for column in columns))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -148,8 +150,6 @@ def calibration(rng, truth, in_force, sigmas=GOOD):
     x = C @ (f.vector + before / SIGMA**2)
     J = parameters_jacobian(x)
     P = J @ C @ J.T + np.diag(FLOOR**2)
-    from dataclasses import replace
-
     six = np.concatenate([x[:3], -x[3:] / x[:3]])
     made = replace(
         CALIBRATED,

@@ -1,0 +1,98 @@
+"""What one of several recordings has to say in the answer merged from all of them.
+
+A flight counts
+
+* if it is calibrated, or lacks nothing but motion that shows all of the six: what it does show is
+  right, and others show the rest;
+* not if its numbers are wrong by nobody knows how much: its residual is not noise, more than half
+  of its fixes are refused, what is missing from the model moves the six and is not modelled beside
+  them, its parts contradict each other, or nothing of it could be solved;
+* not if it hovered or was shorter than the least trusted time: then its own sigmas cannot be
+  checked, and a hover repeats what the recorded attitude says;
+* not if it contradicts the others (:mod:`onboard.core.estimate.merged_flights`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from onboard.answers.answer import Answer
+from onboard.answers.recorded import NO_FLIGHT, Recorded
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.calibration_record import doubt_of, judged_by
+from onboard.core.estimate.merged_flights import Apart, FlightSix, flight_six
+from onboard.core.estimate.merged_record import of_raw
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.maths.accelerometer import SixParameters
+
+NOT_COMPARED = Apart(0.0, 0)
+HOVERED = "it hovered or stood: its numbers are those of the recorded attitude"
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One recording's answer about an accelerometer, and its part in the merged one.
+
+    Attributes:
+        given: the answer, of the raw sensor.
+        said: what it says to the others; None if it does not count.
+        judged: its calibration, residuals against the parameters in force last.
+        why: it does not count, in words; empty if it does.
+    """
+
+    given: Answer
+    said: FlightSix | None
+    judged: Calibration
+    why: str
+
+
+def share_of(
+    recorded: Recorded, imu: int, applied: SixParameters | None, in_force: SixParameters
+) -> Share:
+    """One recording's answer, and whether it counts.
+
+    Args:
+        recorded: the recording.
+        imu: which accelerometer.
+        applied: what the autopilot had in force, where only another recording says it.
+        in_force: the parameters that the autopilot used last.
+    """
+    given = recorded.answer(imu)
+    c = given.calibration
+    why = _why_not(recorded, given, imu)
+    said = None if why else flight_six(c)
+    if said is None:
+        why = why or "it has no numbers"
+    engine = recorded.engine(imu)
+    judged = c
+    if said is None:
+        pass
+    elif applied is not None:
+        said, judged = said.of_raw(applied), of_raw(c, applied)
+        given = replace(given, diagnosis=replace(given.diagnosis, calibration=judged))
+    elif engine is not None and SixParameters(c.in_force_scale, c.in_force_offset) != in_force:
+        judged = judged_by(c, engine, in_force)
+    return Share(given, said, judged, why)
+
+
+def _why_not(recorded: Recorded, given: Answer, imu: int) -> str:
+    """Why a flight does not count, in words; empty if it does."""
+    c, engine, diagnosis = given.calibration, recorded.engine(imu), given.diagnosis
+    if c.status is Status.INVALID:
+        return c.note.split(". ")[0].rstrip(".") or "it has no valid result"
+    if engine is None or (solution := engine.solution()) is None:
+        return c.note.split(". ")[0].rstrip(".") or NO_FLIGHT
+    if given.missing and not given.modelled and diagnosis.verdict is not Verdict.INSUFFICIENT:
+        return given.missing
+    if diagnosis.verdict is Verdict.INSUFFICIENT:
+        m = diagnosis.mismatch
+        if not m.supported:
+            return f"only {m.fixes} of its {m.believed} GPS fixes fit one model"
+        return HOVERED
+    if not engine.moving:
+        return HOVERED
+    if doubt_of(engine, solution):
+        return "its parts contradict each other"
+    if engine.trusted_s < engine.settings.minimum_s:
+        return f"it has {engine.trusted_s:.0f} s of trusted GPS only"
+    return ""

@@ -1,0 +1,150 @@
+"""Several recordings of one vehicle: each keeps its own noise and timing, contradictions show."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from onboard.answers.flights import Flights, distinct
+from onboard.answers.recorded import Recorded
+from onboard.answers.replay import replay
+from onboard.cli.table import replay_report
+from onboard.core.estimate.result import Status
+from onboard.report.replay import replay_html
+from sitl import recording
+from sitl.builtin.truth import GpsTruth, ImuTruth
+from sitl.recording import FlightSpec
+from tests.report.html_page import Page
+
+TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
+BUMPED = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.45, -0.2, 0.3))
+SIX = np.array([*TRUE.scale, *TRUE.offset])
+QUIET = GpsTruth(delay=0.10)
+LOUD = GpsTruth(delay=0.24, velocity_noise=0.15)
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flights")
+    specs = {
+        "monday": FlightSpec(vehicle="copter", seed=1, duration=110.0, imus=(TRUE,), gps=QUIET),
+        "tuesday": FlightSpec(vehicle="copter", seed=2, duration=110.0, imus=(TRUE,), gps=LOUD),
+        "bumped": FlightSpec(vehicle="copter", seed=3, duration=110.0, imus=(BUMPED,), gps=QUIET),
+        "standing": FlightSpec(vehicle="copter", seed=4, duration=60.0, imus=(TRUE,), dull=True),
+    }
+    out = {}
+    for name, spec in specs.items():
+        out[name] = folder / f"{name}.tlog"
+        recording.write_tlog(spec, out[name])
+    return out
+
+
+def together(files, *names):
+    paths = [files[name] for name in names]
+    flights = Flights(distinct(paths), watched=True)
+    return replay(paths, flights), flights
+
+
+def printed(result):
+    console = Console(file=io.StringIO(), width=80)
+    for part in replay_report(result):
+        console.print(part)
+    return console.file.getvalue()
+
+
+@pytest.fixture(scope="module")
+def agreeing(files):
+    return together(files, "monday", "tuesday", "standing")
+
+
+@pytest.fixture(scope="module")
+def contradicting(files):
+    return together(files, "monday", "bumped")
+
+
+def test_flights_that_agree_are_one_answer_and_keep_their_own_timing(agreeing):
+    result, _ = agreeing
+    (answer,) = result.answers
+    c = answer.calibration
+    assert c.status is Status.CALIBRATED
+    sigma = np.array(c.scale_sigma + c.offset_sigma)
+    assert np.all(np.abs(np.array(c.scale + c.offset) - SIX) < 4.0 * sigma)
+    monday, tuesday, standing = answer.flights
+    assert (monday.counted, tuesday.counted, standing.counted) == (True, True, False)
+    assert standing.why
+    own = [np.array(f.given.calibration.offset_sigma) for f in (monday, tuesday)]
+    assert np.all(np.array(c.offset_sigma) < 1.2 * np.minimum(*own))
+    delays = [f.given.calibration.timing["gps_delay_s"].value for f in (monday, tuesday)]
+    assert delays[1] - delays[0] == pytest.approx(0.14, abs=0.03)
+    assert c.timing == {}
+    assert monday.apart.dof > 0
+    assert not monday.apart.contradicted
+    assert c.trusted_s == sum(f.given.calibration.trusted_s for f in (monday, tuesday))
+
+
+def test_a_flight_says_what_it_says_alone(files, agreeing):
+    alone = replay([files["monday"]], Recorded()).calibrations[0]
+    own = agreeing[0].answers[0].flights[0].given.calibration
+    assert own.scale + own.offset == alone.scale + alone.offset
+    assert own.covariance == alone.covariance
+    assert own.timing == alone.timing
+
+
+def test_flights_that_contradict_each_other_are_named_and_not_averaged(contradicting):
+    result, _ = contradicting
+    (answer,) = result.answers
+    c = answer.calibration
+    assert c.status is Status.INSUFFICIENT
+    assert not np.any(np.isfinite(c.scale + c.offset))
+    for name in ("monday.tlog", "bumped.tlog"):
+        assert name in c.note
+    assert all(f.contradicted and f.apart.contradicted for f in answer.flights)
+    (advice,) = result.advice
+    assert not advice.settable
+
+
+@pytest.mark.parametrize("which", ["agreeing", "contradicting"])
+def test_every_outlet_tells_flight_by_flight(which, request):
+    result, flights = request.getfixturevalue(which)
+    document = json.loads(result.document().to_json())
+    assert [f["file"] for f in document["flights"]] == [str(r.path) for r in result.recordings]
+    for entry, flight in zip(document["flights"], result.answers[0].flights, strict=True):
+        (imu,) = entry["imus"]
+        assert imu["contradicted"] == flight.contradicted
+        assert imu["counted"] == flight.counted
+        assert flight.why or imu["scale"] == list(flight.given.calibration.scale)
+    text = printed(result)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "nan" not in text
+    page = Page.of(replay_html(result, flights.chronicle))
+    assert "Flight by flight" in page.words
+    for name in ("monday.tlog", "contradicts" if which == "contradicting" else "counts"):
+        assert name in text
+        assert name in page.words
+
+
+def test_one_after_the_other_on_one_axis(agreeing):
+    result, flights = agreeing
+    chronicle = flights.chronicle
+    course = chronicle.figures(1).course
+    assert np.all(np.diff(course.t) >= 0.0)
+    assert chronicle.duration_s > result.duration_s - 3.0
+    spans = chronicle.spans
+    assert all(a.end <= b.start for a, b in itertools.pairwise(spans))
+
+
+def test_a_single_recording_has_no_flights(files):
+    document = json.loads(replay([files["standing"]], Recorded()).document().to_json())
+    assert "flights" not in document
+
+
+def test_names_tell_files_apart():
+    assert distinct(["a/x.BIN", "b/y.BIN"]) == ("x.BIN", "y.BIN")
+    assert distinct(["a/x.BIN", "b/x.BIN"]) == ("a/x.BIN", "b/x.BIN")
