@@ -97,12 +97,21 @@ class Flights:
     def compared(self, calibrations: Sequence[Calibration]) -> Comparison | None:
         """What the accelerometers say of each other; None if there is nothing to compare.
 
+        Flights in which one of them contradicts others are left out.
+
         Args:
             calibrations: of the accelerometers, as the answers have them.
         """
-        told = [f for f in self._flights if all(map(f.calibrator.parameters.known, f.imus))]
+        odd = {
+            i
+            for c in calibrations
+            for i, flight in enumerate(self.answer(c.imu).flights if c.imu in self.imus else ())
+            if flight.contradicted
+        }
+        agreeing = [f for i, f in enumerate(self._flights) if i not in odd]
+        told = [f for f in agreeing if all(map(f.calibrator.parameters.known, f.imus))]
         try:
-            return compare(calibrations, [f.kept() for f in told or self._flights])
+            return compare(calibrations, [f.kept() for f in told or agreeing])
         except (ArithmeticError, ValueError):  # numbers that no model fits
             return None
 

@@ -1,8 +1,9 @@
-"""Recordings of one vehicle as one flight that is asked once: behind replay, explain and fleet.
+"""A recording as one flight that is asked once: behind replay, explain and fleet.
 
 What is read is only kept and cut into segments; timing and noise are the diagnosis' own, and
-estimating them while reading would be done twice.  A recording follows on the one before: what
-happened at a time happened in one of them.
+estimating them while reading would be done twice.  Recordings that are explained together are one
+flight, each following on the one before; a replay of several has one of these for each
+(:mod:`onboard.answers.flights`).
 """
 
 from __future__ import annotations

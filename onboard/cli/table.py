@@ -41,7 +41,12 @@ def replay_report(result: Replay) -> Iterator[RenderableType]:
         if answer.flights:
             yield from flights(answer.flights)
             yield Text()
-        yield _sentences(_about(calibration, result.autopilot, advice))
+        each = [
+            ("timing", f"{f.name}: {said}")
+            for f in answer.flights
+            if f.given is not None and (said := "; ".join(_timing(f.given.calibration.timing)))
+        ]
+        yield _sentences([*each, *_about(calibration, result.autopilot, advice)])
     if result.comparison is not None:
         yield Text()
         yield Text("Accelerometers compared: mean difference in flight, m/s^2")
