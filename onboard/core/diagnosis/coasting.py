@@ -27,7 +27,7 @@ from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELO
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace
-from onboard.core.filter.whitening import WhiteningFilter
+from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -56,9 +56,9 @@ class Contradiction:
 class AskingFilter(WhiteningFilter):
     """Notes what it expects of the fixes that it must not use."""
 
-    def __init__(self, unknowns: int, levels: NoiseLevels) -> None:
-        """Take the number of unknowns and the noise levels."""
-        super().__init__(unknowns, (levels,))
+    def __init__(self, unknowns: int, levels: NoiseLevels, uses: Uses) -> None:
+        """Take the number of unknowns, the noise levels and the measurements to use."""
+        super().__init__(unknowns, (levels,), uses)
         self.asked: list[Asked] = []
 
     def update(self, epoch: Epoch, theta: Array, covariance: Array) -> WhitenedInnovations | None:
@@ -107,11 +107,12 @@ def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[
         full.model,
         full.point,
         (levels,),
+        uses=full.uses,
         traces=True,
         theta=solution.theta,
         covariance=solution.covariance,
     )
-    made.filter = asking = AskingFilter(full.model.size, levels)
+    made.filter = asking = AskingFilter(full.model.size, levels, made.uses)
     traces: list[EpochTrace] = []
     for batch in full.batches:
         if batch.fresh:

@@ -25,7 +25,7 @@ from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
 from onboard.core.inputs.parameters import ParametersInForce
-from onboard.core.inputs.range_checks import impossible
+from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
@@ -102,6 +102,7 @@ class Calibrator:
 
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
+        sample = measured(sample)
         refusal = impossible(sample)
         if refusal is not None:
             if not isinstance(sample, ParameterValue):  # unset ones are NaN: nothing is lost

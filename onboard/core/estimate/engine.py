@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -90,7 +91,7 @@ class Engine:
         self.prior = prior
         self.point = point or Linearisation()
         self.noise = noise or NoiseLevels()
-        self.uses = uses or Uses()
+        self._uses = uses or Uses()
         self.batches: list[Batch] = []
         self.sample: Sequence[Sequence[Batch]] | None = None
         """Runs of batches on which timing and noise are found; None: the whole buffer."""
@@ -108,6 +109,14 @@ class Engine:
         self._seed: Solution | None = None
         self._pass = self._counting_pass()
         self._solution: Solution | None = None
+
+    @property
+    def uses(self) -> Uses:
+        """What the filter uses: a height that never changes in flight is not measured."""
+        heights = (batch.fixes.height for batch in self.batches)
+        if not self.batches or any(float(np.ptp(height)) > 0.0 for height in heights):
+            return self._uses
+        return replace(self._uses, height=False)
 
     def _model(self) -> Model:
         return calibration_model(self.point, self.prior, self.settings.needs, self._more)

@@ -7,6 +7,7 @@ Only what is physically impossible is refused; what is merely unlikely is judged
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 
@@ -24,6 +25,13 @@ MOST_PARAMETER = 1e30
 PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
 """Part of a name that begins with INS or AHRS, and what its magnitude stays below by far."""
 ACCELEROMETERS = range(1, 6)
+
+
+def measured(sample: Sample) -> Sample:
+    """The sample without what it says is no number: a receiver may have no vertical velocity."""
+    if isinstance(sample, GpsFix) and sample.v_d is not None and math.isnan(sample.v_d):
+        return replace(sample, v_d=None)
+    return sample
 
 
 def impossible(sample: Sample) -> str | None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.inputs.range_checks import impossible
+from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
     AttitudeSample,
     GpsFix,
@@ -61,6 +61,12 @@ def test_what_no_sensor_measures_is_refused_by_name(x):
         assert impossible(replace(sample, t=x)) is not None
     assert impossible(replace(SCALE, value=x)) == "parameter_impossible"
     assert impossible(replace(SCALE, value=20.0)) == "parameter_impossible"
+
+
+def test_a_receiver_without_vertical_velocity_is_believed_horizontally():
+    assert measured(replace(FIX, v_d=math.nan)) == replace(FIX, v_d=None)
+    for sample in (IMU, ATTITUDE, FIX, replace(FIX, v_d=None)):
+        assert measured(sample) is sample
 
 
 @pytest.mark.parametrize("imu", [0, -1, 6, 200])
