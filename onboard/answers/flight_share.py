@@ -20,11 +20,16 @@ from onboard.answers.answer import Answer
 from onboard.answers.recorded import NO_FLIGHT, Recorded
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibration_record import doubt_of, judged_by
+from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.merged_flights import Apart, FlightSix, flight_six
 from onboard.core.estimate.merged_record import of_raw
 from onboard.core.estimate.result import Calibration, Status
-from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.accelerometer import SixParameters, parameters_of
+from onboard.core.maths.arrays import vector3
+from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.effect import Bearing
 
+BESIDE = (Bearing.HARMLESS, Bearing.BESIDE)
 NOT_COMPARED = Apart(0.0, 0)
 HOVERED = "it hovered or stood: its numbers are those of the recorded attitude"
 
@@ -60,10 +65,10 @@ def share_of(
     given = recorded.answer(imu)
     c = given.calibration
     why = _why_not(recorded, given, imu)
-    said = None if why else flight_six(c)
+    engine = recorded.engine(imu)
+    said = None if why or engine is None else flight_six(c, _center(engine))
     if said is None:
         why = why or "it has no numbers"
-    engine = recorded.engine(imu)
     judged = c
     if said is None:
         pass
@@ -75,6 +80,14 @@ def share_of(
     return Share(given, said, judged, why)
 
 
+def _center(engine: Engine) -> SixParameters | None:
+    """Of the prior: what was in force when the flight began."""
+    if engine.prior is None:
+        return None
+    six = parameters_of(engine.prior)
+    return SixParameters(vector3(six[:3]), vector3(six[3:]))
+
+
 def _why_not(recorded: Recorded, given: Answer, imu: int) -> str:
     """Why a flight does not count, in words; empty if it does."""
     c, engine, diagnosis = given.calibration, recorded.engine(imu), given.diagnosis
@@ -82,7 +95,8 @@ def _why_not(recorded: Recorded, given: Answer, imu: int) -> str:
         return c.note.split(". ")[0].rstrip(".") or "it has no valid result"
     if engine is None or (solution := engine.solution()) is None:
         return c.note.split(". ")[0].rstrip(".") or NO_FLIGHT
-    if given.missing and not given.modelled and diagnosis.verdict is not Verdict.INSUFFICIENT:
+    beside = all(bearing_of(e.name) in BESIDE for e in diagnosis.effects)
+    if given.missing and not (diagnosis.verdict is Verdict.EXPLAINED and beside):
         return given.missing
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         m = diagnosis.mismatch

@@ -32,14 +32,15 @@ def agreement(answers: Sequence[FlightAnswer], found: Reconciled) -> str:
 def contradiction(answers: Sequence[FlightAnswer], found: Reconciled) -> str:
     """Which flights contradict each other, where nobody can say which of them are right."""
     odd = [f for f in answers if f.contradicted]
-    compared = sum(f.apart.dof > 0 for f in answers)
-    who = f"{_named(odd)} contradict each other"
-    if len(odd) < compared:
-        who = f"flights contradict each other, {_named(odd)} the rest"
+    if len(odd) == 1:
+        return (
+            f"{_named(odd)} contradicts the flights before it: it erred, or the sensor has "
+            "changed, and nobody can say which: nothing is averaged over them; fly once more"
+        )
     p = found.scatter
     return (
-        f"{who} (all flights: chi-square {p.chi_square:.0f} of {p.dof}), and nobody can say which "
-        "is right: nothing is averaged over them; fly once more"
+        f"{_named(odd)} contradict each other (all flights: chi-square {p.chi_square:.0f} of "
+        f"{p.dof}), and nobody can say which is right: nothing is averaged over them; fly once more"
     )
 
 

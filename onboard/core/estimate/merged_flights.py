@@ -100,7 +100,8 @@ class Reconciled:
     Attributes:
         counted: indices of the flights that agree and count; empty if nobody can say.
         contradicted: indices of those that are named for a contradiction.
-        apart: each flight against the others that count; against all others if none does.
+        apart: each flight against the others that count.  If none does: against all before the
+            last one where these agree, else against all others.
         scatter: of all flights.
         earlier: the contradicted ones were all flown before those that count.
     """
@@ -129,12 +130,17 @@ class Merged:
     inflation: float
 
 
-def flight_six(c: Calibration) -> FlightSix | None:
-    """What a flight says without its prior; None if it has no covariance."""
+def flight_six(c: Calibration, center: SixParameters | None = None) -> FlightSix | None:
+    """What a flight says without its prior; None if it has no covariance.
+
+    Args:
+        c: its calibration.
+        center: of its prior; None: the parameters in force.
+    """
     six, P = np.array(c.scale + c.offset), np.array(c.covariance, dtype=np.float64)
-    in_force = SixParameters(c.in_force_scale, c.in_force_offset)
+    before = center or SixParameters(c.in_force_scale, c.in_force_offset)
     sigma = np.array(c.prior_sigma)
-    found = [without_prior(c.imu, in_force, sigma, six, x) for x in (P - np.diag(FLOOR**2), P)]
+    found = [without_prior(c.imu, before, sigma, six, x) for x in (P - np.diag(FLOOR**2), P)]
     bare, floored = found
     if bare is None or floored is None:
         return None
@@ -177,9 +183,12 @@ def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:
     scatter = scatter_of(said)
     counted = every if not scatter.contradicted else _counting(said)
     others = counted or every
+    before = every[:-1]
+    if not counted and len(before) > 1 and not scatter_of(said[:-1]).contradicted:
+        others = before  # only the last one contradicts: it erred, or the sensor has changed
     apart = tuple(_against(said, i, others) for i in every)
-    if counted:
-        odd = tuple(i for i in every if i not in counted)
+    if others != every or counted:
+        odd = tuple(i for i in every if i not in others)
     else:
         odd = tuple(i for i in every if apart[i].contradicted)
         odd = odd or (min(every, key=lambda i: apart[i].p_value),)
