@@ -206,10 +206,12 @@ class _Sheet:
 
     def ribbon(self, ribbon: Ribbon) -> str:
         there = self._corners(ribbon.x, ribbon.high)
-        outline = "L".join(there + self._corners(ribbon.x, ribbon.low)[::-1])
-        if not outline:
-            return ""
-        return f'<path class="ribbon {escape(ribbon.kind)}" d="M{outline}Z"/>'
+        back = self._corners(ribbon.x, ribbon.low)
+        starts = [*np.flatnonzero(_begins(ribbon.x)).tolist(), len(there)]
+        outline = "".join(
+            f"M{'L'.join(there[a:b] + back[a:b][::-1])}Z" for a, b in itertools.pairwise(starts)
+        )
+        return f'<path class="ribbon {escape(ribbon.kind)}" d="{outline}"/>' if outline else ""
 
     def _corners(self, x: Array, y: Array) -> list[str]:
         return [
@@ -261,10 +263,14 @@ def _label(axis: str, side: str, share: float, value: float) -> str:
 
 
 def _path(px: Sequence[float], py: Sequence[float], x: Array) -> str:
+    corners = zip(_begins(x), px, py, strict=True)
+    return "".join(f"{'M' if begins else 'L'}{a:.1f} {b:.1f}" for begins, a, b in corners)
+
+
+def _begins(x: Array) -> NDArray[np.bool_]:
+    """(n,) where a curve begins anew: at its first point, and after a gap."""
     steps = np.diff(x)
     longest = max(LONGEST_STEP_S, 4.0 * float(np.median(steps))) if len(steps) else 0.0
-    out = []
-    for k, (a, b) in enumerate(zip(px, py, strict=True)):
-        begins = k == 0 or not 0.0 <= steps[k - 1] <= longest
-        out.append(f"{'M' if begins else 'L'}{a:.1f} {b:.1f}")
-    return "".join(out)
+    out = np.ones(len(x), dtype=bool)
+    out[1:] = ~((steps >= 0.0) & (steps <= longest))
+    return out
