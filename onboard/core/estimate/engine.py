@@ -18,6 +18,7 @@ import numpy as np
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.limits import (
     MOST_AGED,
+    MOST_ROUNDS,
     MOST_STATES,
     NEW_SHARE,
     NOISE_ROUNDS,
@@ -223,11 +224,13 @@ class Engine:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
 
         Args:
-            rounds: passes at the most.
+            rounds: passes at the most, while no level is far from where it belongs.
             noise_rounds: in how many of them a search for noise levels may begin.
         """
         search = NoiseSearch(noise_rounds)
-        for turn in range(rounds):
+        for turn in range(MOST_ROUNDS):
+            if turn >= rounds and not search.unfinished:
+                break
             made = self._new_pass(search.members(turn, self.noise))
             self._seed = solve(self._over_sample(made), self.model)
             point = moved(self.point, self.model, self._seed.theta)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.estimate.limits import SETTLED_LOG_RATIO
+from onboard.core.estimate.limits import FAR_LOG_RATIO, SETTLED_LOG_RATIO
 from onboard.core.filter.noise import (
     ESTIMATED,
     NoiseLevels,
@@ -25,14 +25,20 @@ class NoiseSearch:
         self._rounds = rounds
         self._target: NoiseLevels | None = None
         self._moving: Sequence[str] = ESTIMATED
+        self._far = False
         self._members: tuple[NoiseLevels, ...] | None = None
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether a search is under way, or the last one went so far that one more is due."""
+        return self._far or self._target is not None
 
     def members(self, turn: int, levels: NoiseLevels) -> tuple[NoiseLevels, ...] | None:
         """Levels of the bank in pass number ``turn``; None: only those that hold now."""
         self._members = None
         if self._target is not None:
             self._members = line_search(levels, self._target)
-        elif turn < self._rounds:
+        elif turn < self._rounds or self._far:
             self._members = stencil(levels, self._moving)
         return self._members
 
@@ -42,7 +48,10 @@ class NoiseSearch:
         if self._members is None:
             return levels
         if target is not None:
-            return self._members[int(np.argmax(log_likelihoods))]
+            best = self._members[int(np.argmax(log_likelihoods))]
+            self._far = distance(levels, best) > FAR_LOG_RATIO
+            return best
+        self._far = False
         found = stepped(levels, log_likelihoods, self._moving)
         self._moving = [
             name
