@@ -30,8 +30,8 @@ NOISE_ROUNDS: Final = ROUNDS - 1
 factor of four at the most [cost]."""
 SETTLED_LOG_RATIO: Final = 0.15
 """Noise levels closer than this are the same: only their order of magnitude matters [cost]."""
-FAR_LOG_RATIO: Final = 0.8
-"""A search that moves a level by more than this (a factor of 2.2) is followed by another: levels
+FAR_LOG_RATIO: Final = 0.6
+"""A search that moves a level by more than this (a factor of 1.8) is followed by another: levels
 trade with each other, and where one begins a factor of six away (a receiver with 0.3 m/s of noise)
 others first stand in for it, which costs most of what the flight tells [cost]."""
 MOST_ROUNDS: Final = 12

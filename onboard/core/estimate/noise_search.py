@@ -26,6 +26,7 @@ class NoiseSearch:
         self._target: NoiseLevels | None = None
         self._moving: Sequence[str] = ESTIMATED
         self._far = False
+        self._begun: NoiseLevels | None = None
         self._members: tuple[NoiseLevels, ...] | None = None
 
     @property
@@ -36,6 +37,7 @@ class NoiseSearch:
     def members(self, turn: int, levels: NoiseLevels) -> tuple[NoiseLevels, ...] | None:
         """Levels of the bank in pass number ``turn``; None: only those that hold now."""
         self._members = None
+        self._begun = self._begun or levels
         if self._target is not None:
             self._members = line_search(levels, self._target)
         elif turn < self._rounds or self._far:
@@ -49,7 +51,7 @@ class NoiseSearch:
             return levels
         if target is not None:
             best = self._members[int(np.argmax(log_likelihoods))]
-            self._far = distance(levels, best) > FAR_LOG_RATIO
+            self._far = self._went_far(levels, best)
             return best
         self._far = False
         found = stepped(levels, log_likelihoods, self._moving)
@@ -61,6 +63,14 @@ class NoiseSearch:
         if distance(levels, found) >= SETTLED_LOG_RATIO:
             self._target = found
         return levels
+
+    def _went_far(self, before: NoiseLevels, now: NoiseLevels) -> bool:
+        """Whether a level that is larger than it was thought to be has moved much.
+
+        One that becomes smaller than that is soon below all others, and matters no more.
+        """
+        moved = [(getattr(before, n), getattr(now, n), getattr(self._begun, n)) for n in ESTIMATED]
+        return any(max(a, b) > c and abs(np.log(b / a)) > FAR_LOG_RATIO for a, b, c in moved)
 
     def settled(self, before: NoiseLevels, now: NoiseLevels) -> bool:
         """Whether there is nothing more to try, and the levels have not moved."""
