@@ -26,6 +26,7 @@ EXAMPLES = """\
 \b
 onboard match flight.BIN
 onboard match simulation.BIN flight.BIN --json result.json
+onboard match flight.BIN --report flight.html
 onboard match flight.BIN --param sim.param --frame-out frame.json
 """
 TWO = 2
@@ -36,6 +37,7 @@ TWO = 2
     "logs", nargs=-1, required=True, metavar="[SIM] REAL", type=click.Path(path_type=Path)
 )
 @click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
+@click.option("--report", "report_file", metavar="FILE", help="Write one self-contained HTML page.")
 @click.option("--param", "param_file", metavar="FILE", help="Write settings of the simulator.")
 @click.option(
     "--frame-out", "frame_file", metavar="FILE", help="Write a frame file that SITL loads."
@@ -46,6 +48,7 @@ TWO = 2
 def match(
     logs: tuple[Path, ...],
     json_file: str | None,
+    report_file: str | None,
     param_file: str | None,
     frame_file: str | None,
     given_frame: str | None,
@@ -69,11 +72,16 @@ def match(
         raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
     if json_file is not None:
         write_json(match_document(result).to_json(), json_file)
+    if report_file is not None:
+        # jinja2 only when it is wanted.
+        from onboard.report.match import match_html
+
+        write_text(match_html(result), report_file)
     if param_file is not None:
         write_text(settings_text(result), param_file)
     if frame_file is not None:
         write_text(frame_text(result), frame_file)
-    if STANDARD_OUTPUT not in (json_file, param_file, frame_file):
+    if STANDARD_OUTPUT not in (json_file, report_file, param_file, frame_file):
         console = Console(highlight=False)
         for part in summary(result):
             console.print(part)

@@ -36,6 +36,20 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
+class Points:
+    """Single measurements: ``x``, ``y`` (n,), CSS class and words for the legend.
+
+    ``spread`` (n,), if there is one, is drawn as a bar up and down from each.
+    """
+
+    x: Array
+    y: Array
+    kind: str
+    label: str
+    spread: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Ribbon:
     """A filled area between two curves: ``x``, ``low``, ``high`` (n,), all finite."""
 
@@ -119,6 +133,7 @@ def line_chart(
     bands: Sequence[Band] = (),
     *,
     ribbons: Sequence[Ribbon] = (),
+    points: Sequence[Points] = (),
     x_label: str = "time",
     x_unit: str = "s",
     x_range: tuple[float, float] | None = None,
@@ -134,9 +149,10 @@ def line_chart(
     ``summary`` tells those who do not see the curves what they show.
     """
     drawn = [(*decimate(line.x, line.y), line) for line in lines]
-    xs = np.concatenate([x for x, _, _ in drawn]) if drawn else np.zeros(0)
-    ys = np.concatenate([y for _, y, _ in drawn]) if drawn else np.zeros(0)
-    if len(xs) == 0:
+    xs = np.concatenate([np.zeros(0), *(x for x, _, _ in drawn), *(p.x for p in points)])
+    ys = np.concatenate([np.zeros(0), *(y for _, y, _ in drawn), *(p.y for p in points)])
+    xs, ys = xs[np.isfinite(xs)], ys[np.isfinite(ys)]
+    if len(xs) == 0 or len(ys) == 0:
         return Markup('<p class="muted">{}: no data to draw.</p>').format(title)
     x0, x1 = x_range or (float(xs.min()), float(xs.max()))
     sheet = _Sheet(x0, x1 if x1 > x0 else x0 + 1.0, *(y_range or _range(ys, symmetric=symmetric)))
@@ -145,6 +161,7 @@ def line_chart(
     y_marks, y_labels = sheet.value_axis()
     shapes += [*x_marks, *y_marks]
     shapes += [sheet.ribbon(ribbon) for ribbon in ribbons]
+    shapes += [sheet.dots(p) for p in points]
     shapes += [sheet.curve(x, y, line.kind) for x, y, line in drawn]
     return Markup(
         "<figure><figcaption>{}{}</figcaption>"
@@ -217,6 +234,21 @@ class _Sheet:
         return [
             f"{self.px(float(a)):.1f} {self.py(float(b)):.1f}" for a, b in zip(x, y, strict=True)
         ]
+
+    def dots(self, points: Points) -> str:
+        """Strokes without length: round, and of one size however the drawing is stretched."""
+        kind = escape(points.kind)
+        seen = np.isfinite(points.x) & np.isfinite(points.y)
+        seen &= (points.x >= self.x0) & (points.x <= self.x1)
+        there = self._corners(points.x[seen], points.y[seen])
+        out = f'<path class="dots {kind}" d="{"".join(f"M{c}h0" for c in there)}"/>'
+        if points.spread is None:
+            return out
+        wide = np.nan_to_num(points.spread[seen])
+        low = self._corners(points.x[seen], points.y[seen] - wide)
+        high = self._corners(points.x[seen], points.y[seen] + wide)
+        bars = "".join(f"M{a}L{b}" for a, b in zip(low, high, strict=True))
+        return f'<path class="spread {kind}" d="{bars}"/>{out}'
 
     def curve(self, x: Array, y: Array, kind: str) -> str:
         d = _path([self.px(float(v)) for v in x], [self.py(float(v)) for v in y], x)

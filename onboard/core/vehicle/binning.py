@@ -8,6 +8,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.limits import CURVE_BINS
 
 FEWEST_IN_BIN = 5
+MOST_POINTS = 400
+"""Single steps that are kept of a curve, to be drawn [cost]."""
 
 
 def binned(x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -24,3 +26,12 @@ def binned(x: Array, y: Array) -> tuple[Array, Array, Array]:
             mean.append(float(np.mean(y[mine])))
             spread.append(float(np.std(y[mine])))
     return np.array(middle), np.array(mean), np.array(spread)
+
+
+def thinned(x: Array, y: Array) -> Array:
+    """(p, 2) even share of the points (n,) in order of x, the first and the last among them."""
+    order = np.argsort(x, kind="stable")
+    if len(order) > MOST_POINTS:
+        order = order[np.linspace(0, len(order) - 1, MOST_POINTS).astype(np.intp)]
+    out: Array = np.column_stack([x[order], y[order]])
+    return out

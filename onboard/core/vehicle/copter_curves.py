@@ -7,7 +7,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
-from onboard.core.vehicle.binning import FEWEST_IN_BIN, binned
+from onboard.core.vehicle.binning import FEWEST_IN_BIN, binned, thinned
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.records import Curve
 from onboard.core.vehicle.signals import Signals
@@ -48,6 +48,7 @@ def _drag(m: Matched, frame: CopterAirframe, axis: int) -> Curve:
         spread,
         law(x, c_m, k),
         law(x, frame.rotor_drag, frame.body_drag),
+        thinned(u, data),
     )
 
 
@@ -78,6 +79,7 @@ def _thrust(m: Matched, frame: CopterAirframe) -> Curve | None:
         spread,
         top * scale * ((1.0 - expo) * x + expo * x * x),
         top * ((1.0 - frame.propExpo) * x + frame.propExpo * x * x),
+        thinned(c, share),
     )
 
 
@@ -92,6 +94,6 @@ def _sag(m: Matched, frame: CopterAirframe, signals: Signals) -> Curve | None:
         return None
     x, mean, spread = binned(used[flown], b.x[flown, 0])
     nominal = np.full(len(x), frame.maxVoltage)
-    return Curve(
-        "sag", "charge taken", "Ah", "battery voltage", "V", x, mean, spread, mean.copy(), nominal
-    )
+    points = thinned(used[flown], b.x[flown, 0])
+    return Curve("sag", "charge taken", "Ah", "battery voltage", "V", x, mean, spread,
+                 mean.copy(), nominal, points)  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import NAN
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.battery import fitted_battery
 from onboard.core.vehicle.copter import (
@@ -84,7 +85,7 @@ def match_copter(
             other = matched(copter_model(flight, frame, force_sigma, other_form))
             if rms(other.held) < rms(found.held):
                 variant, found = other_form, other
-    before, after = drifts_of(found)
+    alone = drifts_of(found)
     effects = tuple(
         _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
     )
@@ -95,8 +96,9 @@ def match_copter(
         effects=effects,
         wind=wind_of(found),
         mismatch=mismatch_of(found),
-        alone_before=before,
-        alone_after=after,
+        alone_before=float(alone.before[-1]) if alone else NAN,
+        alone_after=float(alone.after[-1]) if alone else NAN,
+        alone=alone,
         ambiguous=ambiguous_of(found),
         not_testable=windless(untested, found),
         numbers=numbers_of(found),

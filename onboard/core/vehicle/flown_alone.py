@@ -9,8 +9,10 @@ from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import ALONE_EVERY_S, ALONE_S
 
 
-def drift_alone(flight: Flight, error_b: Array, slope: Array) -> float:
-    """RMS over the starts of the velocity error after :data:`ALONE_S`, m/s; NaN if none fits.
+def drift_alone(flight: Flight, error_b: Array, slope: Array) -> Array:
+    """(k,) RMS over the starts of the velocity error after each step, m/s; empty if none fits.
+
+    The last is that after :data:`ALONE_S`.
 
     The attitude is the recorded one; the model feels its own velocity: ``d(dv)/dt = R (e + G dv)``
     with the force's error e and its slope G over the velocity.
@@ -29,9 +31,10 @@ def drift_alone(flight: Flight, error_b: Array, slope: Array) -> float:
         and flight.t[k + length] - flight.t[k] < 1.2 * ALONE_S
     ]
     if not starts:
-        return float("nan")
+        return np.zeros(0)
     at = np.array(starts)
     drift = np.zeros((len(at), 3))
+    out = np.empty(length)
     for k in range(length):
         i = at + k
         R_nb = np.swapaxes(flight.R_bn[i], -1, -2)
@@ -39,4 +42,5 @@ def drift_alone(flight: Flight, error_b: Array, slope: Array) -> float:
         damped = np.eye(3) - h * R_nb @ slope[i]
         pushed = drift + h * np.einsum("nij,nj->ni", R_nb, error_b[i])
         drift = np.linalg.solve(damped, pushed[..., None])[..., 0]
-    return float(np.sqrt(np.mean(np.sum(drift**2, axis=1))))
+        out[k] = np.sqrt(np.mean(np.sum(drift**2, axis=1)))
+    return out

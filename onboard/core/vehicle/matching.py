@@ -13,6 +13,7 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.choices import Choices, Chosen, choose
 from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.flown_alone import drift_alone
@@ -27,6 +28,7 @@ from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import fitted_noise, gust_evidence
 from onboard.core.vehicle.places import AXES, places_of
 from onboard.core.vehicle.records import (
+    Alone,
     AxisMismatch,
     Compared,
     Difference,
@@ -165,19 +167,26 @@ def wind_of(m: Matched) -> WindEstimate:
     north, east = fit.theta[places].tolist()
     sigmas = fit.sigma[places].tolist()
     exponent, exponent_sigma = None, float("nan")
+    factor = np.ones(len(flight))
     if "wind_profile" in m.chosen.effects:
         k = m.model.indices("wind_profile")[0]
         exponent, exponent_sigma = float(fit.theta[k]), float(fit.sigma[k])
+        profile = _effect(m.model, "wind_profile")
+        if isinstance(profile, WindProfile):
+            factor = profile.factor(m.model.start(flight), exponent)
     numbers = np.unique(fit.block)
-    series, spread, when, heights, ekf = [], [], [], [], []
+    series, spread, when, heights, ekf, law = [], [], [], [], [], []
     for block, number in zip(fit.blocks, numbers, strict=False):
         mine = fit.block == number
         information = block.N[np.ix_(places, places)]
         if np.linalg.cond(information) > 1e8:
             continue
         covariance = np.linalg.inv(information) * fit.scale
-        series.append(fit.theta[places] + np.linalg.solve(information, block.b[places]))
-        spread.append(np.sqrt(np.diag(covariance)))
+        here = float(np.mean(factor[mine]))  # the unknown is the wind at the mean height
+        found = fit.theta[places] + np.linalg.solve(information, block.b[places])
+        series.append(here * found)
+        spread.append(here * np.sqrt(np.diag(covariance)))
+        law.append(here * fit.theta[places])
         when.append(float(np.mean(flight.t[mine]) - flight.t[0]))
         heights.append(float(np.mean(flight.height[mine]) - flight.ground))
         has = flight.ekf_wind.shape[1] == 2
@@ -196,6 +205,7 @@ def wind_of(m: Matched) -> WindEstimate:
         np.array(series).reshape(-1, 2),
         np.array(spread).reshape(-1, 2),
         np.array(ekf).reshape(-1, 2),
+        np.array(law).reshape(-1, 2),
     )
 
 
@@ -208,10 +218,14 @@ def mismatch_of(m: Matched) -> dict[str, AxisMismatch]:
     }
 
 
-def drifts_of(m: Matched) -> tuple[float, float]:
-    """Velocity that the nominal model and the found one drift in ten seconds alone, m/s."""
-    full = [_drift(m.model, m.model.nominal, m.nominal), _drift(m.model, m.fit.theta, m.held)]
-    return full[0], full[1]
+def drifts_of(m: Matched) -> Alone | None:
+    """How velocity drifts when the nominal model, and the found one, fly on alone."""
+    before = _drift(m.model, m.model.nominal, m.nominal)
+    after = _drift(m.model, m.fit.theta, m.held)
+    if not len(before):
+        return None
+    t: Array = m.model.flight.step_s * np.arange(1.0, len(before) + 1.0)
+    return Alone(t, before, after)
 
 
 def series_of(m: Matched) -> ForceSeries:
@@ -221,7 +235,8 @@ def series_of(m: Matched) -> ForceSeries:
     t = m.model.flight.t - m.model.flight.t[0]
     axes = tuple(AXES[m.model.axes[k]] for k in columns)
     before, after = measured - m.nominal[:, columns], measured - m.held[:, columns]
-    return ForceSeries(t, axes, measured, before, after)
+    speed = np.linalg.norm(m.model.flight.v_n, axis=1)
+    return ForceSeries(t, axes, measured, before, after, speed)
 
 
 def ambiguous_of(m: Matched) -> tuple[Ambiguity, ...]:
@@ -287,7 +302,7 @@ def _effect(model: ForceModel, name: str) -> Effect:
     return next(e for e in model.effects if e.name == name)
 
 
-def _drift(model: ForceModel, theta: Array, residual: Array) -> float:
+def _drift(model: ForceModel, theta: Array, residual: Array) -> Array:
     n = len(model.flight)
     error, slope = np.zeros((n, 3)), np.zeros((n, 3, 3))
     columns = [k for k, axis in enumerate(model.axes) if axis in FORCE]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.vehicle.binning import binned
+from onboard.core.vehicle.binning import binned, thinned
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.records import Curve
@@ -27,7 +27,7 @@ def plane_curves(m: Matched, frame: PlaneAirframe) -> tuple[Curve, ...]:
         fitted, nominal = c_lift_0 + c_lift_a * x, frame.c_lift_0 + frame.c_lift_a * x
         curves.append(
             Curve("lift", "angle of attack", "rad", "lift coefficient", "1", x, mean, spread,
-                  fitted, nominal)
+                  fitted, nominal, thinned(air.alpha[use], data[use]))
         )  # fmt: skip
     if 0 in model.axes and model.indices("drag"):
         profile, induced = theta[model.indices("drag")].tolist()
@@ -38,6 +38,6 @@ def plane_curves(m: Matched, frame: PlaneAirframe) -> tuple[Curve, ...]:
         fitted, nominal = profile + induced * x**2, frame.c_drag_p + frame.induced * x**2
         curves.append(
             Curve("drag", "lift coefficient", "1", "drag coefficient", "1", x, mean, spread,
-                  fitted, nominal)
+                  fitted, nominal, thinned(air.lift[use], data[use]))
         )  # fmt: skip
     return tuple(c for c in curves if len(c.x))

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import NAN
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.propulsion import Propulsion
@@ -55,7 +56,7 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     if len(flying) >= FEWEST_STEPS and float(np.linalg.norm(wind)) > 1.0:
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma))
-    before, after = drifts_of(found)
+    alone = drifts_of(found)
     effects = differences(found)
     manoeuvres = MANOEUVRES | {e.name: e.manoeuvre for e in found.model.effects if e.name}
     untested = not_testable_of(found, plane_missing(flying), manoeuvres)
@@ -64,8 +65,9 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         effects=effects,
         wind=wind_of(found),
         mismatch=mismatch_of(found),
-        alone_before=before,
-        alone_after=after,
+        alone_before=float(alone.before[-1]) if alone else NAN,
+        alone_after=float(alone.after[-1]) if alone else NAN,
+        alone=alone,
         ambiguous=ambiguous_of(found),
         not_testable=windless(untested, found),
         numbers=numbers_of(found),

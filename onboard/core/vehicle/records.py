@@ -69,7 +69,7 @@ class WindEstimate:
 
     ``series_*`` are estimates of blocks of flight: times (b,) s since the start, heights above
     ground (b,) m, components (b, 2) and their sigmas (b, 2); ``ekf`` (b, 2) is the autopilot's own
-    (NaN where it has none).
+    (NaN where it has none), ``law`` (b, 2) what one wind and its profile are there.
     """
 
     north: float
@@ -85,6 +85,7 @@ class WindEstimate:
     series: Array = field(default_factory=lambda: np.zeros((0, 2)))
     series_sigma: Array = field(default_factory=lambda: np.zeros((0, 2)))
     ekf: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    law: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ class Curve:
     """A law with the data that it was found from.
 
     ``x`` (k,) in ``x_unit``; ``data`` (k,) and its scatter ``spread`` (k,), ``fitted`` (k,) and
-    ``nominal`` (k,) in ``y_unit``.
+    ``nominal`` (k,) in ``y_unit``; ``points`` (p, 2) are single steps of the flight, x and data.
     """
 
     name: str
@@ -105,18 +106,30 @@ class Curve:
     spread: Array
     fitted: Array
     nominal: Array
+    points: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, slots=True)
 class ForceSeries:
     """Force along body axes at ``t`` (n,) s since the start: (n, k) each, m/s^2.
 
-    ``after`` is predicted by unknowns of the other parts of the flight.
+    ``after`` is predicted by unknowns of the other parts of the flight; ``speed`` (n,) is that over
+    ground, m/s, or empty.
     """
 
     t: Array
     axes: tuple[str, ...]
     measured: Array
+    before: Array
+    after: Array
+    speed: Array = field(default_factory=lambda: EMPTY)
+
+
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """RMS of the velocity error at ``t`` (k,) s after the model was left alone, m/s: (k,) each."""
+
+    t: Array
     before: Array
     after: Array
 
@@ -141,6 +154,7 @@ class VehicleMatch:
         alone_before: RMS of the velocity that the nominal model gains or loses in ten seconds
             alone, m/s.
         alone_after: the same of the model that was found.
+        alone: how the two grow over these ten seconds; None where no stretch is that long.
         ambiguous: what cannot be told apart.
         not_testable: what this flight could not have shown.
         numbers: every unknown of the model, ``effect.unknown`` to value, sigma and nominal.
@@ -158,6 +172,7 @@ class VehicleMatch:
     mismatch: Mapping[str, AxisMismatch] = field(default_factory=dict)
     alone_before: float = NAN
     alone_after: float = NAN
+    alone: Alone | None = None
     ambiguous: tuple[Ambiguity, ...] = ()
     not_testable: tuple[NotTestable, ...] = ()
     numbers: Mapping[str, Compared] = field(default_factory=dict)
