@@ -13,10 +13,10 @@ from onboard.answers.words import (
     number,
     percent,
     unit_in_words,
-    with_sigma,
 )
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.physics.catalogue import kind_of, title_of
+from onboard.core.physics.wording import places
 from onboard.core.vehicle.places import AXES
 from onboard.core.vehicle.records import Compared, Difference, NotTestable, Place
 
@@ -43,8 +43,11 @@ ALIKE = 0.005
 
 
 def whole(value: float, sigma: float, unit: str = "") -> str:
-    """A number with its sigma and unit, as people read it."""
-    return f"{with_sigma(value, sigma)} {unit_in_words(unit)}".rstrip()
+    """A number with its sigma to the first digit of that, and unit, as people read it."""
+    if not math.isfinite(sigma) or sigma <= 0.0:
+        return f"{number(value)} {unit_in_words(unit)}".rstrip()
+    digits = places(sigma)
+    return f"{fixed(value, digits)} ± {fixed(sigma, digits)} {unit_in_words(unit)}".rstrip()
 
 
 def wind_from(north: float, east: float) -> float:
@@ -110,7 +113,7 @@ def _from(north: float, east: float) -> str:
 def _profile(v: Values) -> str:
     p = v["exponent"]
     theirs = "does not" if p.simulation == 0.0 else f"has {number(p.simulation)}"
-    size = with_sigma(p.real, p.sigma)
+    size = whole(p.real, p.sigma)
     return (
         f"The wind grows with height (as height to the power {size}); the simulation's {theirs}. "
         f"Four times as high, it is {4.0**p.real:.1f} times as strong."
@@ -132,23 +135,16 @@ def _rotor_drag(v: Values) -> str:
 
 
 def _body_drag(v: Values) -> str:
-    said = []
-    for axis, way in (("x", "forward"), ("y", "sideways")):
-        a = v.get(f"area_by_mass_{axis}")
-        if a is None:
-            continue
-        if abs(a.real) < 2.0 * a.sigma:
-            said.append(f"none {way} ({_against(a)})")
-        else:
-            said.append(f"{_times(a)} in the simulation {way}")
-    sizes = [
-        f"{axis} {whole(v[f'area_by_mass_{axis}'].real, v[f'area_by_mass_{axis}'].sigma)}"
-        for axis in "xy"
-        if f"area_by_mass_{axis}" in v
-    ]
-    same = len(said) == 2 and len({s.rsplit(" ", 1)[0] for s in said}) == 1
-    how = said[0].rsplit(" ", 1)[0] + " both ways" if same else " and ".join(said)
-    return f"The body brakes {how} (drag area by mass: {listed(sizes)} m²/kg)."
+    areas = {axis: v[f"area_by_mass_{axis}"] for axis in "xy"}
+    hows = {
+        axis: f"{_times(a)} in the simulation" if a.real > 2.0 * a.sigma else "not at all"
+        for axis, a in areas.items()
+    }
+    sizes = [f"{axis} {whole(a.real, a.sigma)} m²/kg" for axis, a in areas.items()]
+    how = f"{hows['x']} forward and {hows['y']} sideways"
+    if hows["x"] == hows["y"]:
+        how = f"{hows['x']}, forward and sideways"
+    return f"The body brakes {how} (drag area by mass: {listed(sizes)})."
 
 
 def _thrust_scale(v: Values) -> str:
@@ -195,7 +191,9 @@ def _tilt(v: Values) -> str:
         if abs(t.real) > 2.0 * t.sigma:
             size = whole(math.degrees(abs(t.real)), math.degrees(t.sigma))
             parts.append(f"{size}° {ways[0 if t.real > 0.0 else 1]}")
-    return f"The rotors do not pull straight up: they lean {listed(parts) or 'a little'}."
+    return (
+        f"The rotors do not pull straight up: they lean {listed(parts) if parts else 'a little'}."
+    )
 
 
 def _ground(v: Values) -> str:
@@ -213,7 +211,8 @@ def _density(v: Values) -> str:
 def _coefficients(what: str, names: Mapping[str, str]) -> Callable[[Values], str]:
     def say(v: Values) -> str:
         told = [
-            f"{meaning} {whole(v[key].real, v[key].sigma)} ({_against(v[key])})"
+            f"{meaning} {whole(v[key].real, v[key].sigma)}, {_times(v[key])} "
+            f"the simulation's {number(v[key].simulation)}"
             for key, meaning in names.items()
             if key in v and _apart(v[key])
         ]
@@ -250,13 +249,15 @@ SENTENCES: Mapping[str, Callable[[Values], str]] = {
     "ground_effect": _ground,
     "air_density": _density,
     "lift": _coefficients(
-        "The wing lifts otherwise", {"c_lift_0": "at zero angle", "c_lift_a": "per radian"}
+        "The wing lifts unlike the simulation's",
+        {"c_lift_0": "at zero angle", "c_lift_a": "per radian"},
     ),
     "drag": _coefficients(
-        "The air brakes otherwise", {"c_drag_p": "profile drag", "induced": "drag by lift"}
+        "The air brakes unlike the simulation's",
+        {"c_drag_p": "profile drag", "induced": "drag by lift"},
     ),
     "side_force": _coefficients(
-        "The air pushes to the side otherwise",
+        "The air pushes to the side unlike the simulation's",
         {"c_y_b": "per radian of sideslip", "c_y_deltar": "at full rudder"},
     ),
     "airspeed_scale": _airspeed,
@@ -285,7 +286,7 @@ def where(p: Place, speed: float = math.nan) -> str:
     regime = REGIME_WORDS.get(p.regime, p.regime)
     pace = f" at {speed:.0f} m/s" if math.isfinite(speed) else ""
     axis = AXIS_WORDS.get(p.axis, p.axis.replace("_", " "))
-    share = f", {percent(p.share)} of it" if math.isfinite(p.share) else ""
+    share = f", {percent(p.share)} of the effect" if math.isfinite(p.share) else ""
     return f"{span}: {regime}{pace}, mostly {axis}{share}"
 
 

@@ -18,6 +18,8 @@ from onboard.report.page import render
 
 TEMPLATE = "match.html.j2"
 MOST_PLACES = 3
+LEAST_SHARE = 0.005
+"""Less is no per cent, and not said."""
 OF_EFFECT = {
     "rotor_drag": ("drag_x", "drag_y"),
     "body_drag": ("drag_x", "drag_y"),
@@ -62,7 +64,7 @@ def match_html(match: Match) -> str:
         wind=wind_sentence(match),
         winds=[] if wind is None else match_charts.of_wind(wind),
         autopilot_wind=wind is not None and match_charts.has_ekf(wind),
-        curves=[_curve(c, match) for c in v.curves],
+        curves=[_curve(c, match) for c in v.curves if match_charts.tells(c)],
         settings=[
             {
                 "name": s.name,
@@ -109,10 +111,10 @@ def _card(d: Difference, v: VehicleMatch) -> dict[str, Any]:
         "title": words.capital(title(d.name)),
         "name": d.name,
         "level": d.level,
-        "share": words.percent(d.share) if math.isfinite(d.share) else "",
+        "share": words.percent(d.share) if d.share >= LEAST_SHARE else "",
         "sentence": story.sentence(d),
         "rows": [_row(key, value) for key, value in d.values.items()],
-        "fit": _pair("Not used in the fit", unit, d.held_out_before, d.held_out_after)
+        "fit": _pair("Error without and with it", unit, d.held_out_before, d.held_out_after)
         if known
         else None,
         "where": [
@@ -141,7 +143,7 @@ def _row(key: str, value: Compared) -> dict[str, str]:
 def _pair(
     label: str, unit: str, before: float, after: float, longest: float | None = None
 ) -> dict[str, Any]:
-    one, two = words.number(before), words.number(after)
+    one, two = words.number(before, 2), words.number(after, 2)
     longest = max(before, after) if longest is None else longest
     said = f"{label}: {one} before, {two} after, {unit}"
     return {

@@ -30,6 +30,7 @@ X_LABELS = {
     "drag_y": "air-relative speed along y",
     "thrust": "command of the motors, 0 to 1",
 }
+LEAST_SAG_V = 0.2
 LEAST_WIND_M_S = 0.3
 """Below, a wind has no direction to speak of."""
 
@@ -46,13 +47,23 @@ def of_forces(v: VehicleMatch, marks: list[Band]) -> list[Markup]:
     if s is None:
         return []
     out = []
+    # One scale for all: where nothing differs, nothing should seem to.
+    errors = np.abs(np.concatenate([s.measured - s.before, s.measured - s.after]))
+    most = 1.1 * float(np.percentile(errors[np.isfinite(errors)], 99.7)) or 1.0
     for k, axis in enumerate(s.axes):
         before, after = s.measured[:, k] - s.before[:, k], s.measured[:, k] - s.after[:, k]
         told = f"{words.number(rms(before))} m/s² before, {words.number(rms(after))} m/s² after"
         lines = [Line(s.t, before, "before", "before"), Line(s.t, after, "after", "after")]
         title = AXIS_WORDS.get(axis, axis)
         out.append(
-            line_chart(title, "m/s²", lines, marks, summary=f"{told}, root mean square"),
+            line_chart(
+                title,
+                "m/s²",
+                lines,
+                marks,
+                y_range=(-most, most),
+                summary=f"{told}, root mean square",
+            )
         )
     return out
 
@@ -155,6 +166,11 @@ def of_wind(wind: WindEstimate) -> list[Markup]:
 def has_ekf(wind: WindEstimate) -> bool:
     """Whether the autopilot has a wind of its own."""
     return bool(len(wind.ekf) and np.isfinite(wind.ekf).all(axis=1).any())
+
+
+def tells(c: Curve) -> bool:
+    """Whether a curve has something to show: a battery that stays full has not."""
+    return c.name != "sag" or float(np.ptp(c.data)) > LEAST_SAG_V
 
 
 def of_curve(c: Curve) -> Markup:

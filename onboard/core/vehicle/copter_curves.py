@@ -65,8 +65,9 @@ def _thrust(m: Matched, frame: CopterAirframe) -> Curve | None:
     top = frame.full_thrust
     c = air.commands[:, 0]
     column = model.axes.index(2)
-    power = np.maximum((1.0 - expo) * c + expo * air.commands[:, 1], 1e-3)
-    share = top * scale * power - m.fit.residual[:, column] * power / np.maximum(air.power, 1e-3)
+    # As if every motor had the mean command: what they differ by bends the law.
+    level = (1.0 - expo) * c + expo * c * c
+    share = level * (top * scale - m.fit.residual[:, column] / np.maximum(air.power, 1e-3))
     x, mean, spread = binned(c, share)
     return Curve(
         "thrust",

@@ -1,0 +1,138 @@
+"""The page of a match: what it says is what the JSON says, and it needs nothing but itself."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.answers import match_story as story
+from onboard.answers import words
+from onboard.answers.match_document import match_document
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.vehicle.records import Compared, Difference, VehicleMatch, WindEstimate
+from onboard.report.match import match_html
+from tests.report.html_page import Page
+from tests.report.matches_by_hand import ROTORS, WIND, by_hand
+
+
+def page(**changes: object) -> Page:
+    return Page.of(match_html(by_hand(**changes)))
+
+
+def test_every_part_of_the_story_is_there():
+    said = page().words
+    for heading in (
+        "What differs",
+        "Before and after, on flight not used in the fit",
+        "Where it differs",
+        "By speed over ground",
+        "Wind over height",
+        "Laws and their data",
+        "Settings for the simulator",
+        "Could not be told apart",
+        "What this flight cannot tell",
+        "Fly this to find out",
+    ):
+        assert heading in said, heading
+    assert "Hover at half a metre." in said
+    assert "not flown near the ground" in said
+    assert "10 to 22 s: turning at 5 m/s, mostly to the sides" in said
+
+
+def test_it_asks_for_nothing_outside_itself():
+    html = match_html(by_hand())
+    tags = Page.of(html).tags
+    assert not {"script", "link", "img", "iframe", "object"} & {tag for tag, _ in tags}
+    for _, attributes in tags:
+        assert not {"src", "href", "onload", "onclick"} & set(attributes)
+    assert not re.search(r"https?:|url\(|@import", html)
+
+
+def test_names_of_files_and_numbers_of_others_are_escaped():
+    html = match_html(by_hand(name="<script>alert(1)</script>.BIN", note="a < b & c"))
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+    assert "a &lt; b &amp; c" in html
+
+
+def test_numbers_are_those_of_the_document():
+    match = by_hand()
+    said = Page.of(match_html(match)).words
+    document = json.loads(match_document(match).to_json())
+    for axis in ("x", "y"):
+        m = document["mismatch"][axis]
+        assert f"{words.number(m['before'], 2)} → {words.number(m['after'], 2)} m/s²" in said
+    alone = document["mismatch"]["velocity_after_10s"]
+    assert f"{words.number(alone['before'], 2)} → {words.number(alone['after'], 2)} m/s" in said
+    for effect in document["effects"]:
+        assert effect["name"] in said
+        for value in effect["values"].values():
+            shown = [w.replace("−", "-") for w in re.findall(r"−?\d+\.\d+", said)]
+            assert any(abs(float(w) - value["real"]) < value["sigma"] / 2.0 for w in shown)
+    for name, value in document["settings"].items():
+        assert f"{name} {words.setting(value)}" in said
+
+
+def test_a_flight_that_agrees_has_no_cards_and_nothing_to_set():
+    said = page(effects=(), ambiguous=()).words
+    assert "Nothing: the simulation's airframe flies like this recording." in said
+    assert "Settings for the simulator" not in said
+    assert "Could not be told apart" not in said
+
+
+def test_a_recording_without_anything_is_still_a_page():
+    nothing = by_hand(effects=())
+    empty = VehicleMatch("unknown", not_testable=nothing.not_testable, note="no GPS")
+    match = replace(nothing, vehicle=empty, verdict=Verdict.INSUFFICIENT)
+    said = Page.of(match_html(match)).words
+    assert "no GPS" in said
+    assert "This recording says too little" in said
+    assert "nan" not in said.lower().split()
+
+
+def test_a_number_that_is_not_known_is_not_drawn():
+    bare = WindEstimate(1.0, 2.0, np.nan, np.nan, 10.0)
+    odd = replace(WIND, held_out_before=np.nan, share=np.nan)
+    html = match_html(by_hand(wind=bare, alone=None, effects=(odd,)))
+    assert "NaN" not in html
+    assert ">nan" not in html
+    Page.of(html)
+
+
+def test_one_scale_for_all_axes():
+    """Where nothing differs, nothing should seem to."""
+    charts = [t for t in page().tags if t[0] == "path" and (t[1].get("class") or "") == "grid"]
+    assert charts
+    html = match_html(by_hand())
+    figures = re.findall(r"<figure>.*?</figure>", html, re.S)
+    of_forces = [f for f in figures if "(x)" in f or "(y)" in f]
+    marks = [re.findall(r'class="tick y"[^>]*>([^<]+)<', f) for f in of_forces]
+    assert len(marks) == 2
+    assert marks[0] == marks[1]
+
+
+@pytest.mark.parametrize("name", [n for n in story.SENTENCES if n != "wind"])
+def test_every_effect_has_a_sentence_even_with_numbers_that_nobody_expects(name):
+    odd = Difference(name, "vehicle", {"strange": Compared(1.0, 2.0, 0.1, "m")})
+    assert "strange 2.0 ± 0.1 m" in story.sentence(odd) or "unlike" in story.sentence(odd)
+
+
+def test_sentences_say_what_a_pilot_asks():
+    assert story.sentence(WIND) == (
+        "The wind was 5.00 ± 0.02 m/s from 307°; the simulation's air stands still."
+    )
+    assert "2.0 times as much as in the simulation: 0.497 ± 0.003" in story.sentence(ROTORS)
+    tilt = Difference(
+        "thrust_tilt",
+        "vehicle",
+        {"x": Compared(0.0, 0.0599, 0.001, "rad"), "y": Compared(0.0, 0.0001, 0.001, "rad")},
+    )
+    assert story.sentence(tilt).endswith("they lean 3.43 ± 0.06° forward.")
+    lag = Difference("motor_lag", "vehicle", {"time_constant": Compared(0.0, 0.06, 0.003, "s")})
+    assert "60 ± 3 ms late" in story.sentence(lag)
+    late = Difference("gps_latency", "sensor", {"delay": Compared(0.1, 0.22, 0.004, "s")})
+    assert "0.220 ± 0.004 s (simulation 0.100 s)" in story.sentence(late)
