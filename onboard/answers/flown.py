@@ -34,6 +34,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans
 from onboard.core.vehicle.trajectory import Sensors
+from onboard.recordings.recording import Recording
 
 FASTEST_HZ = 100.0
 """Inertial samples beyond this rate are averaged: no vehicle's force changes faster [physics]."""
@@ -52,8 +53,9 @@ class Flown:
     A reader for :func:`onboard.answers.replay.read`.
     """
 
-    def __init__(self, imu: int = 1) -> None:
-        """Take which accelerometer to look at."""
+    def __init__(self, imu: int = 1, *, airborne: bool = False) -> None:
+        """Take which accelerometer to look at, and whether all of it is flight."""
+        self.airborne = airborne
         self.recorded = Recorded((imu,))
         self.imu = imu
         self._kept: list[Sample] = []
@@ -96,7 +98,8 @@ class Flown:
             t = np.array([f.t for f in fixes])
             v = np.array([(f.v_n, f.v_e, f.v_d or 0.0) for f in fixes])
             height = np.array([f.altitude for f in fixes])
-            self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")
+            if not self.airborne:
+                self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")
             self.ground = float(np.percentile(height, 0.5))
         step = _averaged_over(self._kept)
         for sample in _with_landings(_slower(self._kept, step), self.grounded):
@@ -161,7 +164,10 @@ class FlownRecording:
 
 
 def flown(
-    path: str | Path, *, imu: int | None = None, progress: Callable[[float], None] | None = None
+    path: str | Path | Recording,
+    *,
+    imu: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> FlownRecording:
     """Read a recording and ask its sensor level.
 
@@ -169,7 +175,7 @@ def flown(
         RecordingError: a file that cannot be used.
     """
     wanted = imu or 1
-    collected = Flown(wanted)
+    collected = Flown(wanted, airborne=isinstance(path, Recording) and path.airborne)
     source = read([path], collected, imu=imu, progress=progress)
     if wanted in collected.imus:
         diagnosis = collected.answer(wanted).diagnosis

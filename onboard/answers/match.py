@@ -25,6 +25,7 @@ from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Stream
 from onboard.core.vehicle.trajectory import motions
+from onboard.recordings.recording import Recording
 
 PLANES = ("plane",)
 COPTERS = ("copter",)
@@ -81,8 +82,8 @@ class Match:
 
 
 def match(
-    real: str | Path,
-    simulation: str | Path | None = None,
+    real: str | Path | Recording,
+    simulation: str | Path | Recording | None = None,
     *,
     frame: Mapping[str, object] | None = None,
     progress: Callable[[float], None] | None = None,
@@ -90,7 +91,7 @@ def match(
     """Compare a real recording with a simulation's, or with an airframe.
 
     Args:
-        real: the recording of the real flight.
+        real: the recording of the real flight, a file or opened already.
         simulation: a recording of the simulation's like flight; None: the nominal airframe.
         frame: keys of a frame or coefficient file to compare with; ArduPilot's default without.
         progress: told the share of the reading that is done.

@@ -195,7 +195,7 @@ def replay(
 
 
 def read(
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path | Recording],
     reader: Reader,
     *,
     imu: int | None = None,
@@ -204,7 +204,7 @@ def read(
     """Feed files, one after the other, to one reader.
 
     Args:
-        paths: at least one recording, all of the same vehicle.
+        paths: at least one recording, all of the same vehicle; files, or opened already.
         reader: a fresh one; restarted between files, finished after the last.
         imu: an accelerometer that must be there.
         progress: called every few thousand samples.
@@ -215,7 +215,7 @@ def read(
     """
     if not paths:
         raise UsageError("no recording given")
-    recordings = tuple(open_recording(path) for path in paths)
+    recordings = tuple(p if isinstance(p, Recording) else open_recording(p) for p in paths)
     _refuse_repetition(recordings)
     _refuse_mixture(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)

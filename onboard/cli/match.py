@@ -21,15 +21,19 @@ from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.diagnosis.records import Verdict
 from onboard.errors import RecordingError, UsageError
+from onboard.recordings.recording import Recording
+from onboard.recordings.table import open_table
 
 EXAMPLES = """\
 \b
 onboard match flight.BIN
 onboard match simulation.BIN flight.BIN --json result.json
 onboard match flight.BIN --report flight.html
+onboard match flight.csv --columns columns.toml
 onboard match flight.BIN --param sim.param --frame-out frame.json
 """
 TWO = 2
+TABLE = ".csv"
 
 
 @click.command(epilog=EXAMPLES)
@@ -43,6 +47,12 @@ TWO = 2
     "--frame-out", "frame_file", metavar="FILE", help="Write a frame file that SITL loads."
 )
 @click.option(
+    "--columns",
+    "columns_file",
+    metavar="FILE",
+    help="Recordings that end in .csv are tables; FILE says what their columns are.",
+)
+@click.option(
     "--frame", "given_frame", metavar="FILE", help="Compare with this frame file of SITL."
 )
 def match(
@@ -52,6 +62,7 @@ def match(
     param_file: str | None,
     frame_file: str | None,
     given_frame: str | None,
+    columns_file: str | None,
 ) -> None:
     """Make the simulator fly like the recording.
 
@@ -62,10 +73,11 @@ def match(
     if len(logs) > TWO:
         raise UsageError("match takes one recording, or a simulation's and a real one")
     frame = None if given_frame is None else _frame(given_frame)
-    simulation = logs[0] if len(logs) == TWO else None
+    opened = [_opened(log, columns_file) for log in logs]
+    simulation = opened[0] if len(logs) == TWO else None
     try:
         with reading(logs, then="comparing vehicles") as progress:
-            result = match_recordings(logs[-1], simulation, frame=frame, progress=progress)
+            result = match_recordings(opened[-1], simulation, frame=frame, progress=progress)
     except ValueError as error:
         raise UsageError(f"--frame {given_frame}: {error}") from None
     if result.vehicle.series is None and result.verdict is Verdict.INSUFFICIENT:
@@ -85,6 +97,19 @@ def match(
         console = Console(highlight=False)
         for part in summary(result):
             console.print(part)
+
+
+def _opened(log: Path, columns: str | None) -> Path | Recording:
+    """A table by its column map; other recordings are opened by their content.
+
+    Raises:
+        UsageError: a table without a map, or one that cannot be used.
+    """
+    if log.suffix.lower() != TABLE:
+        return log
+    if columns is None:
+        raise UsageError(f"{log}: a table needs --columns: what its columns are")
+    return open_table(log, columns)
 
 
 def _frame(file: str) -> Mapping[str, object]:

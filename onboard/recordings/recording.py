@@ -19,9 +19,10 @@ LONGEST_GAP_S = 3600.0
 class Recording:
     """One opened file.
 
-    ``kind`` is ``tlog``, ``dataflash`` or ``ulog``; ``autopilot`` is ``ardupilot``, ``px4`` or
-    ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples, restarts
+    ``kind`` is ``tlog``, ``dataflash``, ``ulog`` or ``table``; ``autopilot`` is ``ardupilot``,
+    ``px4`` or ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples, restarts
     excluded; ``counts`` has the number of messages that are read, by their name in the file;
+    ``airborne``: whether all of it is flight, so that no ground is to be looked for;
     ``damage`` says in plain words what was skipped and ``notes`` what was chosen.
     """
 
@@ -33,6 +34,7 @@ class Recording:
     read: Callable[[], Iterator[Sample]] = field(repr=False)
     damage: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    airborne: bool = False
 
     def samples(self) -> Iterator[Sample]:
         """Every sample in the order of the file; each call starts from the beginning."""

@@ -108,7 +108,7 @@ def test_one_scale_for_all_axes():
     charts = [t for t in page().tags if t[0] == "path" and (t[1].get("class") or "") == "grid"]
     assert charts
     html = match_html(by_hand())
-    figures = re.findall(r"<figure>.*?</figure>", html, re.S)
+    figures = re.findall(r"<figure>.*?</figure>", html, re.DOTALL)
     of_forces = [f for f in figures if "(x)" in f or "(y)" in f]
     marks = [re.findall(r'class="tick y"[^>]*>([^<]+)<', f) for f in of_forces]
     assert len(marks) == 2

@@ -1,0 +1,289 @@
+"""A table of any laboratory (CSV) as a recording, by a column map.
+
+Motion capture, a simulator of one's own, another autopilot: whatever has time, attitude, specific
+force and velocity or position can be asked.  An empty cell is no measurement, so that quantities of
+different rates fit into one table.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from heapq import merge
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.inputs.samples import (
+    AirData,
+    AttitudeSample,
+    Battery,
+    GpsFix,
+    ImuSample,
+    Outputs,
+    Sample,
+    VehicleState,
+)
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import (
+    euler_from_rotation,
+    interpolate_rotation,
+    rotation_from_euler,
+    rotation_from_quaternion,
+    vector_from_rotation,
+)
+from onboard.errors import RecordingError
+from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.table_map import TableMap, load_map
+
+DELIMITERS = ",;\t"
+FEWEST_ROWS = 20
+EARTH_RADIUS_M = 6_371_000.0
+SLOPE_S = 0.1
+"""Span over which a position becomes a velocity, s: longer than the noise of motion capture,
+shorter than a manoeuvre."""
+TURN_S = 0.02
+"""Span over which an attitude becomes rates, s, where there is no gyroscope."""
+SMALLEST = 1e-6
+"""Length of a quaternion that is none."""
+NO_NUMBERS = ("", "nan", "null", "none", "na")
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """One quantity at its own times: ``t`` (n,) s, ``x`` (n, k)."""
+
+    t: Array
+    x: Array
+
+
+def open_table(path: str | Path, columns: str | Path) -> Recording:
+    """Open a CSV table with a column map.
+
+    Raises:
+        RecordingError: the table cannot be read, lacks a column, or holds too little; names both.
+        ConfigurationError: the map cannot be used.
+    """
+    path, chosen = Path(path), load_map(columns)
+    wanted = list(dict.fromkeys(c for q in chosen.quantities.values() for c in q.columns))
+    cells = _read(path, wanted)
+    tracks = _tracks(path, cells, chosen)
+    samples = _samples(tracks, chosen)
+    counts = {name: len(track.t) for name, track in tracks.items()}
+    return Recording(
+        path,
+        "table",
+        "unknown",
+        elapsed_s(tracks["force"].t),
+        counts,
+        lambda: iter(samples()),
+        notes=(f"columns as {Path(columns).name} says",),
+        airborne=chosen.airborne,
+    )
+
+
+def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
+    """The wanted columns, NaN where a cell holds no number."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head = file.readline().lstrip("# ")
+            delimiter = max(DELIMITERS, key=head.count)
+            names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter), [])]
+            missing = [name for name in wanted if name not in names]
+            if missing:
+                there = ", ".join(names[:20])
+                raise RecordingError(f"{path}: has no column {missing[0]!r} (there: {there})")
+            places = [names.index(name) for name in wanted]
+            rows = [
+                [_cell(row[k]) if k < len(row) else np.nan for k in places]
+                for row in csv.reader(file, delimiter=delimiter)
+                if row
+            ]
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{path}: no table of text ({error})") from None
+    if len(rows) < FEWEST_ROWS:
+        raise RecordingError(f"{path}: {len(rows)} rows are no flight")
+    every = np.array(rows, dtype=np.float64)
+    return {name: every[:, k] for k, name in enumerate(wanted)}
+
+
+def _cell(text: str) -> float:
+    """A number, or NaN: what is no number is no measurement."""
+    text = text.strip()
+    if text.lower() in NO_NUMBERS:
+        return float("nan")
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, Track]:
+    """Each quantity in SI at the rows that have all of it, in order of time."""
+    clock = chosen.quantities["time"]
+    t = clock.factor * cells[clock.columns[0]]
+    out: dict[str, Track] = {}
+    for name, quantity in chosen.quantities.items():
+        if name == "time":
+            continue
+        x = quantity.factor * np.column_stack([cells[c] for c in quantity.columns])
+        seen = np.isfinite(x).all(axis=1) & np.isfinite(t)
+        its, first = np.unique(t[seen], return_index=True)
+        if name in ("attitude", "force", "velocity", "position") and len(its) < FEWEST_ROWS:
+            where = ", ".join(quantity.columns)
+            raise RecordingError(f"{path}: {len(its)} rows with a number in {where} are no flight")
+        out[name] = Track(its, x[seen][first])
+    # The clock starts at zero: nanoseconds since 1970 would leave no digits for a difference.
+    zero = min(float(track.t[0]) for track in out.values() if len(track.t))
+    out = {name: Track(track.t - zero, track.x) for name, track in out.items()}
+    if float(np.median(np.diff(out["force"].t))) > 1.0:
+        where = ", ".join(clock.columns)
+        raise RecordingError(f"{path}: rows over a second apart; is the unit of {where} right?")
+    return out
+
+
+def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterator[Sample]]:
+    """What reads the tracks as samples in order of time."""
+    R_nb = _rotations(tracks["attitude"], chosen)
+    t = tracks["attitude"].t
+    streams: list[list[Sample]] = [
+        [VehicleState(0.0, armed=True, kind=chosen.vehicle)],
+        [
+            AttitudeSample(float(a), float(e[0]), float(e[1]), float(e[2]))
+            for a, e in zip(t, np.column_stack(euler_from_rotation(R_nb)), strict=True)
+        ],
+        _imu(tracks, Track(t, R_nb), chosen),
+        _fixes(tracks, chosen),
+        _outputs(tracks, chosen),
+        _battery(tracks),
+    ]
+    if "airspeed" in tracks:
+        its = tracks["airspeed"]
+        streams.append(
+            [AirData(float(a), float(v)) for a, v in zip(its.t, its.x[:, 0], strict=True)]
+        )
+    return lambda: merge(*streams, key=lambda s: s.t or 0.0)
+
+
+def _rotations(attitude: Track, chosen: TableMap) -> Array:
+    """(n, 3, 3) forward-right-down to north-east-down."""
+    if chosen.quaternion:
+        q = attitude.x.copy()
+        q[np.linalg.norm(q, axis=1) < SMALLEST, 0] = 1.0
+        R = rotation_from_quaternion(q)
+    else:
+        R = rotation_from_euler(attitude.x[:, 0], attitude.x[:, 1], attitude.x[:, 2])
+    if chosen.conjugate:
+        R = np.swapaxes(R, -1, -2)
+    out: Array = chosen.world @ R @ chosen.body.T
+    return out
+
+
+def _imu(tracks: dict[str, Track], attitude: Track, chosen: TableMap) -> list[Sample]:
+    """Specific force and rates along forward, right, down."""
+    force = tracks["force"]
+    R_bn = np.swapaxes(interpolate_rotation(force.t, attitude.t, attitude.x), -1, -2)
+    if chosen.force_in_world:
+        f = np.einsum("nij,nj->ni", R_bn, force.x @ chosen.world.T)
+    else:
+        f = force.x @ chosen.body.T
+    if chosen.kinematic:  # an accelerometer does not feel gravity, but what holds against it
+        f = f - STANDARD_GRAVITY * R_bn[:, :, 2]
+    w = _rates(tracks, attitude, chosen, force.t)
+    return [
+        ImuSample(float(a), 1, (float(b[0]), float(b[1]), float(b[2])),
+                  (float(c[0]), float(c[1]), float(c[2])))
+        for a, b, c in zip(force.t, f, w, strict=True)
+    ]  # fmt: skip
+
+
+def _rates(tracks: dict[str, Track], attitude: Track, chosen: TableMap, t: Array) -> Array:
+    """(m, 3) rad/s at times (m,): the gyroscope's, or the slope of the attitude."""
+    if "rates" in tracks and len(tracks["rates"].t) > 1:
+        known, x = tracks["rates"].t, tracks["rates"].x @ chosen.body.T
+    else:
+        known = attitude.t
+        at = np.searchsorted(known, known + TURN_S), np.searchsorted(known, known - TURN_S)
+        late, early = (np.clip(k, 0, len(known) - 1) for k in at)
+        turn = np.swapaxes(attitude.x[early], -1, -2) @ attitude.x[late]
+        x = vector_from_rotation(turn) / np.maximum(known[late] - known[early], 1e-6)[:, None]
+    return np.column_stack([np.interp(t, known, x[:, k]) for k in range(3)])
+
+
+def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
+    """Velocity and place as a receiver would report them."""
+    position = tracks.get("position")
+    p = None if position is None else position.x @ chosen.world.T
+    if "velocity" in tracks:
+        t, v = tracks["velocity"].t, tracks["velocity"].x @ chosen.world.T
+    elif position is not None and p is not None:
+        t, v = _slope(position.t, p)
+    else:
+        return []
+    keep = _thinned(t, chosen.fix_rate)
+    t, v = t[keep], v[keep]
+    if position is not None and p is not None:
+        at = np.column_stack([np.interp(t, position.t, p[:, k]) for k in range(3)])
+    else:  # heights matter for wind and density: the velocity's own way
+        steps = np.diff(t, prepend=t[0])[:, None]
+        at = np.cumsum(v * steps, axis=0)
+    latitude, longitude, altitude = chosen.origin
+    north = np.degrees(at[:, 0] / EARTH_RADIUS_M)
+    east = np.degrees(at[:, 1] / (EARTH_RADIUS_M * np.cos(np.radians(latitude))))
+    return [
+        GpsFix(float(a), 0, 3, latitude + float(north[k]), longitude + float(east[k]),
+               altitude - float(at[k, 2]), float(v[k, 0]), float(v[k, 1]), float(v[k, 2]))
+        for k, a in enumerate(t)
+    ]  # fmt: skip
+
+
+def _slope(t: Array, p: Array) -> tuple[Array, Array]:
+    """Velocity at the middle of each span, by difference."""
+    late = np.searchsorted(t, t + SLOPE_S)
+    early = np.arange(len(t))
+    there = late < len(t)
+    early, late = early[there], late[there]
+    span = t[late] - t[early]
+    whole = span < 3.0 * SLOPE_S  # a gap is no velocity
+    early, late, span = early[whole], late[whole], span[whole]
+    return 0.5 * (t[late] + t[early]), (p[late] - p[early]) / span[:, None]
+
+
+def _thinned(t: Array, rate: float) -> NDArray[np.intp]:
+    """Indices of samples at no more than a rate (Hz)."""
+    slot = np.floor((t - t[0]) * rate + 1e-6).astype(np.int64)
+    return np.flatnonzero(np.concatenate([[True], np.diff(slot) > 0]))
+
+
+def _outputs(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
+    its = tracks.get("motors")
+    if its is None:
+        return []
+    x, normalised = its.x, chosen.quantities["motors"].unit != "us"
+    if chosen.motor_range is not None:
+        low, high = chosen.motor_range
+        x, normalised = np.clip((x - low) / (high - low), 0.0, 1.0), True
+    return [
+        Outputs(float(a), tuple(float(c) for c in row), normalised)
+        for a, row in zip(its.t, x, strict=True)
+    ]
+
+
+def _battery(tracks: dict[str, Track]) -> list[Sample]:
+    volts, amps = tracks.get("voltage"), tracks.get("current")
+    if volts is None:
+        return []
+    current = None
+    if amps is not None and len(amps.t) > 1:
+        current = np.interp(volts.t, amps.t, amps.x[:, 0])
+    return [
+        Battery(float(a), float(v), None if current is None else float(current[k]))
+        for k, (a, v) in enumerate(zip(volts.t, volts.x[:, 0], strict=True))
+    ]
