@@ -20,10 +20,10 @@ class Recording:
     """One opened file.
 
     ``kind`` is ``tlog``, ``dataflash``, ``ulog`` or ``table``; ``autopilot`` is ``ardupilot``,
-    ``px4`` or ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples, restarts
-    excluded; ``counts`` has the number of messages that are read, by their name in the file;
-    ``airborne``: whether all of it is flight, so that no ground is to be looked for;
-    ``damage`` says in plain words what was skipped and ``notes`` what was chosen.
+    ``px4`` or ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples,
+    restarts excluded; ``counts`` has the number of messages that are read, by their name in the
+    file; ``damage`` says in plain words what was skipped and ``notes`` what was chosen;
+    ``airborne``: whether all of it is flight, so that no ground is to be looked for.
     """
 
     path: Path

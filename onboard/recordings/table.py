@@ -23,6 +23,7 @@ from onboard.core.inputs.samples import (
     GpsFix,
     ImuSample,
     Outputs,
+    ParameterValue,
     Sample,
     VehicleState,
 )
@@ -155,6 +156,11 @@ def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterato
     t = tracks["attitude"].t
     streams: list[list[Sample]] = [
         [VehicleState(0.0, armed=True, kind=chosen.vehicle)],
+        # Without these, an ordinary autopilot's filters would be taken for granted.
+        [
+            ParameterValue("INS_ACCEL_FILTER", chosen.low_pass[0], 0.0),
+            ParameterValue("INS_GYRO_FILTER", chosen.low_pass[1], 0.0),
+        ],
         [
             AttitudeSample(float(a), float(e[0]), float(e[1]), float(e[2]))
             for a, e in zip(t, np.column_stack(euler_from_rotation(R_nb)), strict=True)
@@ -234,11 +240,12 @@ def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
     else:  # heights matter for wind and density: the velocity's own way
         steps = np.diff(t, prepend=t[0])[:, None]
         at = np.cumsum(v * steps, axis=0)
-    latitude, longitude, altitude = chosen.origin
-    north = np.degrees(at[:, 0] / EARTH_RADIUS_M)
-    east = np.degrees(at[:, 1] / (EARTH_RADIUS_M * np.cos(np.radians(latitude))))
+    latitude, longitude = np.radians(chosen.origin[:2])
+    altitude = chosen.origin[2]
+    north = at[:, 0] / EARTH_RADIUS_M
+    east = at[:, 1] / (EARTH_RADIUS_M * np.cos(latitude))
     return [
-        GpsFix(float(a), 0, 3, latitude + float(north[k]), longitude + float(east[k]),
+        GpsFix(float(a), 0, 3, float(latitude + north[k]), float(longitude + east[k]),
                altitude - float(at[k, 2]), float(v[k, 0]), float(v[k, 1]), float(v[k, 2]))
         for k, a in enumerate(t)
     ]  # fmt: skip

@@ -45,7 +45,8 @@ OF_TABLE = {"vehicle", "world", "body", "airborne", "fix_rate", "origin"}
 OF_QUANTITY = {"columns", "column", "unit"}
 OWN_KEYS = {
     "attitude": {"quaternion", "euler", "conjugate", "unit"},
-    "force": OF_QUANTITY | {"kind", "frame"},
+    "force": OF_QUANTITY | {"kind", "frame", "low_pass"},
+    "rates": OF_QUANTITY | {"low_pass"},
     "motors": OF_QUANTITY | {"range"},
 }
 
@@ -71,6 +72,8 @@ class TableMap:
         conjugate: whether the attitude turns the world to the body, not the body to the world.
         kinematic: whether the force is acceleration, without gravity's reaction.
         force_in_world: whether it is along the world's axes.
+        low_pass: cut-off (Hz) of the second-order filters that force and rates went through; 0 is
+            none.
         motor_range: what the motors are at idle and at full; None: as the unit says.
         vehicle: ``copter``, ``plane`` or empty.
         airborne: whether all of the table is flight: then no ground is looked for.
@@ -85,6 +88,7 @@ class TableMap:
     conjugate: bool = False
     kinematic: bool = False
     force_in_world: bool = False
+    low_pass: tuple[float, float] = (0.0, 0.0)
     motor_range: tuple[float, float] | None = None
     vehicle: str = ""
     airborne: bool = False
@@ -137,6 +141,10 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
         conjugate=_flag(attitude, "conjugate", "attitude."),
         kinematic=_word(force, "kind", KINDS, "force.") == "acceleration",
         force_in_world=_word(force, "frame", ("body", "world"), "force.") == "world",
+        low_pass=(
+            _number(force, "low_pass", 0.0, "force."),
+            _number(_table(found, "rates"), "low_pass", 0.0, "rates.") if "rates" in found else 0.0,
+        ),
         motor_range=_range(_table(found, "motors")) if "motors" in found else None,
         vehicle=_word(found, "vehicle", VEHICLES, ""),
         airborne=_flag(found, "airborne", ""),

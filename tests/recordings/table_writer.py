@@ -10,7 +10,6 @@ import numpy as np
 from onboard.core.inputs.samples import (
     AttitudeSample,
     Battery,
-    GpsFix,
     ImuSample,
     Outputs,
     Sample,
@@ -36,10 +35,12 @@ quaternion = ["qw", "qx", "qy", "qz"]
 [force]
 columns = ["ax", "ay", "az"]
 unit = "g"
+low_pass = 20
 
 [rates]
 columns = ["gx", "gy", "gz"]
 unit = "deg/s"
+low_pass = 20
 
 [velocity]
 columns = ["ve", "vn", "vu"]
@@ -74,9 +75,6 @@ def cells(sample: Sample) -> dict[str, float]:
             w = np.degrees(FLU @ np.array(sample.w_b))
             out |= dict(zip(("gx", "gy", "gz"), w, strict=True))
         return out
-    if isinstance(sample, GpsFix) and sample.fix_type >= 3:
-        out = {"ve": sample.v_e, "vn": sample.v_n, "vu": -(sample.v_d or 0.0)}
-        return out | {"e": 0.0, "n": 0.0, "u": sample.altitude}
     if isinstance(sample, Outputs):
         return dict(zip(("m1", "m2", "m3", "m4"), sample.values, strict=False))
     if isinstance(sample, Battery):
@@ -84,12 +82,19 @@ def cells(sample: Sample) -> dict[str, float]:
     return {}
 
 
-def write_table(samples: Iterable[Sample], path: Path) -> None:
-    """Each sample a row, with empty cells for what it is not."""
-    rows = [",".join(COLUMNS)]
-    for sample in samples:
-        its = cells(sample)
+def moving(
+    t: float, v_n: tuple[float, ...], p_n: tuple[float, ...]
+) -> tuple[float, dict[str, float]]:
+    """Velocity and place at a time, from north-east-down."""
+    names = ("ve", "vn", "vu", "e", "n", "u")
+    return t, dict(zip(names, (*(ENU @ np.array(v_n)), *(ENU @ np.array(p_n))), strict=True))
+
+
+def write_table(rows: Iterable[tuple[float, dict[str, float]]], path: Path) -> None:
+    """Times (s) and cells as rows, with empty cells for what a row is not about."""
+    lines = [",".join(COLUMNS)]
+    for t, its in rows:
         if its:
-            its["t_ms"] = 1e3 * (sample.t or 0.0)
-            rows.append(",".join(f"{its[c]:.9g}" if c in its else "" for c in COLUMNS))
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+            every = its | {"t_ms": 1e3 * t}
+            lines.append(",".join(f"{every[c]:.9g}" if c in every else "" for c in COLUMNS))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,173 @@
+"""Tables by a column map: units, frames, rates of their own, and what is wrong with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.samples import (
+    AttitudeSample,
+    Battery,
+    GpsFix,
+    ImuSample,
+    Outputs,
+    VehicleState,
+)
+from onboard.core.maths.frames import rotation_from_euler
+from onboard.errors import ConfigurationError, RecordingError
+from onboard.recordings.table import open_table
+from onboard.recordings.table_map import load_map
+from tests.recordings.table_writer import MAP, MOTORS, cells, moving, write_table
+
+ANGLES = (0.1, -0.2, 0.7)
+FORCE = (0.3, -0.4, -9.5)
+RATES = (0.01, 0.02, -0.03)
+VELOCITY = (3.0, -2.0, -0.5)
+"""NED."""
+N = 60
+
+
+@pytest.fixture
+def table(tmp_path):
+    rows = []
+    for k in range(N):
+        t = 0.02 * k
+        rows += [
+            (t, cells(AttitudeSample(t, *ANGLES))),
+            (t + 0.001, cells(ImuSample(t, 1, FORCE, RATES))),
+            (t + 0.002, moving(t, VELOCITY, tuple(t * v for v in VELOCITY))[1]),
+            (t + 0.003, cells(Outputs(t, (1150.0, 1550.0, 1950.0, 2000.0)))),
+            (t + 0.004, cells(Battery(t, 15.5))),
+        ]
+    path = tmp_path / "flight.csv"
+    write_table(rows, path)
+    return path
+
+
+@pytest.fixture
+def columns(tmp_path):
+    def written(text=MAP + MOTORS):
+        path = tmp_path / "map.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def samples(table, columns, kind):
+    return [s for s in open_table(table, columns).samples() if isinstance(s, kind)]
+
+
+def test_frames_and_units_become_those_of_the_core(table, columns):
+    its = columns()
+    attitude = samples(table, its, AttitudeSample)[7]
+    assert (attitude.roll, attitude.pitch, attitude.yaw) == pytest.approx(ANGLES, abs=1e-7)
+    imu = samples(table, its, ImuSample)[7]
+    assert imu.f_b == pytest.approx(FORCE, rel=1e-6)
+    assert imu.w_b == pytest.approx(RATES, rel=1e-6)
+    fix = samples(table, its, GpsFix)[3]
+    assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-6)
+    assert samples(table, its, Battery)[0].voltage == pytest.approx(15.5)
+    out = samples(table, its, Outputs)[0]
+    assert out.normalised
+    assert out.values == pytest.approx((0.0, 0.5, 1.0, 1.0))
+    assert samples(table, its, VehicleState)[0].kind == "copter"
+
+
+def test_samples_come_in_order_of_time_and_can_be_read_twice(table, columns):
+    recording = open_table(table, columns())
+    times = [s.t for s in recording.samples()]
+    assert times == sorted(times)
+    assert times == [s.t for s in recording.samples()]
+    assert recording.counts["force"] == N
+
+
+def test_fixes_are_no_more_than_asked_for(table, columns):
+    rate = 5.0
+    fixes = samples(table, columns(f"fix_rate = {rate}\n" + MAP), GpsFix)
+    steps = np.diff([f.t for f in fixes])
+    assert steps.min() > 1.0 / rate - 0.021
+
+
+def test_a_position_alone_becomes_a_velocity(table, columns):
+    text = MAP.replace('[velocity]\ncolumns = ["ve", "vn", "vu"]\n', "")
+    fixes = samples(table, columns(text), GpsFix)
+    for fix in fixes:
+        assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-5)
+
+
+def test_acceleration_is_given_what_an_accelerometer_feels(table, columns):
+    text = MAP.replace('unit = "g"', 'unit = "g"\nkind = "acceleration"')
+    f = samples(table, columns(text), ImuSample)[5].f_b
+    down_b = rotation_from_euler(*ANGLES).T[:, 2]
+    assert f == pytest.approx(np.array(FORCE) - 9.80665 * down_b, abs=1e-5)
+
+
+def test_rates_that_are_not_measured_are_the_slope_of_the_attitude(tmp_path, columns):
+    rows = []
+    for k in range(200):
+        t = 0.01 * k
+        rows.append((t, cells(AttitudeSample(t, 0.0, 0.0, 0.8 * t)) | cells(
+            ImuSample(t, 1, FORCE)) | moving(t, VELOCITY, VELOCITY)[1]))  # fmt: skip
+    path = tmp_path / "turn.csv"
+    write_table(rows, path)
+    text = MAP.replace('[rates]\ncolumns = ["gx", "gy", "gz"]\nunit = "deg/s"\nlow_pass = 20\n', "")
+    for imu in samples(path, columns(text), ImuSample)[5:-5]:
+        assert imu.w_b == pytest.approx((0.0, 0.0, 0.8), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"qz"]', '"nope"]', "no column 'nope'"),
+        ('"qz"]', "]", "attitude.quaternion must name 4 columns, has 3"),
+        ('unit = "deg/s"', 'unit = "rpm"', "rates.unit is 'rpm'"),
+        ('world = "enu"', 'world = "ecef"', "world is 'ecef'"),
+        ("[time]", "[clock]", "clock is unknown"),
+        ('unit = "g"', 'unit = "g"\nflavour = 1', "force.flavour is unknown"),
+        ("range = [1150, 1950]", "range = [2, 1]", "motors.range must rise"),
+        ('column = "t_ms"', "column = 3", "time.column must name columns"),
+        ('vehicle = "copter"', "fix_rate = 0", "fix_rate must be positive"),
+        ('vehicle = "copter"', "vehicle = ", "no TOML"),
+    ],
+)
+def test_what_is_wrong_is_named(table, columns, old, new, said):
+    text = MAP + MOTORS
+    assert old in text
+    with pytest.raises((ConfigurationError, RecordingError), match=said) as caught:
+        open_table(table, columns(text.replace(old, new, 1)))
+    assert "map.toml" in str(caught.value) or "flight.csv" in str(caught.value)
+
+
+def test_a_table_that_is_none_is_named(tmp_path, columns):
+    path = tmp_path / "x.csv"
+    with pytest.raises(RecordingError, match="no such file"):
+        open_table(path, columns())
+    path.write_bytes(b"\xff\xfe\x00\x00")
+    with pytest.raises(RecordingError, match="no table of text"):
+        open_table(path, columns())
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(RecordingError, match="no column 't_ms'"):
+        open_table(path, columns())
+
+
+def test_a_column_of_words_is_no_flight(table, columns):
+    table.write_text(table.read_text().replace(".", "x"))
+    with pytest.raises(RecordingError, match="are no flight"):
+        open_table(table, columns())
+
+
+def test_an_absent_map_is_named(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"absent\.toml: cannot be read"):
+        load_map(tmp_path / "absent.toml")
+
+
+def test_places_follow_velocities(table, columns):
+    first, *_, last = samples(table, columns(), GpsFix)
+    earth = 6.371e6
+    flown = last.t - first.t
+    north, east = VELOCITY[0] * flown, VELOCITY[1] * flown
+    assert (last.latitude - first.latitude) * earth == pytest.approx(north, rel=0.02)
+    along = earth * np.cos(first.latitude)
+    assert (last.longitude - first.longitude) * along == pytest.approx(east, rel=0.02)
+    assert last.altitude - first.altitude == pytest.approx(-VELOCITY[2] * flown, rel=0.02)
