@@ -13,6 +13,7 @@ from onboard.answers.explain_document import (
     NotTestableDocument,
     WhereDocument,
 )
+from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
 from onboard.core.vehicle.records import Difference
 
@@ -66,6 +67,30 @@ class MatchedRecordings(msgspec.Struct, frozen=True, kw_only=True):
     real: str
 
 
+class TwiceDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """One unknown from the recording and from the simulator's flight."""
+
+    real: float | None
+    again: float | None
+    sigma: float | None
+    unit: str
+    agrees: bool
+
+
+class VerifiedDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """``--verify``: the simulator flew the recording again, nominally and with what was found.
+
+    ``mismatch`` is between the recording and those two flights: ``x``, ``y``, ``z`` of the force,
+    m/s^2, and ``tilt``, degrees.
+    """
+
+    simulator: str
+    agrees: bool
+    numbers: dict[str, TwiceDocument]
+    mismatch: dict[str, HeldOutDocument]
+    effects_left: list[str]
+
+
 class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     """``onboard match --json``."""
 
@@ -81,6 +106,7 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     frame: dict[str, float | list[float]]
     ambiguous: list[AmbiguityDocument]
     not_testable: list[NotTestableDocument]
+    verified: VerifiedDocument | None = None
     schema: str = MATCH_SCHEMA
 
     def to_json(self) -> bytes:
@@ -88,8 +114,8 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
         return msgspec.json.format(msgspec.json.encode(self), indent=2) + b"\n"
 
 
-def match_document(match: Match) -> MatchDocument:
-    """The document of a match."""
+def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDocument:
+    """The document of a match, with its verification if there was one."""
     vehicle = match.vehicle
     mismatch = {
         axis: HeldOutDocument(before=finite(m.before), after=finite(m.after))
@@ -117,6 +143,29 @@ def match_document(match: Match) -> MatchDocument:
             for a in vehicle.ambiguous
         ],
         not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in match.not_testable],
+        verified=None if verified is None else _verified(verified),
+    )
+
+
+def _verified(v: FlownAgain) -> VerifiedDocument:
+    return VerifiedDocument(
+        simulator=v.simulator,
+        agrees=v.agrees,
+        numbers={
+            key: TwiceDocument(
+                real=finite(n.real),
+                again=finite(n.again),
+                sigma=finite(n.sigma),
+                unit=n.unit,
+                agrees=n.agrees,
+            )
+            for key, n in v.numbers.items()
+        },
+        mismatch={
+            key: HeldOutDocument(before=finite(m.before), after=finite(m.after))
+            for key, m in v.mismatch.items()
+        },
+        effects_left=list(v.left),
     )
 
 

@@ -12,12 +12,13 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import match_document
 from onboard.answers.match_files import frame_text, settings_text
 from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
-from onboard.cli.progress import reading
+from onboard.cli.progress import reading, waiting
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.diagnosis.records import Verdict
 from onboard.errors import RecordingError, UsageError
@@ -29,6 +30,7 @@ EXAMPLES = """\
 onboard match flight.BIN
 onboard match simulation.BIN flight.BIN --json result.json
 onboard match flight.BIN --report flight.html
+onboard match flight.BIN --verify
 onboard match flight.csv --columns columns.toml
 onboard match flight.BIN --param sim.param --frame-out frame.json
 """
@@ -47,6 +49,9 @@ TABLE = ".csv"
     "--frame-out", "frame_file", metavar="FILE", help="Write a frame file that SITL loads."
 )
 @click.option(
+    "--verify", "verifies", is_flag=True, help="Let the simulator fly it again with what was found."
+)
+@click.option(
     "--columns",
     "columns_file",
     metavar="FILE",
@@ -63,6 +68,8 @@ def match(
     frame_file: str | None,
     given_frame: str | None,
     columns_file: str | None,
+    *,
+    verifies: bool,
 ) -> None:
     """Make the simulator fly like the recording.
 
@@ -82,13 +89,20 @@ def match(
         raise UsageError(f"--frame {given_frame}: {error}") from None
     if result.vehicle.series is None and result.verdict is Verdict.INSUFFICIENT:
         raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
+    verified = None
+    if verifies:
+        # The simulator only when it is wanted.
+        from onboard.cli.match_verify import verify
+
+        with waiting("flying it again"):
+            verified = verify(result, logs[-1])
     if json_file is not None:
-        write_json(match_document(result).to_json(), json_file)
+        write_json(match_document(result, verified).to_json(), json_file)
     if report_file is not None:
         # jinja2 only when it is wanted.
         from onboard.report.match import match_html
 
-        write_text(match_html(result), report_file)
+        write_text(match_html(result, verified), report_file)
     if param_file is not None:
         write_text(settings_text(result), param_file)
     if frame_file is not None:
@@ -97,6 +111,8 @@ def match(
         console = Console(highlight=False)
         for part in summary(result):
             console.print(part)
+        if verified is not None:
+            console.print(flown_again_table(verified))
 
 
 def _opened(log: Path, columns: str | None) -> Path | Recording:
@@ -140,6 +156,26 @@ def summary(result: Match) -> Iterator[RenderableType]:
     if result.effects:
         yield from ("", _effects(result))
     yield from ("", _facts(result))
+
+
+def flown_again_table(verified: FlownAgain) -> Table:
+    """The simulator's flights beside the recording."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    said = "flies like the recording" if verified.agrees else "does not fly like the recording yet"
+    table.add_row("Verified", f"the {verified.simulator} simulator {said}")
+    for key, m in verified.mismatch.items():
+        unit = "deg" if key == "tilt" else "m/s^2"
+        said = f"{key}: {m.before:.3f} -> {m.after:.3f} {unit} RMS from the recording"
+        table.add_row("", f"{said}, nominal and with what was found")
+    for key, n in verified.numbers.items():
+        same = "" if n.agrees else "  differs"
+        again = f"{number(n.real, n.sigma)} recorded, {number(n.again, n.sigma)} flown again"
+        table.add_row("", f"{key}: {again}{same}")
+    if verified.left:
+        table.add_row("", f"still against the frame: {', '.join(verified.left)}")
+    return table
 
 
 def _effects(result: Match) -> Table:

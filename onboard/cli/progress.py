@@ -33,6 +33,16 @@ def reading(logs: Sequence[Path], then: str = "") -> Iterator[Told | None]:
 
 
 @contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """A spinner for what takes long and tells no share of it."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    with Console(stderr=True).status(what):
+        yield
+
+
+@contextmanager
 def numbered(path: Path, number: int, total: int) -> Iterator[Told | None]:
     """A bar for one recording of many."""
     if not sys.stderr.isatty():

@@ -8,6 +8,7 @@ from typing import Any
 
 from onboard.answers import match_story as story
 from onboard.answers import words
+from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
 from onboard.answers.match_words import headline, title, wind_sentence
 from onboard.core.diagnosis.records import Verdict
@@ -32,8 +33,8 @@ OF_EFFECT = {
 """Curves that show an effect."""
 
 
-def match_html(match: Match) -> str:
-    """The page of one match.
+def match_html(match: Match, verified: FlownAgain | None = None) -> str:
+    """The page of one match, with its verification if there was one.
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
@@ -65,6 +66,7 @@ def match_html(match: Match) -> str:
         winds=[] if wind is None else match_charts.of_wind(wind),
         autopilot_wind=wind is not None and match_charts.has_ekf(wind),
         curves=[_curve(c, match) for c in v.curves if match_charts.tells(c)],
+        verified=None if verified is None else _verified(verified),
         settings=[
             {
                 "name": s.name,
@@ -176,6 +178,35 @@ def _speeds(v: VehicleMatch) -> list[dict[str, Any]]:
     rows = match_charts.by_speed(v)
     longest = _longest([(a, b) for _, a, b in rows])
     return [_pair(span, "m/s²", a, b, longest) for span, a, b in rows]
+
+
+def _verified(v: FlownAgain) -> dict[str, Any]:
+    """The simulator's own flights beside the recording."""
+    forces = {k: (m.before, m.after) for k, m in v.mismatch.items() if k != "tilt"}
+    longest = _longest(list(forces.values()))
+    rows = [
+        _pair(story.AXIS_WORDS.get(k, k), "m/s²", before, after, longest)
+        for k, (before, after) in forces.items()
+    ]
+    if "tilt" in v.mismatch:
+        rows.append(_pair("Tilt", "°", v.mismatch["tilt"].before, v.mismatch["tilt"].after))
+    return {
+        "simulator": v.simulator,
+        "agrees": v.agrees,
+        "bars": rows,
+        "numbers": [
+            {
+                "name": words.capital(key.replace("_", " ").replace(".", ": ")),
+                "unit": words.unit_in_words(n.unit),
+                "real": words.number(n.real),
+                "again": words.number(n.again),
+                "sigma": words.number(n.sigma, 2),
+                "agrees": n.agrees,
+            }
+            for key, n in v.numbers.items()
+        ],
+        "left": [title(name) for name in v.left],
+    }
 
 
 def _marks(match: Match) -> list[Band]:

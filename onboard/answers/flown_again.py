@@ -1,0 +1,205 @@
+"""What the simulator makes of a recording that it flies again with the settings found.
+
+The same velocity and heading, once by the nominal airframe in still air and once by what the match
+handed back: the recorded force and tilt are compared side by side, and the second flight is matched
+like the first.  Nothing here flies; the command line does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from onboard.answers.match import Match
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
+from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.effects.wind_profile import LOWEST_M, TOP_M
+from onboard.core.vehicle.records import AxisMismatch
+from onboard.errors import RecordingError
+from onboard.recordings.opening import open_recording
+
+STEP_S = 0.2
+"""Of the grid on which two flights are laid side by side: that of the receiver."""
+LEAST_OVERLAP = 0.6
+MOVING_M_S = 1.0
+ALIKE_SHARE = 0.05
+"""Share by which a number found twice may differ."""
+SURE = 3.0
+FLOORS = {"wind": 0.15, "thrust_tilt": 0.005, "motor_lag": 0.01, "wind_profile": 0.05}
+"""Differences that do not matter, in the unit of the effect's unknowns."""
+AIR = ("wind", "wind_profile", "turbulence")
+
+
+@dataclass(frozen=True, slots=True)
+class Twice:
+    """One unknown as the recording has it, and as the flight of the simulator has it."""
+
+    real: float
+    again: float
+    sigma: float
+    unit: str
+    agrees: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FlownAgain:
+    """The second flight beside the first.
+
+    Attributes:
+        numbers: unknowns of the effects that were found, by ``effect.unknown``.
+        mismatch: RMS between the recording and the simulator's flight, by the nominal airframe in
+            still air and by what was handed back: ``x``, ``y``, ``z`` of the recorded force, m/s^2,
+            and ``tilt``, degrees.
+        left: effects of the airframe by which the second flight still differs from the frame.
+        simulator: which one flew.
+    """
+
+    numbers: Mapping[str, Twice]
+    mismatch: Mapping[str, AxisMismatch]
+    left: tuple[str, ...]
+    simulator: str = "built-in"
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the simulator flies like the recording."""
+        return all(n.agrees for n in self.numbers.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Courses:
+    """A flight on an even grid: velocity (n, 3) NED, force (n, 3) body, roll and pitch (n, 2)."""
+
+    v_n: Array
+    f_b: Array
+    tilt: Array
+
+
+def flown_again(
+    first: Match, second: Match, real: str | Path, nominal: str | Path, found: str | Path
+) -> FlownAgain:
+    """The record of a verification.
+
+    Args:
+        first: match of the recording.
+        second: match of what the simulator recorded, with the frame that was handed back.
+        real: the recording.
+        nominal: the simulator's recording with the nominal airframe in still air.
+        found: the simulator's recording with what was handed back.
+
+    Raises:
+        RecordingError: a file that cannot be used, or flights that do not fit together.
+    """
+    course = courses(real)
+    before, after = (beside(course, courses(path)) for path in (nominal, found))
+    return FlownAgain(
+        numbers_twice(first, second),
+        {key: AxisMismatch(before[key], after[key]) for key in before},
+        tuple(d.name for d in second.vehicle.effects if d.name not in AIR),
+    )
+
+
+def numbers_twice(first: Match, second: Match) -> dict[str, Twice]:
+    """Unknowns of the effects that were found, from both flights."""
+    out: dict[str, Twice] = {}
+    for effect in first.vehicle.effects:
+        for key, value in first.vehicle.numbers.items():
+            other = second.vehicle.numbers.get(key)
+            if not key.startswith(f"{effect.name}.") or other is None:
+                continue
+            if effect.name == "wind":
+                other = replace(other, real=_at_one_height(first, second) * other.real)
+            sigma = math.hypot(value.sigma, other.sigma)
+            most = max(SURE * sigma, ALIKE_SHARE * abs(value.real), FLOORS.get(effect.name, 0.0))
+            agrees = abs(value.real - other.real) <= most
+            out[key] = Twice(value.real, other.real, sigma, value.unit, agrees)
+    return out
+
+
+def _at_one_height(first: Match, second: Match) -> float:
+    """What a wind at the second flight's mean height is to be multiplied by for the first's."""
+    one, other = first.vehicle.wind, second.vehicle.wind
+    if one is None or other is None or other.profile_exponent is None:
+        return 1.0
+    heights = (min(max(w.height, LOWEST_M), TOP_M) for w in (one, other))
+    return float(next(heights) / next(heights)) ** other.profile_exponent
+
+
+def courses(path: str | Path) -> Courses:
+    """What a recording says of its motion, on an even grid, as it was recorded.
+
+    Raises:
+        RecordingError: a file that cannot be used, or one without motion.
+    """
+    fixes, imu, attitude = [], [], []
+    for s in open_recording(path).samples():
+        if isinstance(s, GpsFix) and s.fix_type >= 3:
+            fixes.append((s.t, s.v_n, s.v_e, s.v_d or 0.0))
+        elif isinstance(s, ImuSample) and s.imu == 1:
+            imu.append((s.t, *s.f_b))
+        elif isinstance(s, AttitudeSample):
+            attitude.append((s.t, s.roll, s.pitch))
+    if min(len(fixes), len(imu), len(attitude)) < 2:
+        raise RecordingError(f"{path}: no motion to lay side by side")
+    v, f, a = (np.array(rows) for rows in (fixes, imu, attitude))
+    start = max(x[0, 0] for x in (v, f, a))
+    n = int((min(x[-1, 0] for x in (v, f, a)) - start) / STEP_S)
+    if n < 2:
+        raise RecordingError(f"{path}: no motion to lay side by side")
+    t = start + STEP_S * np.arange(n)
+    return Courses(_means(t, v), _means(t, f), _means(t, a))
+
+
+def _means(t: Array, rows: Array) -> Array:
+    """(n, k) means over the steps that begin at t (n,); straight lines where a step is empty."""
+    middle = t + 0.5 * STEP_S
+    out = np.column_stack([np.interp(middle, rows[:, 0], x) for x in rows[:, 1:].T])
+    which = np.floor((rows[:, 0] - t[0]) / STEP_S).astype(np.int64)
+    inside = (which >= 0) & (which < len(t))
+    counts = np.bincount(which[inside], minlength=len(t))
+    for k, x in enumerate(rows[:, 1:].T):
+        sums = np.bincount(which[inside], weights=x[inside], minlength=len(t))
+        out[:, k] = np.where(counts > 0, sums / np.maximum(counts, 1), out[:, k])
+    return out
+
+
+def beside(real: Courses, simulated: Courses) -> dict[str, float]:
+    """RMS between two flights of one motion while they move: force by axis, m/s^2, tilt, deg.
+
+    Raises:
+        RecordingError: they are not of one motion.
+    """
+    shift = _shift(real.v_n, simulated.v_n)
+    i, j = max(shift, 0), max(-shift, 0)
+    n = min(len(real.v_n) - i, len(simulated.v_n) - j)
+    one, other = slice(i, i + n), slice(j, j + n)
+    moving = np.linalg.norm(real.v_n[one], axis=1) > MOVING_M_S
+    if not moving.any():
+        raise RecordingError("the flights do not move together")
+    force = (real.f_b[one] - simulated.f_b[other])[moving]
+    # Accelerometers have offsets of their own, which are not the airframe's.
+    tilt = np.degrees(real.tilt[one] - simulated.tilt[other])[moving]
+    tilt = (tilt + 180.0) % 360.0 - 180.0
+    out = {axis: _rms(force[:, k]) for k, axis in enumerate("xyz")}
+    out["tilt"] = math.sqrt(float(np.mean(np.sum(tilt**2, axis=1))))
+    return out
+
+
+def _shift(a: Array, b: Array) -> int:
+    """Steps that a is ahead of b: where the velocities differ least."""
+    best, at = math.inf, 0
+    least = int(LEAST_OVERLAP * min(len(a), len(b)))
+    for shift in range(least - len(b), len(a) - least + 1):
+        i, j = max(shift, 0), max(-shift, 0)
+        n = min(len(a) - i, len(b) - j)
+        apart = float(np.mean((a[i : i + n, :2] - b[j : j + n, :2]) ** 2))
+        if apart < best:
+            best, at = apart, shift
+    return at
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))

@@ -1,0 +1,102 @@
+"""``onboard match --verify``: the built-in simulator flies it again, with what was found."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from onboard.answers.flown_again import FlownAgain, flown_again
+from onboard.answers.match import Match
+from onboard.answers.match import match as match_recordings
+from onboard.errors import RecordingError, UsageError
+
+if TYPE_CHECKING:
+    from sitl.builtin.airframe.air import Air
+    from sitl.builtin.airframe.frame import Airframe
+    from sitl.builtin.airframe.wing import Wing
+
+PROFILE_TOP_M = 60.0
+LEAST_HEIGHT_M = 0.5
+KINDS = ("tlog", "dataflash")
+"""Recordings that the simulator can fly again."""
+
+
+def verify(result: Match, recording: Path) -> FlownAgain:
+    """Fly the recording's motion again, nominally and with what was found, and compare.
+
+    Raises:
+        UsageError: the recording cannot be flown again.
+    """
+    # The simulator only when it is wanted: it is no part of what runs on a vehicle.
+    from sitl.again import fly_again
+    from sitl.builtin.airframe.air import Air
+    from sitl.builtin.airframe.frame import Airframe
+    from sitl.builtin.airframe.wing import Wing
+    from sitl.errors import SitlError
+
+    kind = result.real.source.recordings[0].kind
+    if kind not in KINDS:
+        raise UsageError(
+            f"--verify: {recording} is no .tlog or DataFlash, and cannot be flown again"
+        )
+    if result.vehicle.series is None:
+        raise UsageError(f"--verify: {recording}: there is nothing to verify")
+    plane = result.vehicle.vehicle == "plane"
+    with tempfile.TemporaryDirectory() as folder:
+        nominal, found = Path(folder) / "nominal.tlog", Path(folder) / "again.tlog"
+        try:
+            fly_again(recording, Wing() if plane else Airframe(), Air(), nominal)
+            fly_again(recording, craft_of(result), air_of(result), found)
+        except (SitlError, ValueError) as error:
+            raise UsageError(f"--verify: {error}") from None
+        try:
+            second = match_recordings(found, frame=dict(result.frame))
+            return flown_again(result, second, recording, nominal, found)
+        except RecordingError as error:
+            raise UsageError(f"--verify: {error}") from None
+
+
+def craft_of(result: Match) -> Airframe | Wing:
+    """The airframe that was found, for the built-in simulator."""
+    from sitl.builtin.airframe.frame import Airframe
+    from sitl.builtin.airframe.wing import Wing
+
+    v = result.vehicle
+    names = {d.name for d in v.effects}
+    keys: dict[str, float | list[float]] = dict(result.frame)
+    if v.vehicle == "plane":
+        if "thrust_scale" in names:
+            ratio = next(d for d in v.effects if d.name == "thrust_scale").values["ratio"].real
+            keys["hover_throttle"] = Wing().hover_throttle / ratio
+        ratios = [s.value for s in result.settings if s.name == "SIM_ARSPD_RATIO"]
+        if ratios:
+            keys["airspeed_ratio"] = ratios[0]
+        return Wing.from_dict(keys)
+    for effect, unknown, key in (
+        ("motor_lag", "motor_lag.time_constant", "motor_lag"),
+        ("ground_effect", "ground_effect.gain", "ground_effect"),
+    ):
+        if effect in names and unknown in v.numbers:
+            keys[key] = max(v.numbers[unknown].real, 0.0)
+    return Airframe.from_dict(keys)
+
+
+def air_of(result: Match) -> Air:
+    """The air that was found: its wind from 60 m on, where a profile is."""
+    from sitl.builtin.airframe.air import Air
+
+    v, wind = result.vehicle, result.vehicle.wind
+    names = {d.name for d in v.effects}
+    excess = v.numbers["air_density.excess"].real if "air_density" in names else 0.0
+    if wind is None or "wind" not in names:
+        return Air(density_ratio=1.0 + excess)
+    exponent = wind.profile_exponent or 0.0
+    gain = (PROFILE_TOP_M / min(max(wind.height, LEAST_HEIGHT_M), PROFILE_TOP_M)) ** exponent
+    return Air(
+        north=gain * wind.north,
+        east=gain * wind.east,
+        exponent=exponent,
+        turbulence=wind.turbulence_rms or 0.0,
+        density_ratio=1.0 + excess,
+    )
