@@ -125,7 +125,8 @@ def _at_one_height(first: Match, second: Match) -> float:
     if one is None or other is None or other.profile_exponent is None:
         return 1.0
     heights = (min(max(w.height, LOWEST_M), TOP_M) for w in (one, other))
-    return float(next(heights) / next(heights)) ** other.profile_exponent
+    ours, theirs = heights
+    return float((ours / theirs) ** other.profile_exponent)
 
 
 def courses(path: str | Path) -> Courses:

@@ -1,0 +1,110 @@
+"""A flight that the simulator flies again with what was found: it flies like the recording."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from onboard.answers.flown_again import Courses, beside, flown_again, numbers_twice
+from onboard.cli.main import run
+from onboard.cli.match_verify import air_of, craft_of
+from onboard.core.vehicle.records import Compared
+from onboard.report.match import match_html
+from sitl.builtin.airframe.air import Air
+from sitl.builtin.airframe.aircraft import Aircraft
+from sitl.builtin.airframe.frame import Airframe
+from sitl.recording import FlightSpec, write_tlog
+from tests.report.html_page import Page
+from tests.report.matches_by_hand import by_hand
+
+
+def course(seconds=60.0, ahead=0, force=(0.0, 0.0, -9.8)):
+    t = 0.2 * (np.arange(round(seconds / 0.2)) + ahead)
+    v = np.column_stack([5.0 * np.sin(0.3 * t), 4.0 * np.cos(0.17 * t), 0.0 * t])
+    return Courses(v, np.tile(force, (len(t), 1)), np.zeros((len(t), 2)))
+
+
+def test_flights_that_begin_at_other_times_are_laid_side_by_side():
+    found = beside(course(), course(ahead=37))
+    assert all(v == pytest.approx(0.0, abs=1e-9) for v in found.values())
+
+
+def test_what_differs_is_measured_where_it_moves():
+    found = beside(course(force=(0.3, 0.0, -9.8)), course(ahead=-11))
+    assert found["x"] == pytest.approx(0.3)
+    assert found["y"] == pytest.approx(0.0, abs=1e-12)
+
+
+def with_numbers(**numbers: Compared) -> Any:
+    match = by_hand()
+    names = {k.replace("__", "."): v for k, v in numbers.items()}
+    return replace(match, vehicle=replace(match.vehicle, numbers=names))
+
+
+def test_numbers_agree_within_5_per_cent_or_3_sigma():
+    first = with_numbers(rotor_drag__mcoef=Compared(0.25, 0.5, 0.001, "1/s"))
+    for again, agrees in ((0.52, True), (0.56, False)):
+        second = with_numbers(rotor_drag__mcoef=Compared(0.5, again, 0.001, "1/s"))
+        (twice,) = numbers_twice(first, second).values()
+        assert twice.agrees is agrees
+
+
+def test_the_air_that_is_flown_is_the_air_that_was_found():
+    match = by_hand()
+    assert air_of(match) == Air(north=-3.0, east=4.0)
+    wind = replace(match.vehicle.wind, height=15.0, profile_exponent=0.5)
+    grown = air_of(replace(match, vehicle=replace(match.vehicle, wind=wind)))
+    at_15_m = grown.steady(np.array([15.0]), np.array([0.0]))[0]
+    assert at_15_m[:2] == pytest.approx([-3.0, 4.0])
+    assert air_of(by_hand(effects=())) == Air()
+
+
+def test_the_airframe_that_is_flown_has_the_keys_of_the_frame_file():
+    match = replace(by_hand(), frame={"mdrag_coef": 0.4, "motor1_vector": [0.06, 0.0, -1.0]})
+    craft = craft_of(match)
+    assert craft.mdrag_coef == 0.4
+    assert craft.motor_vector == (0.06, 0.0, -1.0)
+
+
+def test_a_recording_that_cannot_be_flown_again_is_named(tmp_path, capsys):
+    path = tmp_path / "x.csv"
+    path.write_text("a\n1\n")
+    columns = tmp_path / "m.toml"
+    columns.write_text("")
+    assert run(["match", str(path), "--columns", str(columns), "--verify"]) == 2
+    assert "[time] is missing" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_flight_is_flown_again_as_it_was(tmp_path):
+    log, answer, page = (tmp_path / n for n in ("flight.tlog", "a.json", "a.html"))
+    craft = Airframe().with_drag(mcoef=0.45)
+    aircraft = Aircraft(craft=craft, air=Air(north=3.0, east=-2.0))
+    write_tlog(FlightSpec(seed=4, duration=130.0, aircraft=aircraft), log)
+    arguments = ["--verify", "--json", str(answer), "--report", str(page)]
+    assert run(["match", str(log), *arguments]) == 0
+    v = json.loads(answer.read_text())["verified"]
+    assert v["agrees"], v
+    assert v["effects_left"] == []
+    assert v["numbers"]["rotor_drag.mcoef"]["again"] == pytest.approx(0.45, rel=0.05)
+    for key in ("x", "y", "tilt"):
+        assert v["mismatch"][key]["after"] < 0.2 * v["mismatch"][key]["before"], v["mismatch"]
+    said = Page.of(page.read_text()).words
+    assert "The built-in simulator flies like the recording" in said
+
+
+def test_the_page_shows_what_was_flown_again(monkeypatch):
+    match = with_numbers(rotor_drag__mcoef=Compared(0.25, 0.5, 0.001, "1/s"))
+    flights = iter([course(), course(force=(0.4, 0.0, -9.8)), course(force=(0.01, 0.0, -9.8))])
+    monkeypatch.setattr("onboard.answers.flown_again.courses", lambda _: next(flights))
+    second = replace(match, real=SimpleNamespace(name="again"))
+    record = flown_again(match, second, "a", "b", "c")
+    said = Page.of(match_html(match, record)).words
+    assert "Flown again with what was found" in said
+    assert "0.40 → 0.010 m/s²" in said
+    assert "still shows: drag of the rotors" in said
