@@ -1,4 +1,4 @@
-"""Makes the pictures that the README shows: the status page during the demo, and two reports.
+"""Makes the pictures that the README shows: the status page during the demo, and reports.
 
     python docs/screenshots.py [FOLDER]
 
@@ -29,6 +29,9 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 
+from sitl.builtin.airframe.air import Air
+from sitl.builtin.airframe.aircraft import Aircraft
+from sitl.builtin.airframe.frame import Airframe
 from sitl.builtin.effects import Effect, TemperatureDrift
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec, write_tlog
@@ -56,6 +59,11 @@ IN_FLIGHT: tuple[Shot, ...] = (
 WRITTEN: tuple[Shot, ...] = (("written-laptop-dark.png", 1440, 900, "dark"),)
 REPORT: Shot = ("report-laptop.png", 1180, 1000, "light")
 EXPLAINED: Shot = ("explained-laptop.png", 1180, 1160, "light")
+MATCHED: tuple[tuple[Shot, str], ...] = (
+    (("match-laptop.png", 1180, 1160, "light"), "main"),
+    (("match-curves.png", 1180, 1180, "light"), "#wind"),
+)
+"""And the part of the page that is at the top of the picture."""
 
 
 def main(folder: Path) -> None:
@@ -81,6 +89,7 @@ def main(folder: Path) -> None:
             ):
                 browser.get(_report(Path(scratch), command, effects).as_uri())
                 _take(browser, folder, shot)
+            _take_match(browser, folder, _matched(Path(scratch)))
 
 
 def _report(scratch: Path, verb: str, effects: tuple[Effect, ...]) -> Path:
@@ -92,6 +101,24 @@ def _report(scratch: Path, verb: str, effects: tuple[Effect, ...]) -> Path:
     command = [sys.executable, "-m", "onboard", verb, str(log), "--report", str(page)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - ours
     return page
+
+
+def _matched(scratch: Path) -> Path:
+    """The page of a match: a copter with other rotors in wind that grows with height."""
+    log, page = scratch / "copter.tlog", scratch / "match.html"
+    air = Air.from_settings(5.0, 120.0, 0.5)
+    aircraft = Aircraft(craft=Airframe().with_drag(mcoef=0.45), air=air)
+    write_tlog(FlightSpec(duration=240.0, seed=5, aircraft=aircraft), log)
+    command = [sys.executable, "-m", "onboard", "match", str(log), "--report", str(page)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - ours
+    return page
+
+
+def _take_match(browser: webdriver.Chrome, folder: Path, page: Path) -> None:
+    for shot, top in MATCHED:
+        browser.get(page.as_uri())
+        browser.execute_script(f"document.querySelector('{top}').scrollIntoView()")
+        _take(browser, folder, shot)
 
 
 def _take(browser: webdriver.Chrome, folder: Path, shot: Shot) -> None:
