@@ -226,7 +226,7 @@ def _apart(v: Compared) -> bool:
 
 
 def _airspeed(v: Values) -> str:
-    s = v["scale"]
+    s = v["over_equivalent"]
     way = "less" if s.real < s.simulation else "more"
     size = 100.0 * abs(s.real / s.simulation - 1.0)
     return (
