@@ -30,6 +30,8 @@ X_LABELS = {
     "drag_y": "air-relative speed along y",
     "thrust": "command of the motors, 0 to 1",
 }
+WORST_SIGMA = 5.0
+"""Median sigmas past which an estimate of a block is too poor to be drawn."""
 LEAST_SAG_V = 0.2
 LEAST_WIND_M_S = 0.3
 """Below, a wind has no direction to speak of."""
@@ -118,14 +120,16 @@ def of_wind(wind: WindEstimate) -> list[Markup]:
     """Wind over time towards north and east, and along itself over height."""
     if len(wind.series_t) < 2 or len(wind.law) != len(wind.series_t):
         return []
+    size = np.linalg.norm(wind.series_sigma, axis=1)
+    told = size < WORST_SIGMA * float(np.median(size))
+    series_t = wind.series_t[told]
+    series, law, spread = wind.series[told], wind.law[told], wind.series_sigma[told]
     out = []
     for k, way in enumerate(("north", "east")):
-        estimate = Points(
-            wind.series_t, wind.series[:, k], "block", "estimate", 2.0 * wind.series_sigma[:, k]
-        )
-        lines = [Line(wind.series_t, wind.law[:, k], "found", "model")]
+        estimate = Points(series_t, series[:, k], "block", "estimate", 2.0 * spread[:, k])
+        lines = [Line(series_t, law[:, k], "found", "model")]
         if has_ekf(wind):
-            lines.append(Line(wind.series_t, wind.ekf[:, k], "theirs", "autopilot"))
+            lines.append(Line(series_t, wind.ekf[told, k], "theirs", "autopilot"))
         out.append(
             line_chart(
                 f"Wind towards {way}",
@@ -133,23 +137,24 @@ def of_wind(wind: WindEstimate) -> list[Markup]:
                 lines,
                 points=[estimate],
                 symmetric=False,
-                y_range=_wide(np.concatenate([wind.series[:, k], *(line.y for line in lines)])),
-                summary=f"mean {words.number(float(np.mean(wind.series[:, k])))} m/s",
+                y_range=_wide(np.concatenate([series[:, k], *(line.y for line in lines)])),
+                summary=f"mean {words.number(float(np.mean(series[:, k])))} m/s",
             )
         )
     speed = math.hypot(wind.north, wind.east)
     if speed < LEAST_WIND_M_S:
         return out
     along = np.array([wind.north, wind.east]) / speed
-    order = np.argsort(wind.series_height)
-    height, law = wind.series_height[order], wind.law[order] @ along
-    found = wind.series[order] @ along
-    top = 1.1 * float(max(found.max(), law.max()))
+    height = wind.series_height[told]
+    order = np.argsort(height)
+    height, model = height[order], law[order] @ along
+    found = series[order] @ along
+    top = 1.1 * float(max(found.max(), model.max()))
     out.append(
         line_chart(
             "Wind over height",
             "height above ground, m",
-            [Line(law, height, "found", "model")],
+            [Line(model, height, "found", "model")],
             points=[Points(found, height, "block", "estimate")],
             x_label="wind speed",
             x_unit="m/s",

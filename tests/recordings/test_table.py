@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,7 +19,7 @@ from onboard.core.inputs.samples import (
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.errors import ConfigurationError, RecordingError
 from onboard.recordings.table import open_table
-from onboard.recordings.table_map import load_map
+from onboard.recordings.table_map import WIDTHS, load_map
 from tests.recordings.table_writer import MAP, MOTORS, cells, moving, write_table
 
 ANGLES = (0.1, -0.2, 0.7)
@@ -171,3 +174,12 @@ def test_places_follow_velocities(table, columns):
     along = earth * np.cos(first.latitude)
     assert (last.longitude - first.longitude) * along == pytest.approx(east, rel=0.02)
     assert last.altitude - first.altitude == pytest.approx(-VELOCITY[2] * flown, rel=0.02)
+
+
+def test_the_map_of_the_manual_is_one(columns):
+    manual = Path(__file__).parents[2] / "docs" / "matching.md"
+    (text,) = re.findall(r"```text\n(vehicle.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
+    chosen = load_map(columns(text))
+    assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"}
+    assert chosen.quaternion
+    assert chosen.airborne
