@@ -36,6 +36,10 @@ def _excess(value: float, sigma: float) -> tuple[float, float]:
     return 1.0 + value, sigma
 
 
+def _half(value: float, sigma: float) -> tuple[float, float]:
+    return 0.5 * value, 0.5 * sigma
+
+
 def _milli(value: float, sigma: float) -> tuple[float, float]:
     return 1e-3 * value, 1e-3 * sigma
 
@@ -55,11 +59,11 @@ KEYS: dict[str, dict[str, dict[str, Converted]]] = {
     "turbulence": {"rms": {"rms": _same, "turbulence_rms": _same, "sigma": _same}},
     "air_density": {"ratio": {"ratio": _same, "excess": _excess}},
     "ground_effect": {"gain": {"gain": _same}},
-    "voltage_sag": {"share": {"share": _same}},
+    "voltage_sag": {"share": {"share": _same, "exponent": _half}},
     "drag": {"c_drag_p": {"c_drag_p": _same}},
     "lift": {"c_lift_0": {"c_lift_0": _same}, "c_lift_a": {"c_lift_a": _same}},
     "side_force": {"c_y_b": {"c_y_b": _same}},
-    "airspeed_scale": {"scale": {"scale": _same, "ratio": _same}},
+    "airspeed_scale": {"scale": {"scale": _same, "over_equivalent": _same}},
     "gps_latency": {"delay": {"delay": _same}},
     "mount_tilt": {"roll": {"roll": _same}, "pitch": {"pitch": _same}},
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from onboard.core.maths.arrays import Array
@@ -46,6 +48,12 @@ class Air:
         self.force_b = np.zeros((n, columns))
         self.alpha = self.pressure = self.lift = np.zeros(n)
         self._u_b: Array | None = None
+
+    def copied(self) -> Air:
+        """The same, to go on from in another way."""
+        out = copy(self)
+        out.force_b, out.wind_n = self.force_b.copy(), self.wind_n.copy()
+        return out
 
     @property
     def evenness(self) -> Array | float:

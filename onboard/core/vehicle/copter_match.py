@@ -38,6 +38,7 @@ from onboard.core.vehicle.matching import (
     matched,
     mismatch_of,
     not_testable_of,
+    note_of,
     numbers_of,
     rms,
     series_of,
@@ -107,6 +108,7 @@ def match_copter(
         series=series_of(found),
         seconds=len(found.model.flight) * found.model.flight.step_s,
         explained=is_explained(found),
+        note=note_of(found),
     )
 
 

@@ -20,6 +20,7 @@ from onboard.core.vehicle.limits import (
     NOISE_ROUNDS,
     ROUNDS,
     SETTLED,
+    STALE,
     THRUST_AXIS,
 )
 from onboard.core.vehicle.model import ForceModel
@@ -167,10 +168,11 @@ def _settled(
         return float(sum(np.sum(r[:, 0] ** 2) for r in rows) + prior @ (apart * apart))
 
     now = cost(theta)
+    at, slope = theta, model.steps(theta)
     for _ in range(ROUNDS):
-        rows = _rows(
-            model, measured - model.predicted(theta), model.steps(theta), noise, sensitivity
-        )
+        if np.max(np.abs(theta - at) / model.plausible) > STALE:
+            at, slope = theta, model.steps(theta)
+        rows = _rows(model, measured - model.predicted(theta), slope, noise, sensitivity)
         N, b = np.diag(prior), prior * (nominal - theta)
         for r in rows:
             N = N + r[:, 1:].T @ r[:, 1:]

@@ -69,6 +69,9 @@ ROUNDS: Final = 6
 """Gauss-Newton steps at the most [cost]."""
 SETTLED: Final = 0.02
 """Sigmas that a step may move and count as no move [cost]."""
+STALE: Final = 0.03
+"""Plausible sizes that the unknowns may move before derivatives are taken anew: drag and wind act
+together, by this share of each other [cost]."""
 NOISE_ROUNDS: Final = 3
 """Times that noise and unknowns are found in turn [cost]."""
 OUTLYING: Final = 5.0
@@ -95,6 +98,9 @@ AMBIGUOUS: Final = 10.0
 [probability]."""
 TURBULENCE_FLOOR_M_S: Final = 0.3
 """Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
+
+TOLD_S: Final = 1.0
+"""Spans of flight that were not used and are shorter are not told of, s [use]."""
 
 # What is shown (flown_alone, curves).
 

@@ -35,6 +35,13 @@ from onboard.core.vehicle.records import (
     ForceSeries,
     WindEstimate,
 )
+from onboard.core.vehicle.remainder import (
+    Remainder,
+    left_out,
+    left_out_sentence,
+    remainder_sentence,
+    remainders,
+)
 
 AIRSPEED = "airspeed_scale"
 FORCE = (0, 1, 2)
@@ -78,6 +85,8 @@ class Matched:
         held: (n, k) residual of each step by unknowns of other folds, m/s^2.
         nominal: (n, k) residual of the nominal airframe in still air.
         turbulence: of the air.
+        remainders: spans that the model does not describe.
+        left_out: spans, s since the start, that were not used.
     """
 
     fit: Fit
@@ -86,6 +95,8 @@ class Matched:
     held: Array
     nominal: Array
     turbulence: Turbulence
+    remainders: tuple[Remainder, ...] = ()
+    left_out: tuple[tuple[float, float], ...] = ()
 
     @property
     def model(self) -> ForceModel:
@@ -95,7 +106,7 @@ class Matched:
 
 def matched(model: ForceModel) -> Matched:
     """Fit, leave out what is no part of the model, fit again, decide."""
-    fit = fitted(model)
+    whole, fit = model, fitted(model)
     kept = _inlying(fit)
     if not kept.all():
         model = replace(model, flight=_cut(model.flight, kept))
@@ -104,7 +115,14 @@ def matched(model: ForceModel) -> Matched:
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)
     return Matched(
-        fit, choices, chosen, held_out(choices, chosen.effects), nominal, _turbulence(fit)
+        fit,
+        choices,
+        chosen,
+        held_out(choices, chosen.effects),
+        nominal,
+        _turbulence(fit),
+        remainders(whole, fit),
+        left_out(whole.flight, kept),
     )
 
 
@@ -288,6 +306,8 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 def is_explained(m: Matched) -> bool:
     """Whether what is left is less than what errors of the velocity or the gusts found make."""
+    if m.remainders:
+        return False
     if m.turbulence.found:
         return True
     left = [
@@ -296,6 +316,12 @@ def is_explained(m: Matched) -> bool:
         if axis in (0, 1)
     ]
     return max(left, default=0.0) < TURBULENCE_FLOOR_M_S
+
+
+def note_of(m: Matched) -> str:
+    """What a person must know of flight that is not described or was not used; may be empty."""
+    said = remainder_sentence(m.remainders), left_out_sentence(m.left_out)
+    return "; ".join(s for s in said if s)
 
 
 def _effect(model: ForceModel, name: str) -> Effect:

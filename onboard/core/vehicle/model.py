@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -101,6 +101,32 @@ class ForceModel:
         out: Array = self.air(theta).force_b[:, list(self.axes)]
         return out
 
+    def _stages(self, theta: Array) -> list[Air]:
+        """The prediction before each effect: what an unknown changes begins with its effect."""
+        air, out, at = self.start(self.flight), [], 0
+        for effect in self.effects:
+            out.append(air.copied())
+            n = len(effect.unknowns)
+            effect.act(air, theta[at : at + n].tolist())
+            at += n
+        return out
+
+    def _from(self, stages: Sequence[Air], number: int, theta: Array) -> Array:
+        """(n, k) prediction at unknowns that differ from the stages' from this effect on."""
+        air, at = stages[number].copied(), 0
+        for k, effect in enumerate(self.effects):
+            n = len(effect.unknowns)
+            if k >= number:
+                effect.act(air, theta[at : at + n].tolist())
+            at += n
+        out: Array = air.force_b[:, list(self.axes)]
+        return out
+
+    @property
+    def _owners(self) -> list[int]:
+        """Which effect each unknown is of."""
+        return [k for k, e in enumerate(self.effects) for _ in e.unknowns]
+
     def gust_slope(self, theta: Array) -> Array:
         """(n, k, 3) change of the force by a gust towards north, east, down, 1/s."""
         here = self.predicted(theta)
@@ -123,20 +149,21 @@ class ForceModel:
 
     def steps(self, theta: Array) -> Array:
         """(n, k, m) derivatives by one-sided differences: good enough to step by."""
-        here, columns = self.predicted(theta), []
-        for j, size in enumerate(self.plausible):
+        here, stages, columns = self.predicted(theta), self._stages(theta), []
+        for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
             there = theta.copy()
             there[j] += DIFFERENCE * size
-            columns.append((self.predicted(there) - here) / (DIFFERENCE * size))
+            columns.append((self._from(stages, owner, there) - here) / (DIFFERENCE * size))
         return np.stack(columns, axis=-1)
 
     def jacobian(self, theta: Array) -> Array:
         """(n, k, m) derivatives by central differences."""
-        columns = []
-        for j, size in enumerate(self.plausible):
+        stages, columns = self._stages(theta), []
+        for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
             h = DIFFERENCE * size
             up, down = theta.copy(), theta.copy()
             up[j] += h
             down[j] -= h
-            columns.append((self.predicted(up) - self.predicted(down)) / (2.0 * h))
+            apart = self._from(stages, owner, up) - self._from(stages, owner, down)
+            columns.append(apart / (2.0 * h))
         return np.stack(columns, axis=-1)

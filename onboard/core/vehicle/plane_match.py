@@ -24,6 +24,7 @@ from onboard.core.vehicle.matching import (
     matched,
     mismatch_of,
     not_testable_of,
+    note_of,
     numbers_of,
     series_of,
     wind_of,
@@ -76,6 +77,7 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         series=series_of(found),
         seconds=len(found.model.flight) * found.model.flight.step_s,
         explained=is_explained(found),
+        note=note_of(found),
     )
 
 

@@ -8,10 +8,12 @@ is taken off.  H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3 (1965).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import skew
@@ -72,7 +74,6 @@ class Smoothed:
 
 @dataclass(frozen=True, slots=True)
 class _Filtered:
-    score: float
     means: Array
     covariances: Array
     ahead_means: Array
@@ -80,9 +81,33 @@ class _Filtered:
     moves: Array
 
 
-def likelihood(steps: Steps, levels: Levels) -> float:
-    """Logarithm of the likelihood of what was measured."""
-    return _filtered(steps, levels).score
+def likelihoods(steps: Steps, levels: Sequence[Levels]) -> Array:
+    """(j,) logarithm of the likelihood of what was measured, by each of the levels at once."""
+    j, n = len(levels), len(steps.dt)
+    m, P, score = np.zeros((j, STATES)), np.tile(START, (j, 1, 1)), np.zeros(j)
+    first = np.flatnonzero(np.isfinite(steps.measured).all(axis=1))
+    if len(first):
+        m[:, V] = steps.measured[first[0]]
+    rates = np.array([_rate(its) for its in levels])
+    R_measured = np.array([_noise(its) for its in levels])
+    moves, kicks = _moves(steps)
+    diagonal = np.arange(STATES)
+    for k in range(n):
+        A = moves[k]
+        m = m @ A.T + kicks[k]
+        P = A @ P @ A.T
+        P[:, diagonal, diagonal] += rates * steps.dt[k]
+        rows = _seen(steps.measured[k])
+        y = np.concatenate([steps.measured[k], np.zeros(3)])[rows]
+        S = P[:, rows][:, :, rows] + R_measured[:, rows][:, :, rows]
+        inverse = np.linalg.inv(S)
+        e = y - m[:, rows]
+        gain = P[:, :, rows] @ inverse
+        m = m + np.einsum("jab,jb->ja", gain, e)
+        P = P - gain @ P[:, rows]
+        P = 0.5 * (P + np.swapaxes(P, 1, 2))
+        score -= 0.5 * (np.einsum("ja,jab,jb->j", e, inverse, e) + np.linalg.slogdet(S)[1])
+    return score
 
 
 def smoothed(steps: Steps, levels: Levels) -> Smoothed:
@@ -99,39 +124,58 @@ def smoothed(steps: Steps, levels: Levels) -> Smoothed:
     return Smoothed(x, np.sqrt(np.maximum(variance / n, 0.0)))
 
 
+def _rate(levels: Levels) -> Array:
+    """(9,) growth of the variances by time."""
+    return np.array([FORCE_WALK**2] * 3 + [levels.attitude**2] * 3 + [BIAS_WALK**2] * 3)
+
+
+def _noise(levels: Levels) -> Array:
+    """(6, 6) covariance of velocity and attitude as they are measured."""
+    return np.diag([levels.velocity**2] * 3 + [LOOSE_RAD**2] * 3)
+
+
+def _seen(measured: Array) -> NDArray[np.intp]:
+    """Which of velocity (3) and attitude (3) is measured."""
+    return np.flatnonzero(np.isfinite(np.concatenate([measured, np.zeros(3)])))
+
+
+def _moves(steps: Steps) -> tuple[Array, Array]:
+    """(n, 9, 9) how the errors go on from fix to fix, and (n, 9) what is added to them."""
+    n = len(steps.dt)
+    crosses = skew(steps.impulse)
+    moves, kicks = np.tile(np.eye(STATES), (n, 1, 1)), np.zeros((n, STATES))
+    moves[:, V, PSI] = -crosses
+    moves[:, PSI, BIAS] = -steps.dt[:, None, None] * steps.R_nb
+    # Half of a step's turning acts on the velocity of the same step.
+    moves[:, V, BIAS] = 0.5 * steps.dt[:, None, None] * crosses @ steps.R_nb
+    kicks[:, PSI] = -steps.turned
+    kicks[:, V] = 0.5 * np.einsum("nij,nj->ni", crosses, steps.turned)
+    return moves, kicks
+
+
 def _filtered(steps: Steps, levels: Levels) -> _Filtered:
     n = len(steps.dt)
-    m, P, score = np.zeros(STATES), START.copy(), 0.0
+    m, P = np.zeros(STATES), START.copy()
     first = np.flatnonzero(np.isfinite(steps.measured).all(axis=1))
     if len(first):
         m[V] = steps.measured[first[0]]
     means, ahead_means = np.empty((n, STATES)), np.empty((n, STATES))
-    covariances, ahead, moves = (np.empty((n, STATES, STATES)) for _ in range(3))
-    crosses = skew(steps.impulse)
-    rate = np.array([FORCE_WALK**2] * 3 + [levels.attitude**2] * 3 + [BIAS_WALK**2] * 3)
-    R_measured = np.diag([levels.velocity**2] * 3 + [LOOSE_RAD**2] * 3)
+    covariances, ahead = (np.empty((n, STATES, STATES)) for _ in range(2))
+    moves, kicks = _moves(steps)
+    rate, R_measured = _rate(levels), _noise(levels)
+    diagonal = np.arange(STATES)
     for k in range(n):
-        h = steps.dt[k]
-        A = np.eye(STATES)
-        A[V, PSI] = -crosses[k]
-        A[PSI, BIAS] = -h * steps.R_nb[k]
-        # Half of a step's turning acts on the velocity of the same step.
-        A[V, BIAS] = 0.5 * h * crosses[k] @ steps.R_nb[k]
-        m = A @ m
-        m[PSI] -= steps.turned[k]
-        m[V] += 0.5 * crosses[k] @ steps.turned[k]
+        A = moves[k]
+        m = A @ m + kicks[k]
         P = A @ P @ A.T
-        P[np.diag_indices(STATES)] += rate * h
-        means[k], ahead_means[k], ahead[k], moves[k] = m, m, P, A
-        y = np.concatenate([steps.measured[k], np.zeros(3)])
-        seen = np.flatnonzero(np.isfinite(y))
+        P[diagonal, diagonal] += rate * steps.dt[k]
+        ahead_means[k], ahead[k] = m, P
+        seen = _seen(steps.measured[k])
+        y = np.concatenate([steps.measured[k], np.zeros(3)])[seen]
         S = P[np.ix_(seen, seen)] + R_measured[np.ix_(seen, seen)]
-        inverse = np.linalg.inv(S)
-        e = y[seen] - m[seen]
-        gain = P[:, seen] @ inverse
-        m = m + gain @ e
+        gain = np.linalg.solve(S, P[seen]).T
+        m = m + gain @ (y - m[seen])
         P = P - gain @ P[seen]
         P = 0.5 * (P + P.T)
-        score -= 0.5 * (float(e @ inverse @ e) + float(np.linalg.slogdet(S)[1]))
         means[k], covariances[k] = m, P
-    return _Filtered(score, means, covariances, ahead_means, ahead, moves)
+    return _Filtered(means, covariances, ahead_means, ahead, moves)

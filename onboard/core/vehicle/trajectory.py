@@ -28,7 +28,7 @@ from onboard.core.vehicle.smoother import (
     Levels,
     Steps,
     V,
-    likelihood,
+    likelihoods,
     smoothed,
 )
 
@@ -161,7 +161,7 @@ def _levels(steps: Steps) -> Levels:
     """The likeliest noise, of the first minute or two."""
     sample = steps.until(LEVELS_FROM)
     trials = [Levels(a, v) for a in ATTITUDE_WANDER for v in VELOCITY_NOISE_M_S]
-    return max(trials, key=lambda levels: likelihood(sample, levels))
+    return trials[int(np.argmax(likelihoods(sample, trials)))]
 
 
 def _integral(t: Array, x: Array) -> Array:

@@ -1,0 +1,140 @@
+"""What no effect describes: blocks of flight whose remainder is beyond chance, and matters.
+
+A fit leaves out steps that are far from its model, and one number over a whole flight hides what
+lasts ten seconds.  So the finished model is asked about every block, those that it left out too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.chi_square import survival
+from onboard.core.vehicle.fit import Fit
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import BLOCK_S, FALSE_ALARM, TOLD_S, TURBULENCE_FLOOR_M_S
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import whitened
+from onboard.core.vehicle.places import AXES
+from onboard.core.vehicle.windows import windows_of
+
+FORCES = (0, 1, 2)
+MOST_TOLD = 3
+"""Spans that a sentence names [use]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """A span with more than chance: s since the start, body axis, and RMS of it, m/s^2."""
+
+    start_s: float
+    end_s: float
+    axis: str
+    force: float
+
+
+def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
+    """Spans of the whole flight that the fit describes worse than chance and gusts would have it.
+
+    In a span the whitened squares of a block are rarer than :data:`FALSE_ALARM` among all blocks,
+    by the scatter that blocks usually have, and what is left is more than a gust of
+    :data:`TURBULENCE_FLOOR_M_S` would make.
+
+    Args:
+        whole: the model with the whole flight, also what the fit left out.
+        fit: of it.
+    """
+    flight = whole.flight
+    windows = windows_of(flight)
+    residual = windows.mean(whole.measured() - whole.predicted(fit.theta))
+    sensitivity = windows.mean(whole.sensitivity(fit.theta))
+    t = flight.t[windows.first] - flight.t[0]
+    block = np.floor(t / BLOCK_S).astype(int)
+    numbers = np.unique(block)
+    found: list[Remainder] = []
+    for k, axis in enumerate(whole.axes):
+        if axis not in FORCES:
+            continue
+        e = whitened(
+            residual[:, k, None], fit.noise[k], sensitivity[:, k], windows.piece, windows.length_s
+        )[:, 0]
+        rows = np.array([np.count_nonzero(block == b) for b in numbers])
+        energy = np.array([float(np.sum(e[block == b] ** 2)) for b in numbers])
+        usual, share = _scatter(energy / rows, rows)
+        level = FALSE_ALARM / (len(numbers) * len(whole.axes))
+        for b, count, its in zip(numbers.tolist(), rows.tolist(), energy.tolist(), strict=True):
+            mine = block == b
+            force = _rms(residual[mine, k])
+            matters = force > TURBULENCE_FLOOR_M_S * _rms(sensitivity[mine, k])
+            dof = max(round(share * count), 1)
+            if matters and survival(dof * its / (usual * count), dof) < level:
+                start, end = float(t[mine][0]), float(t[mine][-1]) + windows.length_s
+                found.append(Remainder(start, end, AXES[axis], force))
+    return _joined(found)
+
+
+def left_out(flight: Flight, kept: Mask) -> tuple[tuple[float, float], ...]:
+    """Spans (s since the start) of steps that are not kept (n,), as long as is worth telling."""
+    out: list[tuple[float, float]] = []
+    for t in (flight.t[~kept] - flight.t[0]).tolist():
+        if out and t - out[-1][1] < TOLD_S:
+            out[-1] = (out[-1][0], t)
+        else:
+            out.append((t, t))
+    return tuple((a, b) for a, b in out if b - a >= TOLD_S)
+
+
+def remainder_sentence(found: tuple[Remainder, ...]) -> str:
+    """What a person is told of them; empty where there are none."""
+    if not found:
+        return ""
+    worst = sorted(found, key=lambda r: -r.force * (r.end_s - r.start_s))
+    said = [
+        f"{r.start_s:.0f}-{r.end_s:.0f} s ({r.axis}, {r.force:.2f} m/s^2)"
+        for r in sorted(worst[:MOST_TOLD], key=lambda r: r.start_s)
+    ]
+    more = f" and {len(worst) - MOST_TOLD} more" if len(worst) > MOST_TOLD else ""
+    return f"no effect describes the force at {', '.join(said)}{more}"
+
+
+def left_out_sentence(spans: tuple[tuple[float, float], ...]) -> str:
+    """What a person is told of spans that no fit used; empty where there are none."""
+    if not spans:
+        return ""
+    longest = sorted(sorted(spans, key=lambda s: s[0] - s[1])[:MOST_TOLD])
+    said = ", ".join(f"{a:.0f}-{b:.0f} s" for a, b in longest)
+    more = f" and {len(spans) - MOST_TOLD} shorter spans" if len(spans) > MOST_TOLD else ""
+    return f"not used, too far from the model: {said}{more}"
+
+
+def _joined(found: list[Remainder]) -> tuple[Remainder, ...]:
+    """Neighbouring blocks of one axis as one span."""
+    out: list[Remainder] = []
+    for r in found:
+        last = out[-1] if out else None
+        if last and last.axis == r.axis and r.start_s - last.end_s < TOLD_S:
+            before, now = last.end_s - last.start_s, r.end_s - r.start_s
+            mean = (before * last.force**2 + now * r.force**2) / (before + now)
+            out[-1] = Remainder(last.start_s, r.end_s, r.axis, float(np.sqrt(mean)))
+        else:
+            out.append(r)
+    return tuple(out)
+
+
+def _scatter(ratio: Array, rows: Array) -> tuple[float, float]:
+    """What blocks' mean squares (b,) usually are, and which share of their rows is independent.
+
+    Means of independent squares scatter by ``sqrt(2 / rows)``; those of gusty air by more.
+    """
+    usual = max(float(np.median(ratio)), 1.0)
+    logarithm = np.log(np.maximum(ratio, 1e-9))
+    spread = 1.4826 * float(np.median(np.abs(logarithm - np.median(logarithm))))
+    expected = math.sqrt(2.0 / float(np.median(rows)))
+    return usual, min(1.0, (expected / max(spread, 1e-9)) ** 2)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))
