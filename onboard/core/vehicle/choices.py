@@ -58,7 +58,7 @@ class Choices:
         squares = self._s - 2.0 * self._b @ x + x @ self._N @ x + f.prior @ (apart * apart)
         covariance = np.linalg.inv((self._N + np.diag(f.prior))[np.ix_(free, free)])
         sigma = np.zeros(len(x))
-        plain = np.sqrt(np.diag(covariance) * f.inflation[free])
+        plain = np.hypot(np.sqrt(np.diag(covariance) * f.inflation[free]), f.doubt[free])
         for i, s in zip(free, plain.tolist(), strict=True):
             sigma[i] = f.model.unknowns[i].doubted(float(f.theta[i] + x[i]), s)
         return Solved(x, sigma, float(squares) / f.scale)

@@ -21,7 +21,6 @@ from onboard.core.vehicle.limits import (
     ROUNDS,
     SETTLED,
     STALE,
-    THRUST_AXIS,
 )
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
@@ -53,6 +52,7 @@ class Fit:
         jacobian: (n, k, m) of the prediction.
         sensitivity: (n, k) to gusts, 1/s.
         block: (n,) number of the block of each step.
+        doubt: (m,) by how much gusts may have turned the unknowns.
     """
 
     model: ForceModel
@@ -65,6 +65,7 @@ class Fit:
     jacobian: Array
     sensitivity: Array
     block: Array
+    doubt: Array
 
     @property
     def information(self) -> Array:
@@ -82,7 +83,7 @@ class Fit:
     @property
     def sigma(self) -> Array:
         """(m,) standard deviations, with what the laws are good for."""
-        plain = np.sqrt(np.diag(self.covariance))
+        plain = np.hypot(np.sqrt(np.diag(self.covariance)), self.doubt)
         pairs = zip(self.model.unknowns, self.theta.tolist(), plain.tolist(), strict=True)
         return np.array([u.doubted(v, s) for u, v, s in pairs])
 
@@ -153,6 +154,7 @@ def summed(
         jacobian,
         sensitivity,
         block,
+        np.zeros(len(theta)),
     )
 
 
@@ -211,7 +213,7 @@ def _rows(
             rows = np.hstack([rows, jacobian[:, k]])
         sensitive = windows.mean(sensitivity[:, k])
         made = whitened(windows.mean(rows), its, sensitive, windows.piece, step)
-        if jacobian is not None and model.instrumented and model.axes[k] == THRUST_AXIS:
+        if jacobian is not None and model.axes[k] in model.instrumented:
             made[:, 1:] = _instrumented(made[:, 1:], windows.piece)
         out.append(made)
     return out

@@ -99,8 +99,13 @@ AMBIGUOUS: Final = 10.0
 TURBULENCE_FLOOR_M_S: Final = 0.3
 """Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
 
+MOST_BY_GUSTS: Final = 0.95
+"""Share of what tells an unknown that gusts may make; past it nothing is known [probability]."""
 TOLD_S: Final = 1.0
 """Spans of flight that were not used and are shorter are not told of, s [use]."""
+SENSED_GUST_M_S: Final = 0.15
+"""Gusts below this are within what an airspeed sensor wanders by: a per cent of a plane's speed,
+m/s [data sheet]."""
 
 # What is shown (flown_alone, curves).
 

@@ -17,15 +17,17 @@ from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.flown_alone import drift_alone
+from onboard.core.vehicle.gust_errors import gust_doubt
 from onboard.core.vehicle.limits import (
     FALSE_ALARM,
     MOST_OUTLYING,
     OUTLYING,
+    SENSED_GUST_M_S,
     SURE,
     TURBULENCE_FLOOR_M_S,
 )
 from onboard.core.vehicle.model import ForceModel
-from onboard.core.vehicle.noise import fitted_noise, gust_evidence
+from onboard.core.vehicle.noise import AxisNoise, fitted_noise, gust_evidence, likelihood
 from onboard.core.vehicle.places import AXES, places_of
 from onboard.core.vehicle.records import (
     Alone,
@@ -42,6 +44,7 @@ from onboard.core.vehicle.remainder import (
     remainder_sentence,
     remainders,
 )
+from onboard.core.vehicle.windows import windows_of
 
 AIRSPEED = "airspeed_scale"
 FORCE = (0, 1, 2)
@@ -59,6 +62,7 @@ class Turbulence:
         whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; the same as
             ``rms`` where that is not known.
         whole_sigma: of it.
+        floor: what other things than gusts look like, m/s.
     """
 
     rms: float
@@ -66,12 +70,17 @@ class Turbulence:
     evidence: float
     whole: float
     whole_sigma: float
+    floor: float = TURBULENCE_FLOOR_M_S
+
+    @property
+    def seen(self) -> bool:
+        """Whether it is more than chance."""
+        return survival(self.evidence, 1) < FALSE_ALARM
 
     @property
     def found(self) -> bool:
         """Whether it is more than chance, and than errors of the velocity look like."""
-        sure = self.rms > TURBULENCE_FLOOR_M_S + SURE * self.sigma
-        return sure and survival(self.evidence, 1) < FALSE_ALARM
+        return self.seen and self.rms > self.floor + SURE * self.sigma
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +120,9 @@ def matched(model: ForceModel) -> Matched:
     if not kept.all():
         model = replace(model, flight=_cut(model.flight, kept))
         fit = fitted(model, fit.theta)
+    turbulence = _turbulence(fit)
+    if AIRSPEED in {e.name for e in model.effects} and turbulence.seen:
+        fit = replace(fit, doubt=gust_doubt(fit, turbulence.rms))
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)
@@ -120,7 +132,7 @@ def matched(model: ForceModel) -> Matched:
         chosen,
         held_out(choices, chosen.effects),
         nominal,
-        _turbulence(fit),
+        turbulence,
         remainders(whole, fit),
         left_out(whole.flight, kept),
     )
@@ -358,9 +370,30 @@ def _cut(flight: Flight, kept: Mask) -> Flight:
     return out
 
 
+def _felt(fit: Fit) -> Turbulence:
+    """Gusts by what the airspeed sensor reads beyond the model, as far as it is no white noise."""
+    k, flight = len(fit.model.axes) - 1, fit.model.flight
+    windows = windows_of(flight)
+    residual = windows.mean(fit.residual[:, k])
+    noise = fitted_noise(residual, np.ones(len(residual)), windows.piece, windows.length_s)
+    data = residual, windows.piece, windows.length_s
+    evidence = 2.0 * (likelihood(*data, noise) - likelihood(*data, AxisNoise(rms(residual))))
+    scale = float(fit.theta[fit.model.indices(AIRSPEED)[0]])
+    gust = noise.force * math.sqrt(1.0 - noise.white) / max(abs(scale), 0.1)
+    memory = 2.0 * (noise.correlation_s + windows.length_s)
+    sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
+    return Turbulence(gust, sigma, evidence, gust, sigma, SENSED_GUST_M_S)
+
+
 def _turbulence(fit: Fit) -> Turbulence:
-    """Gusts by how the lateral noise grows with the sensitivity to them."""
+    """Gusts by how the lateral noise grows with the sensitivity to them.
+
+    An airspeed sensor shows those along the flow directly: a plane's angles follow the gusts, so
+    that its forces hide them.
+    """
     flight = fit.model.flight
+    if AIRSPEED in {e.name for e in fit.model.effects}:
+        return _felt(fit)
     lateral = (0, 1) if "rotor_drag" in {e.name for e in fit.model.effects} else (1,)
     found = []
     for k, axis in enumerate(fit.model.axes):

@@ -33,15 +33,15 @@ class ForceModel:
         effects: in the order in which they act.
         axes: body axes that it predicts.
         start: makes the air.
-        instrumented: whether the vehicle's commands answer what acts along z (see
-            :func:`onboard.core.vehicle.fit.fitted`).
+        instrumented: axes along which what the vehicle does answers the disturbance, so that
+            regressors must be told from their past (see :func:`onboard.core.vehicle.fit.fitted`).
     """
 
     flight: Flight
     effects: tuple[Effect, ...]
     axes: tuple[int, ...]
     start: Start
-    instrumented: bool = False
+    instrumented: tuple[int, ...] = ()
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -101,9 +101,11 @@ class ForceModel:
         out: Array = self.air(theta).force_b[:, list(self.axes)]
         return out
 
-    def _stages(self, theta: Array) -> list[Air]:
+    def _stages(self, theta: Array, gust: Array | None = None) -> list[Air]:
         """The prediction before each effect: what an unknown changes begins with its effect."""
         air, out, at = self.start(self.flight), [], 0
+        if gust is not None:
+            air.gust_n = gust
         for effect in self.effects:
             out.append(air.copied())
             n = len(effect.unknowns)
@@ -156,9 +158,9 @@ class ForceModel:
             columns.append((self._from(stages, owner, there) - here) / (DIFFERENCE * size))
         return np.stack(columns, axis=-1)
 
-    def jacobian(self, theta: Array) -> Array:
-        """(n, k, m) derivatives by central differences."""
-        stages, columns = self._stages(theta), []
+    def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
+        """(n, k, m) derivatives by central differences, in air that also moves by ``gust`` (3,)."""
+        stages, columns = self._stages(theta, gust), []
         for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
             h = DIFFERENCE * size
             up, down = theta.copy(), theta.copy()

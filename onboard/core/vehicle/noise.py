@@ -133,6 +133,12 @@ def gust_evidence(
     return 2.0 * (score - none), trial.gust
 
 
+def likelihood(residual: Array, piece: NDArray[np.int64], step_s: float, noise: AxisNoise) -> float:
+    """Logarithm of the likelihood of a residual (n,) by a noise that does not grow with gusts."""
+    shape = 0.0, noise.correlation_s, noise.white
+    return _scored(residual, np.ones(len(residual)), piece, step_s, shape)[0]
+
+
 def _scored(
     residual: Array,
     sensitivity: Array,

@@ -73,8 +73,18 @@ def unstalled(flight: Flight, frame: PlaneAirframe, wind_n: Array) -> Flight:
     return replace(out, piece=np.concatenate([[0], np.cumsum(breaks)]))
 
 
-def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> ForceModel:
-    """Every effect of a plane that this recording can speak of."""
+def plane_model(
+    flight: Flight, frame: PlaneAirframe, force_sigma: Array, *, gusty: bool = False
+) -> ForceModel:
+    """Every effect of a plane that this recording can speak of.
+
+    Args:
+        flight: with throttle and rudder, if the recording has outputs.
+        frame: to compare with.
+        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
+        gusty: whether the air is turbulent: then a plane that keeps its lift turns its nose by the
+            gusts, and least squares would take that for lift that hardly depends on the angle.
+    """
     sensor = has_airspeed(flight)
 
     def start(of: Flight) -> Air:
@@ -99,7 +109,8 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
         axes: tuple[int, ...] = (1, 2)
     else:
         axes = (0, 1, 2)
-    return ForceModel(flight, effects, (*axes, COLUMN) if sensor else axes, start)
+    axes = (*axes, COLUMN) if sensor else axes
+    return ForceModel(flight, effects, axes, start, instrumented=axes if gusty else ())
 
 
 DENSITY_RANGE_M = 500.0
