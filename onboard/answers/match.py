@@ -121,7 +121,7 @@ def match(
     return Match(
         recording,
         other,
-        _verdict(vehicle, every),
+        _verdict(vehicle, simulated, every),
         every,
         vehicle,
         simulated,
@@ -237,12 +237,15 @@ def _value(
     return Compared(shown.simulation, shown.simulation, 0.0, shown.unit)
 
 
-def _verdict(vehicle: VehicleMatch, effects: tuple[Difference, ...]) -> Verdict:
+def _verdict(
+    vehicle: VehicleMatch, simulated: VehicleMatch | None, effects: tuple[Difference, ...]
+) -> Verdict:
     if vehicle.series is None:
         return Verdict.INSUFFICIENT if not effects else Verdict.PARTLY_EXPLAINED
+    explained = vehicle.explained and (simulated is None or simulated.explained)
     if not effects:
-        return Verdict.CLEAN if vehicle.explained else Verdict.UNEXPLAINED
-    return Verdict.EXPLAINED if vehicle.explained else Verdict.PARTLY_EXPLAINED
+        return Verdict.CLEAN if explained else Verdict.UNEXPLAINED
+    return Verdict.EXPLAINED if explained else Verdict.PARTLY_EXPLAINED
 
 
 def settings_of(

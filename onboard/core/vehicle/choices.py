@@ -80,6 +80,33 @@ class Choices:
             out.append((fold, x))
         return out
 
+    def lasting(self, effects: Sequence[str], places: Sequence[int], whole: Solved) -> bool:
+        """Whether one of these unknowns (places) is off also without any two blocks in a row.
+
+        What is of the vehicle is there all the time, what is of the air for a while (a gust front)
+        is not.  Only flight that would show the difference is a witness against it.
+
+        Args:
+            effects: that are free.
+            places: of the unknowns that are asked about.
+            whole: by all blocks.
+        """
+        f, blocks = self.fit, self.fit.blocks
+        lasts = set(places)
+        for i in range(len(blocks) - 1):
+            N, b, _ = _sum(blocks[i : i + 2])
+            x, free = self._at(effects, self._N - N, self._b - b)
+            rest = (self._N - N + np.diag(f.prior))[np.ix_(free, free)]
+            plain = np.sqrt(np.diag(np.linalg.inv(rest)) * f.inflation[free])
+            sigmas = dict(zip(free, plain.tolist(), strict=True))
+            for k in tuple(lasts):
+                unknown = f.model.unknowns[k]
+                apart = abs(f.theta[k] + x[k] - unknown.nominal)
+                told = abs(f.theta[k] + whole.x[k] - unknown.nominal) > TESTABLE * sigmas[k]
+                if told and apart < unknown.floor + SURE * sigmas[k]:
+                    lasts.discard(k)
+        return bool(lasts)
+
     def _at(self, effects: Sequence[str], N: Array, b: Array) -> tuple[Array, list[int]]:
         """Unknowns about the fit's by these sums, and which of them are free."""
         f = self.fit
@@ -140,6 +167,8 @@ def _passes(choices: Choices, chosen: Sequence[str], name: str, gain: float, lev
         return False
     with_it = choices.solved([*chosen, name])
     if not _matters(choices.fit, places, with_it):
+        return False
+    if not choices.lasting([*chosen, name], places, with_it):
         return False
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
