@@ -147,14 +147,16 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
         commands = plane_commands(recording.signals)
     flight = _flight(recording, commands)
     names = NAMES.get(kind, NAMES["copter"])
-    if flight is None or len(flight) < FEWEST_STEPS:
-        absent = tuple(NotTestable(n, NOTHING) for n in names)
-        return VehicleMatch(kind or "unknown", not_testable=absent, note=NOTHING)
-    if kind not in (*COPTERS, *PLANES):
-        why = f"no airframe is known of a {kind}" if kind else "nobody says what kind of vehicle"
-        return VehicleMatch(
-            kind or "unknown", not_testable=tuple(NotTestable(n, why) for n in names), note=why
-        )
+    why = ""
+    if kind and kind not in (*COPTERS, *PLANES):
+        why = f"no airframe is known of a {kind}"
+    elif flight is None or len(flight) < FEWEST_STEPS:
+        why = NOTHING
+    elif not kind:
+        why = "nobody says what kind of vehicle"
+    if why or flight is None:
+        absent = tuple(NotTestable(n, why) for n in names)
+        return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
     sigma = recording.sensors.force_sigma
     if kind in COPTERS:
         return match_copter(flight, recording.signals, airframe, sigma)
