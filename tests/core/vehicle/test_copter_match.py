@@ -101,3 +101,13 @@ def test_sigmas_cover_the_truth_over_many_flights():
             misses.append(abs(numbers[key].real - truth) / numbers[key].sigma)
     assert np.mean(np.array(misses) < 2.0) >= 0.85
     assert max(misses) < 5.0
+
+
+def test_a_gust_front_is_said_and_is_not_called_clean():
+    flight = copter_flight(seed=11)
+    struck = (flight.t > flight.t[0] + 80.0) & (flight.t < flight.t[0] + 89.0)
+    flight.f_b[struck, 0] += 0.25 * 5.0
+    match = matched(flight)
+    assert names(match) == set()
+    assert not match.explained
+    assert "no effect describes the force at" in match.note
