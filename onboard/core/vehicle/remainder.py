@@ -15,7 +15,15 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import BLOCK_S, FALSE_ALARM, TOLD_S, TURBULENCE_FLOOR_M_S
+from onboard.core.vehicle.limits import (
+    BLOCK_S,
+    FALSE_ALARM,
+    GROUND_M,
+    MARGIN_S,
+    STILL_M_S,
+    TOLD_S,
+    TURBULENCE_FLOOR_M_S,
+)
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import whitened
 from onboard.core.vehicle.places import AXES
@@ -54,13 +62,23 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     t = flight.t[windows.first] - flight.t[0]
     block = np.floor(t / BLOCK_S).astype(int)
     numbers = np.unique(block)
+    flying = ~near_ground(flight)[windows.first]
+    residual = residual * flying[:, None]
     found: list[Remainder] = []
     for k, axis in enumerate(whole.axes):
         if axis not in FORCES:
             continue
-        e = whitened(
-            residual[:, k, None], fit.noise[k], sensitivity[:, k], windows.piece, windows.length_s
-        )[:, 0]
+        # Contact with the ground is no effect that was overlooked.
+        e = (
+            flying
+            * whitened(
+                residual[:, k, None],
+                fit.noise[k],
+                sensitivity[:, k],
+                windows.piece,
+                windows.length_s,
+            )[:, 0]
+        )
         rows = np.array([np.count_nonzero(block == b) for b in numbers])
         energy = np.array([float(np.sum(e[block == b] ** 2)) for b in numbers])
         usual, share = _scatter(energy / rows, rows)
@@ -74,6 +92,27 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
                 start, end = float(t[mine][0]), float(t[mine][-1]) + windows.length_s
                 found.append(Remainder(start, end, AXES[axis], force))
     return _joined(found)
+
+
+def near_ground(flight: Flight) -> Mask:
+    """(n,) steps within :data:`MARGIN_S` of where the vehicle may have touched the ground.
+
+    Where it was as low as that, or neither climbed nor sank before it first did and after it last
+    did: such a stretch cannot be told from one that stands or rolls.
+    """
+    touching = flight.height < flight.ground + GROUND_M
+    moving = np.flatnonzero(np.abs(flight.v_n[:, 2]) > STILL_M_S)
+    if len(moving):
+        touching[: moving[0]] = True
+        touching[moving[-1] + 1 :] = True
+    low = flight.t[touching]
+    if not len(low):
+        return np.zeros(len(flight), dtype=bool)
+    at = np.searchsorted(low, flight.t)
+    before = np.abs(flight.t - low[np.maximum(at - 1, 0)])
+    after = np.abs(flight.t - low[np.minimum(at, len(low) - 1)])
+    out: Mask = np.minimum(before, after) <= MARGIN_S
+    return out
 
 
 def left_out(flight: Flight, kept: Mask) -> tuple[tuple[float, float], ...]:
