@@ -1,7 +1,7 @@
 """What is left of the vehicle under a flood: samples heard, stalls of the loop, what is written.
 
-An armed vehicle that stands (20 samples a second), or the simulated one in flight; the daemon, which
-believes that it has learned something worth writing; and somebody who floods its port from others.
+An armed vehicle that stands (20 samples a second), or the simulated one in flight; the daemon,
+which believes that it has learned something worth writing; and others who flood its port.
 ``python -m benchmarks.flood --seconds 10``.
 """
 
@@ -115,9 +115,7 @@ def crowd(port: int) -> None:
 def many(port: int) -> None:
     """Disarmed HEARTBEATs, 50,000 a second, from 400 ports in turn."""
     senders = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(400)]
-    beat = Codec(system=1, component=1).encode(
-        mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3)
-    )
+    beat = Codec(system=1, component=1).encode(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3))
     paced(lambda n: senders[n % 400].sendto(beat, ("127.0.0.1", port)), A_SECOND)
 
 
@@ -189,11 +187,9 @@ async def watched(
                 while not service.link.presence.proven:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
             found = time.monotonic() - began
-            wanted = calibration()
             offset = tuple(to_float32(0.05 + 0.01 * i) for i in range(3))
             if vehicle is stand:
                 convinced(service, calibration(in_force_offset=offset))
-            del wanted
             await asyncio.sleep(LEARNED_S)
             counts = service.parts.traffic._counts  # noqa: SLF001
             quiet = await rate(counts, QUIET_S)

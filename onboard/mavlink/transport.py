@@ -259,7 +259,7 @@ def line_of_its_own(sock: socket.socket, address: Address) -> socket.socket | No
     """
     line = socket.socket(sock.family, sock.type)
     try:
-        line.setblocking(False)
+        line.settimeout(0.0)
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, limits.SOCKET_BYTES)
         for one in (sock, line):
             one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
