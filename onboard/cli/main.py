@@ -16,6 +16,7 @@ from importlib.util import find_spec
 import click
 
 from onboard import __version__
+from onboard.cli.simulator import make_importable
 from onboard.errors import OnboardError
 
 DONE, USAGE, INTERRUPTED = 0, 2, 130
@@ -30,11 +31,15 @@ class Verb:
     module: str
     attribute: str
     summary: str
+    simulates: bool = False
 
 
 VERBS: dict[str, Verb] = {
     "demo": Verb(
-        "onboard.cli.demo", "demo", "Fly a simulated autopilot and calibrate it, to see it work."
+        "onboard.cli.demo",
+        "demo",
+        "Fly a simulated autopilot and calibrate it, to see it work.",
+        simulates=True,
     ),
     "run": Verb("onboard.cli.run", "run", "The service: calibrate an autopilot while it flies."),
     "status": Verb("onboard.cli.status", "status", "What the running service has learnt."),
@@ -51,7 +56,12 @@ VERBS: dict[str, Verb] = {
     ),
     "fleet": Verb("onboard.cli.fleet", "fleet", "Calibrate from every recording in folders."),
     "service": Verb("onboard.cli.service", "service", "The systemd unit: show it, install it."),
-    "sim": Verb("onboard.cli.sim", "sim", "The simulated autopilot alone, for any ground station."),
+    "sim": Verb(
+        "onboard.cli.sim",
+        "sim",
+        "The simulated autopilot alone, for any ground station.",
+        simulates=True,
+    ),
 }
 
 
@@ -68,6 +78,8 @@ class LazyGroup(click.Group):
         if cmd_name not in self.list_commands(ctx):
             return None
         verb = VERBS[cmd_name]
+        if verb.simulates:
+            make_importable()
         command = getattr(importlib.import_module(verb.module), verb.attribute)
         if not isinstance(command, click.Command):
             raise TypeError(f"{verb.module}.{verb.attribute} is not a command")

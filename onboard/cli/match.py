@@ -138,7 +138,7 @@ def _frame(file: str) -> Mapping[str, object]:
         found = json.loads(Path(file).read_text(encoding="utf-8"))
     except OSError as error:
         raise UsageError(f"--frame {file}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UsageError(f"--frame {file}: no JSON ({error})") from None
     if not isinstance(found, dict):
         raise UsageError(f"--frame {file}: no JSON object")

@@ -172,7 +172,11 @@ class Connection:
         broken = self._broken = asyncio.get_running_loop().create_future()
         try:
             self._transport = await open_transport(
-                self.endpoint, self._received, self._lost, linger=self._linger
+                self.endpoint,
+                self._received,
+                self._lost,
+                linger=self._linger,
+                first=self.peers.is_vehicle,
             )
         except EndpointError as error:
             if not self.connects:

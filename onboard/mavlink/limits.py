@@ -22,8 +22,17 @@ READ_SIZE: Final = 65536
 BYTES_PER_TURN: Final = 2048
 """bytes that are read before the loop has its turn: what a line of 921600 baud brings within a
 linger; bytes made to be slow to parse take some milliseconds [cost]."""
-DATAGRAMS_PER_TURN: Final = 128
-"""So many are read in a turn, also of those that are empty or bring an error [data]."""
+DATAGRAMS_PER_TURN: Final = 1024
+"""So many are read in a turn, also of those that are empty or bring an error: 2 to 3 ms, and a
+socket is emptied faster than a core can fill it [cost]."""
+SOCKET_BYTES: Final = 1 << 20
+"""bytes that the system is asked to keep for a datagram socket: some thousand small datagrams, a
+second of a vehicle's and 0.05 s of a flood [cost]."""
+SENDERS_WAITING: Final = 64
+"""Addresses of which something waits to be handed on, without the vehicle's: twice those that are
+listened to [cost]."""
+WAITING_BYTES: Final = 131072
+"""bytes of one of them that wait: two of the longest datagrams, or a second of a flood [cost]."""
 FULL_TURN_PAUSE_S: Final = 0.001
 """s between two turns while more waits than one of them reads [cost]."""
 SOURCES_MAX: Final = 256

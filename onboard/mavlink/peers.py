@@ -101,6 +101,11 @@ class Peers:
         """The peer at an address, None if it is not in the table."""
         return self._table.get(address)
 
+    def is_vehicle(self, address: Address | None) -> bool:
+        """Whether the vehicle is heard from there."""
+        peer = self._table.get(address)
+        return peer is not None and peer.merit is Merit.VEHICLE
+
     def begin_anew(self) -> None:
         """The connection was made anew: half a packet from before means nothing."""
         if not self._addressed:

@@ -14,19 +14,21 @@ import contextlib
 import errno
 import os
 import socket
-from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol
 
 from onboard.mavlink import limits
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
 from onboard.mavlink.peers import Address
 from onboard.mavlink.serialport import open_serial
+from onboard.mavlink.waiting import Waiting
 
 UNUSABLE = (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES, errno.EPERM)
 
 Receive = Callable[[bytes, Address | None], None]
 Lost = Callable[[str], None]
+First = Callable[[Address | None], bool]
 
 
 class Transport(Protocol):
@@ -45,7 +47,12 @@ class Transport(Protocol):
 
 
 async def open_transport(
-    endpoint: Endpoint, receive: Receive, lost: Lost, *, linger: float = limits.LINGER_S
+    endpoint: Endpoint,
+    receive: Receive,
+    lost: Lost,
+    *,
+    linger: float = limits.LINGER_S,
+    first: First | None = None,
 ) -> Transport:
     """Open an endpoint.
 
@@ -54,6 +61,7 @@ async def open_transport(
         receive: called with what was read and the address that it came from (None: the only one).
         lost: called once with the reason when the connection breaks by itself.
         linger: longest delay of a message, s (see the module's text).
+        first: whether what an address sent to a listening socket goes before what others sent.
 
     Raises:
         EndpointError: port in use, no such local address, or no permission.
@@ -76,10 +84,10 @@ async def open_transport(
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
                 return StreamTransport(sock, receive, lost, linger)
             with contextlib.suppress(OSError):
-                sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, limits.SOCKET_BYTES)
             if endpoint.kind is EndpointKind.UDP_IN:
                 sock.bind(address)
-                return DatagramTransport(sock, receive, linger, listening=True)
+                return DatagramTransport(sock, receive, linger, listening=True, first=first)
             sock.connect(address)
             return DatagramTransport(sock, receive, linger)
         except OSError as error:
@@ -148,17 +156,26 @@ class DatagramTransport:
     """
 
     def __init__(
-        self, sock: socket.socket, receive: Receive, linger: float, *, listening: bool = False
+        self,
+        sock: socket.socket,
+        receive: Receive,
+        linger: float,
+        *,
+        listening: bool = False,
+        first: First | None = None,
     ) -> None:
         self.dropped = 0
+        self.waiting = Waiting() if first is None else Waiting(first)
         self._socket = sock
         self._receive = receive
         self._listening = listening
+        self._linger = linger
         self._buffer = memoryview(bytearray(limits.READ_SIZE))
-        self._waiting: deque[tuple[Address | None, bytearray]] = deque()
-        self._waiting_size = 0
         self._closed = False
-        self._pace = Pace(sock.fileno(), self._drain, linger)
+        self._line: socket.socket | None = None
+        self._line_of: Address | None = None
+        self._line_pace: Pace | None = None
+        self._pace = Pace(sock.fileno(), partial(self._drain, sock), linger)
 
     @property
     def port(self) -> int:
@@ -179,6 +196,7 @@ class DatagramTransport:
         """Stop and release the port."""
         if not self._closed:
             self._closed = True
+            self._close_line()
             self._pace.close()
             self._socket.close()
 
@@ -191,37 +209,69 @@ class DatagramTransport:
         except OSError:
             self.dropped += 1
 
-    def _drain(self) -> int:
-        """Read what waits and hand on a turn of it, each address's bytes by themselves."""
-        self._read()
+    def _drain(self, sock: socket.socket) -> int:
+        """Read what there is and hand on a turn of it, each sender's bytes by themselves."""
+        more = self._read(sock)
         left = limits.BYTES_PER_TURN
-        while left and self._waiting and not self._closed:
-            source, data = self._waiting[0]
-            turn = bytes(data[:left])
-            del data[:left]
-            if not data:
-                self._waiting.popleft()
-            left -= len(turn)
-            self._waiting_size -= len(turn)
-            self._receive(turn, source)
-        return limits.BYTES_PER_TURN - left
+        while left and not self._closed and (turn := self.waiting.take(left)):
+            source, data = turn
+            left -= len(data)
+            self._receive(data, source)
+        if self.waiting.favourite != self._line_of and not self._closed:
+            self._open_line(self.waiting.favourite)
+        return limits.BYTES_PER_TURN if more or self.waiting else limits.BYTES_PER_TURN - left
 
-    def _read(self) -> None:
+    def _read(self, sock: socket.socket) -> bool:
+        """Empty a socket; whether it was too much for one turn."""
         for _ in range(limits.DATAGRAMS_PER_TURN):
-            if self._waiting_size >= limits.BYTES_PER_TURN:
-                return
             try:
-                size, address = self._socket.recvfrom_into(self._buffer)
+                size, address = sock.recvfrom_into(self._buffer)
             except BlockingIOError:
-                return
+                return False
             except OSError:
                 continue  # an ICMP error about something we sent
-            source = address if self._listening else None
-            if size and self._waiting and self._waiting[-1][0] == source:
-                self._waiting[-1][1].extend(self._buffer[:size])
-            elif size:
-                self._waiting.append((source, bytearray(self._buffer[:size])))
-            self._waiting_size += size
+            self.waiting.put(address if self._listening else None, self._buffer[:size])
+        return True
+
+    def _open_line(self, address: Address | None) -> None:
+        """Have the system keep what this one sends apart from what all others send."""
+        self._close_line()
+        self._line_of = address
+        line = None if address is None else line_of_its_own(self._socket, address)
+        if line is not None:
+            self._line = line
+            self._line_pace = Pace(line.fileno(), partial(self._drain, line), self._linger)
+
+    def _close_line(self) -> None:
+        if self._line is not None and self._line_pace is not None:
+            self._line_pace.close()
+            self._line.close()
+            self._line = self._line_pace = None
+
+
+def line_of_its_own(sock: socket.socket, address: Address) -> socket.socket | None:
+    """A second socket on the port of ``sock`` that gets what one address sends, in its own buffer.
+
+    Without it a flood from elsewhere fills the only buffer while this process has to wait for a
+    core, and the vehicle's datagrams are lost with the others'.  Sharing the port is allowed for
+    this moment only: another program that wants it is still told that it is taken.  None where the
+    system does not do that.
+    """
+    line = socket.socket(sock.family, sock.type)
+    try:
+        line.settimeout(0.0)
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, limits.SOCKET_BYTES)
+        for one in (sock, line):
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        line.bind(sock.getsockname())
+        line.connect(address)
+    except OSError:
+        line.close()
+        return None
+    finally:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+    return line
 
 
 class StreamTransport:

@@ -106,6 +106,10 @@ class Answers:
             if reason is Reason.CHANGED_BY_OTHER and value is not None:
                 progress.left |= {name}
                 progress.values[name] = value
+                if name in course.plan.names[3:]:
+                    # The order of the rest counted on this offset.  All are read again, for one
+                    # answer may be wrong, before anything could make all three zero.
+                    progress.queue.clear()
                 self.hear(course.write_next(now), now)
             else:
                 self.hear(course.stuck(reason, sentence, now), now)

@@ -33,8 +33,9 @@ def test_every_verb_has_examples_that_its_own_options_accept(verb, capsys):
     assert lines
     for line in lines:
         command = line.split(" | ")[0]
-        program, name, *arguments = shlex.split(command, comments=True)
-        assert (program, name) == ("onboard", verb)
+        words = shlex.split(command, comments=True)
+        program, name, *arguments = words[words[0] == "sudo" :]
+        assert (Path(program).name, name) == ("onboard", verb)
         # Parsing alone: nothing is read, connected or written.
         made = main.cli.get_command(click.Context(main.cli), verb)
         assert made is not None

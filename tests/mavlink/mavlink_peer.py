@@ -41,7 +41,9 @@ class FakeAir:
         self.opened_at: list[float] = []
         self.failures: list[Exception] = []
 
-    async def open(self, endpoint: Endpoint, receive, lost, *, linger: float) -> FakeTransport:
+    async def open(
+        self, endpoint: Endpoint, receive, lost, *, linger: float, first
+    ) -> FakeTransport:
         self.opened_at.append(asyncio.get_running_loop().time())
         if self.failures:
             raise self.failures.pop(0)

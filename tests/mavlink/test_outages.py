@@ -34,10 +34,10 @@ class Absence(FakeAir):
         super().__init__()
         self._errors, self._begin, self._end = cycle(errors), begin, end
 
-    async def open(self, endpoint, receive, lost, *, linger):
+    async def open(self, endpoint, receive, lost, *, linger, first):
         if self._begin <= asyncio.get_running_loop().time() < self._end:
             self.failures = [next(self._errors)]
-        return await super().open(endpoint, receive, lost, linger=linger)
+        return await super().open(endpoint, receive, lost, linger=linger, first=first)
 
     async def beat(self, seconds):
         """Whoever is there beats its heart."""

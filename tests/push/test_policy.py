@@ -286,3 +286,11 @@ def test_third_accelerometer_has_its_own_names():
     plan = propose(cal, current(3), system_id=1)
     assert plan.names == parameter_names(3).six
     assert judge(plan, cal, LANDED, PolicySettings()) == ()
+
+
+@pytest.mark.parametrize(
+    ("armed", "landed", "may_fly"),
+    [(False, True, False), (True, False, True), (None, None, True)],
+)
+def test_what_does_not_say_that_it_stands_may_fly(armed, landed, may_fly):
+    assert VehicleCondition(armed=armed, landed=landed).may_fly is may_fly

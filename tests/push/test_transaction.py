@@ -482,3 +482,16 @@ def test_roll_back_that_is_not_stored_stays_open(world):
     assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
     assert outcome.open
     assert {n: world.autopilot.ram[n] for n in world.plan.names} == world.plan.before
+
+
+def test_however_often_time_is_told_nothing_is_believed_before_late_packets_have_come(world):
+    """A driver ticks when it likes, not only when something is due."""
+    transaction, entered = world.push(), {}
+    while world.client is not None:
+        entered.setdefault(transaction.state, world.now)
+        until = world.now + 0.05
+        world.run(until=until)
+        if world.client is not None:
+            world.handle(transaction.tick(world.now))
+    assert entered[State.VERIFYING] - entered[State.SETTLING] >= 1.9
+    assert world.outcomes[0].result is Result.COMPLETED

@@ -86,7 +86,7 @@ class PushSettings(Section, frozen=True, kw_only=True):
     policy: Literal["never", "landed", "in_flight"] = "landed"
     approval: bool = False
     imus: tuple[ImuNumber, ...] = ()
-    disarmed_s: Annotated[float, Meta(ge=LEAST_DISARMED_S)] = 5.0
+    disarmed_s: Annotated[float, Meta(ge=LEAST_DISARMED_S, le=LARGEST)] = 5.0
     allow_loosening: bool = False
     scale_min: Annotated[float, Meta(ge=0.8, lt=1.0)] = 0.8
     scale_max: Annotated[float, Meta(gt=1.0, le=1.2)] = 1.2
