@@ -9,8 +9,8 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import FURTHEST, SPACINGS_S
-from onboard.core.diagnosis.selection import FORGOTTEN_S, OFFSETS, Fitter
+from onboard.core.diagnosis.limits import FORGOTTEN_S, FURTHEST, SPACINGS_S
+from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums

@@ -35,9 +35,9 @@ MOST_EFFECTS: Final = 5
 
 # Jumps (jumps, selection).
 
-FORGOTTEN: Final = 2.5
-"""Time constants after which an error of the attitude is forgotten: a twelfth is left [tuned: the
-25 s in which an EKF of the simulator settles]."""
+FORGOTTEN_S: Final = 25.0
+"""s after which a filter that GPS corrects has forgotten a jump of the accelerometer, and an EKF
+has settled [tuned]."""
 FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.diagnosis.limits import FORGOTTEN
+from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.solution import solve, total
-from onboard.core.filter.limits import ATTITUDE_TIME_S
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -26,8 +25,6 @@ from onboard.core.physics.effects.bias_step import LARGEST
 
 OFFSETS = (3, 4, 5)
 """Columns of the offsets among the six."""
-FORGOTTEN_S = FORGOTTEN * ATTITUDE_TIME_S
-"""s after which an EKF that has begun, and a filter that saw a jump, have forgotten it."""
 
 
 @dataclass(frozen=True, slots=True)
