@@ -17,8 +17,6 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.gps.distrust import Distrust
 from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
-from onboard.core.physics.catalogue import bearing_of
-from onboard.core.physics.effect import Bearing
 from onboard.core.physics.effects.gps_latency import GpsLatency
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
@@ -166,8 +164,8 @@ def test_a_flight_with_a_failing_receiver_is_never_explained(recordings):
         assert f"only {said.mismatch.fixes} of {said.mismatch.believed} GPS fixes" in said.note
         return
     (fault,) = (e for e in said.effects if e.name == "gps_fault")
-    # What else is said may be that the receiver is late, and no error of the sensor.
-    assert all(bearing_of(e.name) is Bearing.HARMLESS for e in said.effects)
+    # What else is said may be that the receiver is late or its clock wrong: no error of the sensor.
+    assert all(e.name.startswith(("gps_", "clock_")) for e in said.effects)
     failing = [(112.0, 142.2), (162.0, 171.0)]
     for a, b in fault.intervals:
         assert any(start - 1.0 <= a <= b <= end + 1.0 for start, end in failing), (a, b)
