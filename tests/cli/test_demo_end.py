@@ -12,6 +12,15 @@ import pytest
 LIMIT_S = 300.0  # only ends a hopeless test
 
 
+@pytest.fixture
+def hears_interrupts():
+    """What runs in a shell's background ignores SIGINT, and its children would, too."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("hears_interrupts")
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_what_ends_it_ends_its_autopilot(number):

@@ -24,11 +24,11 @@ from onboard.core.physics.effect import NuisanceFit
 
 def compared(
     choice: Choice, full: Examination, calibrator: Calibrator, imu: int
-) -> tuple[set[str], dict[str, list[str]]]:
-    """Effects that are in every model, and are large; what does better in their place is taken.
+) -> dict[str, list[str]]:
+    """What does better in the place of a large effect that is in every model is taken.
 
     Returns:
-        Those that are large enough; of the timing among them, others that do about as well.
+        Of the timing that is large all the same, others that do about as well.
     """
     told = fix_clock(calibrator.parameters, full.batches).configured_on_stamp
     large: Measured = {}
@@ -37,13 +37,12 @@ def compared(
         targets = (_target(choice, full, name, told) for name in large)
         if not any(reconsider_nuisance(choice, target, held) for target, held in targets):
             break
-    rivals = {
+    return {
         name: others
         for name in large
         if nuisance_kinds()[name].least is not None
         if (others := _rivals(choice, *_target(choice, full, name, told)))
     }
-    return set(large), rivals
 
 
 def _large(choice: Choice, full: Examination, calibrator: Calibrator, imu: int) -> Measured:

@@ -50,10 +50,8 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
     full, choice = _selected(clear.full, clear.testable)
-    large, rivals = compared(choice, full, calibrator, imu)
+    rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
-    if "gps_smoothing" in large and "gps_smoothing" not in rivals:
-        families = [f.averaged() for f in families]
     final, families = settled(full, choice, families, named_only=clear.clipped)
     asked = not clear.clipped
     unused = unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked)

@@ -117,6 +117,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             window=_finite(point["window"]),
             attitude_delay=_finite(point["attitude_delay"]),
             heading=_finite(point.get("heading", 0.0)),
+            antenna=_three(point.get("antenna", (0.0, 0.0, 0.0))),
         ),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),

@@ -77,7 +77,7 @@ def prepare(
     maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
     start, end, measured = _subdivide(epoch_t)
     intervals = maker.intervals(start, end)
-    around = maker.around(epoch_t, point.window)
+    around = maker.around(epoch_t, point.window, np.array(point.antenna))
     regressors = model.regressors(intervals, around)
     return Prepared(
         _steps(intervals, regressors),

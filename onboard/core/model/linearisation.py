@@ -26,6 +26,8 @@ class Linearisation:
         window: averaging span of the receiver, s.
         attitude_delay: lateness of the recorded attitude, s.
         heading: how much too large the recorded yaw is, rad.
+        antenna: (3,) lever arm beyond the configured one, body axes, m, whose velocity latency and
+            averaging act on; the unknown itself is linear and counted from nothing.
         skew: growth of the latency, s/s, from ``skew_from`` (s on the boot clock) on.
         skew_from: see ``skew``.
     """
@@ -36,6 +38,7 @@ class Linearisation:
     window: float = 0.0
     attitude_delay: float = 0.0
     heading: float = 0.0
+    antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     skew: float = 0.0
     skew_from: float = 0.0
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.model.quadrature import Around, Signals, lever_velocity
+from onboard.core.model.quadrature import Around, Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
 from onboard.core.model.smoothing import mean_slope, second_difference
 
@@ -63,8 +63,8 @@ class GpsLatency(Family):
         self.taken = taken
 
     def velocity(self, around: Around) -> Direct:
-        """``-a = -(R f + g)``."""
-        body = -around.now.f_b[..., None]
+        """``-a = -(R f + g)``, at the antenna."""
+        body = -around.f_antenna_now[..., None]
         ned = np.zeros_like(body)
         ned[:, 2, 0] = -STANDARD_GRAVITY
         return Direct(body=body, ned=ned)
@@ -109,12 +109,12 @@ class GpsSmoothing(Family):
         """
         slope = mean_slope(around.offset, self.taken)
         third = second_difference(around.offset) / 6.0
-        return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_epoch))
+        return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_antenna))
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span."""
         body = np.zeros((len(around.now.t), 3, 2))
-        body[..., 0] = around.now.f_b / 24.0
+        body[..., 0] = around.f_antenna_now / 24.0
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
         return Direct(body=body, ned=ned)
@@ -136,8 +136,8 @@ class LeverArmError(Family):
         self.unknowns = tuple(Unknown(f"antenna_{a}", "m", 0.0, sigma) for a in AXIS)
 
     def velocity(self, around: Around) -> Direct:
-        """``R (w x e_i)``, the velocity of a point of a rigid body."""
-        return Direct(body=lever_velocity(around.now.w_b))
+        """``R (w x e_i)``, the velocity of a point of a rigid body, as the receiver sees it."""
+        return Direct(body=around.swing)
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""

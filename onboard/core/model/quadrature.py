@@ -91,6 +91,8 @@ class Around:
         offset: (2 J + 1,) s.
         signals: at the nodes, S = (K, 2 J + 1).
         f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
+        f_antenna: (K, 2 J + 1, 3) the same at the antenna, whose velocity it is that a receiver
+            averages and reports late.
         now: signals at the epochs, S = (K,).
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
             span that it averages, body axes of the epoch, 1/s.
@@ -99,8 +101,15 @@ class Around:
     offset: Array
     signals: Signals
     f_epoch: Array
+    f_antenna: Array
     now: Signals
     swing: Array
+
+    @property
+    def f_antenna_now(self) -> Array:
+        """(K, 3) specific force at the antenna at the epochs, body axes."""
+        middle: Array = self.f_antenna[:, len(self.offset) // 2]
+        return middle
 
 
 def lever_velocity(w_b: Array) -> Array:
@@ -131,6 +140,14 @@ def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
     after = (1.0 - share) * P[:, low] + share * P[:, low + 1]
     before = (1.0 - share) * P[:, -1 - low] + share * P[:, -2 - low]
     out: Array = (after - before) / (2.0 * (offset[0] + at * step))
+    return out
+
+
+def _second_derivative(offset: Array, P: Array) -> Array:
+    """(K, n, 3, 3) of the attitude at the nodes, 1/s^2: acceleration per m of lever arm."""
+    out = np.empty_like(P)
+    out[:, 1:-1] = (P[:, 2:] - 2.0 * P[:, 1:-1] + P[:, :-2]) / float(offset[1] - offset[0]) ** 2
+    out[:, 0], out[:, -1] = out[:, 1], out[:, -2]
     return out
 
 
@@ -223,8 +240,14 @@ class NodeMaker:
         to_end = weight * (1.0 - share[::2]) * T[:, None]
         return Intervals(coarse, P, T, weight, to_end)
 
-    def around(self, epoch: Array, window: float = 0.0) -> Around:
-        """Nodes around ``epoch`` (K,) of a receiver that averages over ``window``, s."""
+    def around(self, epoch: Array, window: float = 0.0, antenna: Array | None = None) -> Around:
+        """Nodes around epochs.
+
+        Args:
+            epoch: (K,) s.
+            window: over which the receiver averages, s.
+            antenna: (3,) lever arm beyond the segment's own, body axes, m; None: none.
+        """
         J = AROUND_COUNT
         offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
         fine = self.signals(epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1))
@@ -248,7 +271,10 @@ class NodeMaker:
         now = Signals(
             nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._segment
         )
-        return Around(offset, nodes, f_epoch, now, _swing(offset, P, now.w_b, window))
+        lever = self._segment.lever_arm_b + (0.0 if antenna is None else antenna)
+        f_antenna = f_epoch + _second_derivative(offset, P) @ lever
+        swing = _swing(offset, P, now.w_b, window)
+        return Around(offset, nodes, f_epoch, f_antenna, now, swing)
 
     def _attitude(self, t: Array) -> Array:
         flat = interpolate_rotation(t.ravel(), self._segment.t_attitude, self._segment.R_attitude)

@@ -209,10 +209,6 @@ class Effect(Family):
         """
         return self
 
-    def averaged(self) -> Self:
-        """The effect as a receiver sees it whose averaging is known for sure."""
-        return self
-
     def formula(self, sizes: Sequence[float]) -> str:  # noqa: ARG002 - only nameless ones have one
         """What is written where there is no name; empty otherwise."""
         return ""

@@ -51,8 +51,11 @@ def test_the_linearisation_follows_its_unknowns():
     asked = dict(zip(MOVING, (0.03, 0.04, 0.05, -0.2), strict=True))
     for name, value in asked.items():
         theta[model.index[name]] = value
+    arm = (0.04, -0.03, 0.02)
+    theta[model.slices["antenna_place"]] = arm
     point = Linearisation(delay=0.1, window=0.2, attitude_delay=0.01, heading=0.3)
     after = moved(point, model, theta)
+    assert after.antenna == arm
     assert np.subtract(after.moving, point.moving) == pytest.approx(list(asked.values()))
     assert not after.near(point, (0.02, 1.0, 1.0, 1.0))
     assert after.near(point, (0.04, 0.05, 0.06, 0.3))

@@ -64,16 +64,19 @@ R, F, W = rotation(T), force(T), rates(T)
 TEMPERATURE, THROTTLE = 25.0 + 4.0 * T, 0.5 + 0.2 * np.sin(T)
 
 
-def nodes_of(f_read):
+def nodes_of(f_read, told=(0.0, 0.0, 0.0), found=(0.0, 0.0, 0.0)):
     slow = {"temperature": (T[::20], TEMPERATURE[::20]), "throttle": (T[::20], THROTTLE[::20])}
     step = slice(None, None, 10)  # 200 Hz
-    segment = Segment(T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow)
+    segment = Segment(
+        T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow, np.array(told)
+    )
     made = NodeMaker(segment, np.zeros(3), NOMINAL)
-    return made.intervals(EPOCHS[:-1], EPOCHS[1:]), made.around(EPOCHS)
+    around = made.around(EPOCHS, antenna=np.array(found))
+    return made.intervals(EPOCHS[:-1], EPOCHS[1:]), around
 
 
-def columns_of(family, f_read=F):
-    intervals, around = nodes_of(f_read)
+def columns_of(family, f_read=F, **arm):
+    intervals, around = nodes_of(f_read, **arm)
     assert family.available(around.now)
     return Model([family]).regressors(intervals, around)
 
@@ -178,34 +181,51 @@ VELOCITY = np.vstack(
 )
 
 
-def velocity_at(t):
-    return np.stack([np.interp(t, T, VELOCITY[:, i]) for i in range(3)], axis=-1)
+ARMS = (
+    {},
+    {"told": (0.8, -0.5, -0.4)},
+    {"found": (0.8, -0.5, -0.4)},
+    {"told": (0.3, 0.0, -0.9), "found": (0.2, 0.4, 0.6)},
+)
+"""Where the antenna is, m: at the accelerometer, told, found in flight, and both."""
 
 
-def test_a_late_receiver_reads_the_velocity_of_before():
+def velocity_at(t, told=(0.0, 0.0, 0.0), found=(0.0, 0.0, 0.0)):
+    v = np.stack([np.interp(t, T, VELOCITY[:, i]) for i in range(3)], axis=-1)
+    arm, e = np.add(told, found), 1e-4
+    flat = np.ravel(t)
+    swing = (rotation(flat + e) - rotation(flat - e)) @ arm / (2 * e)
+    return v + swing.reshape(v.shape)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_late_receiver_reads_the_velocity_of_before(arm):
     e = 2e-3
-    numeric = (velocity_at(EPOCHS - e) - velocity_at(EPOCHS + e)) / (2 * e)
-    got = columns_of(GpsLatency(0.0))
+    numeric = (velocity_at(EPOCHS - e, **arm) - velocity_at(EPOCHS + e, **arm)) / (2 * e)
+    got = columns_of(GpsLatency(0.0), **arm)
     np.testing.assert_allclose(direct(got, 0), numeric, atol=2e-3)
     np.testing.assert_array_equal(got.along_velocity[:, 0], -1.0)
 
 
-def test_a_clock_that_runs_away_is_a_latency_that_grows():
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_clock_that_runs_away_is_a_latency_that_grows(arm):
     e = 1e-3
     late = e * (EPOCHS - ORIGIN.t0)
-    numeric = (velocity_at(EPOCHS - late) - velocity_at(EPOCHS + late)) / (2 * e)
-    np.testing.assert_allclose(direct(columns_of(ClockSkew(ORIGIN)), 0), numeric, atol=5e-3)
+    numeric = (velocity_at(EPOCHS - late, **arm) - velocity_at(EPOCHS + late, **arm)) / (2 * e)
+    got = columns_of(ClockSkew(ORIGIN), **arm)
+    np.testing.assert_allclose(direct(got, 0), numeric, atol=5e-3)
 
 
+@pytest.mark.parametrize("arm", ARMS)
 @pytest.mark.parametrize("window", [0.2, 0.3])
-def test_a_receiver_that_averages(window):
+def test_a_receiver_that_averages(window, arm):
     def mean(w):
         s = np.linspace(-w / 2, w / 2, 401)
-        return np.trapezoid(velocity_at(EPOCHS[:, None] + s), s, axis=1) / w
+        return np.trapezoid(velocity_at(EPOCHS[:, None] + s, **arm), s, axis=1) / w
 
     e = 0.01  # of window^2
     numeric = (mean(np.sqrt(window**2 + e)) - mean(np.sqrt(window**2 - e))) / (2 * e)
-    got = direct(columns_of(GpsSmoothing(window)), 0)
+    got = direct(columns_of(GpsSmoothing(window), **arm), 0)
     np.testing.assert_allclose(got, numeric, atol=0.05 * np.abs(numeric).max())
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import copy
-from typing import Self
 
 import numpy as np
 
-from onboard.core.model.quadrature import Around, lever_velocity
+from onboard.core.model.quadrature import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import AXES, Bearing, Cure, Effect
 from onboard.core.physics.finding import Finding
@@ -35,22 +33,10 @@ class GpsLeverArm(Effect):
     keys = tuple(AXES)
     plausible = (5.0, 5.0, 5.0)
     unknowns = tuple(Unknown(f"lever_{a}", "m", 0.0, 2.0) for a in AXES)
-    through_average = False
-
-    def averaged(self) -> Self:
-        """The same, seen through the receiver's average.
-
-        About a span that is not known for sure, the average takes itself for more span.
-        """
-        made = copy(self)
-        made.through_average = True
-        return made
 
     def velocity(self, around: Around) -> Direct:
-        """``R (w x e_i)``."""
-        if self.through_average:
-            return Direct(body=around.swing)
-        return Direct(body=lever_velocity(around.now.w_b))
+        """``R (w x e_i)``, as the receiver sees it."""
+        return Direct(body=around.swing)
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
