@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 from unittest import mock
@@ -23,6 +23,8 @@ from onboard.daemon.learning import handover
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink import connection
+from onboard.mavlink.peers import Address
+from onboard.mavlink.transport import First, Receive, Transport
 from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.messages import packed
 
@@ -35,9 +37,6 @@ LOOK_S = 0.1
 last as long as on a small companion, which solves every 20 s for that."""
 DIAGNOSIS_S = (2.0, 40.0)
 """A diagnosis takes between so many seconds, from a desktop computer to a slow companion."""
-
-
-Receive = Callable[[bytes], None]
 
 
 class Observer(Protocol):
@@ -53,12 +52,12 @@ class Observer(Protocol):
 class Line:
     """The daemon's end of the line (:class:`onboard.mavlink.transport.Transport`)."""
 
-    def __init__(self, receive: Callable[[bytes], None], send: Callable[[bytes], None]) -> None:
+    def __init__(self, receive: Receive, send: Callable[[bytes], None]) -> None:
         self.dropped = 0
-        self.receive: Callable[[bytes], None] | None = receive
+        self.receive: Receive | None = receive
         self._send = send
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes, _to: Sequence[Address] = ()) -> None:
         """To the vehicle."""
         if self.receive is not None:
             self._send(data)
@@ -163,7 +162,7 @@ class Room:
         waiting, self._link.outbox = self._link.outbox, []
         frames = [packed(message, self._packer) for _, message in waiting]
         if frames and self._line is not None and self._line.receive is not None:
-            self._line.receive(b"".join(frames))
+            self._line.receive(b"".join(frames), None)
 
     # The daemon
 
@@ -218,9 +217,9 @@ class Room:
         self._inbox.append(data)
 
     async def _open(
-        self, _endpoint: object, receive: Receive, _lost: object, *, linger: float
-    ) -> Line:
-        del linger
+        self, _endpoint: object, receive: Receive, _lost: object, *, linger: float, first: First
+    ) -> Transport:
+        del linger, first  # nobody else is on this line
         self._line = Line(receive, self._take)
         return self._line
 

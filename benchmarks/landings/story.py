@@ -64,8 +64,9 @@ class Story:
 
     async def play(self, chapters: list[Chapter]) -> None:
         """Play all of it; must run on a virtual clock."""
-        flying = asyncio.create_task(self.room.fly(), name="vehicle")
-        try:
+        # A vehicle that fails would otherwise be waited for without end.
+        async with asyncio.TaskGroup() as both:
+            flying = both.create_task(self.room.fly(), name="vehicle")
             with self.room.fitted():
                 self._say("the first board is " + self.history.board.name)
                 self._powered()
@@ -74,9 +75,7 @@ class Story:
                 for chapter in chapters:
                     await self._chapter(chapter)
                 await self.room.stop_daemon()
-        finally:
             flying.cancel()
-            await asyncio.gather(flying, return_exceptions=True)
 
     async def _chapter(self, chapter: Chapter) -> None:
         self._needs_approval = chapter.needs_approval
