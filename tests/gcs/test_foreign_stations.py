@@ -10,6 +10,9 @@ import pytest
 
 from tests.gcs.test_ground_stations import WANTED, six
 
+LOOSENED = {"push": {"approval": True, "disarmed_s": 2.0, "allow_loosening": True}}
+"""Where a ground station may choose any policy."""
+
 
 @pytest.mark.slow
 async def test_mavsdk_reads_lists_and_sets(airfield):
@@ -21,7 +24,7 @@ async def test_mavsdk_reads_lists_and_sets(airfield):
         ProtocolVersion,
     )
 
-    async with airfield() as (service, vehicle, router):
+    async with airfield(LOOSENED) as (service, vehicle, router):
         kind = mavsdk.ComponentType.GROUND_STATION
         station = mavsdk.Mavsdk(mavsdk.Configuration.create_with_component_type(kind))
         try:
@@ -60,7 +63,7 @@ MAVPROXY = os.environ.get("MAVPROXY") or shutil.which("mavproxy.py")
     MAVPROXY is None, reason="MAVProxy is not installed (pip install MAVProxy), nor MAVPROXY set"
 )
 async def test_mavproxy_fetches_shows_and_sets(airfield, tmp_path):
-    async with airfield() as (service, vehicle, router):
+    async with airfield(LOOSENED) as (service, vehicle, router):
         console = await asyncio.create_subprocess_exec(
             MAVPROXY,
             f"--master=udpout:127.0.0.1:{router.port}",
