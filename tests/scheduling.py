@@ -24,3 +24,14 @@ class SharedWork(LoadFileScheduling):
     def _split_scope(self, nodeid):
         file = super()._split_scope(nodeid)
         return SHARED.get(file, file)
+
+    def remove_node(self, node):
+        """A test that has ended its process has had its turn: it is not run in the next one, too."""
+        units = self.assigned_work[node]
+        pending = (test for unit in units.values() for test, done in unit.items() if not done)
+        fatal = next(pending, None)
+        for unit in units.values():
+            unit.pop(fatal, None)
+        self.assigned_work[node] = {k: u for k, u in units.items() if not all(u.values())}
+        super().remove_node(node)
+        return fatal
