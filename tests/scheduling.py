@@ -26,7 +26,7 @@ class SharedWork(LoadFileScheduling):
         return SHARED.get(file, file)
 
     def remove_node(self, node):
-        """A test that has ended its process has had its turn: it is not run in the next one, too."""
+        """A test that has ended its process has had its turn: the next process goes on after it."""
         units = self.assigned_work[node]
         pending = (test for unit in units.values() for test, done in unit.items() if not done)
         fatal = next(pending, None)
