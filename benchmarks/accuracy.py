@@ -1,7 +1,7 @@
 """Errors of what replay answers on recordings whose answers are known: the six, the latency.
 
 Looks for ``answers.json`` in ONBOARD_RECORDINGS/sitl or in ``../shared/recordings/sitl`` beside the
-project, and prints the table of the README.
+project, and prints the table of docs/benchmarks.md.
 """
 
 from __future__ import annotations
