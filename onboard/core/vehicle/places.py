@@ -11,6 +11,9 @@ from onboard.core.vehicle.records import Place
 MOST = 4
 LEAST_SHARE = 0.05
 AXES = ("x", "y", "z", "airspeed")
+"""Names of the columns of a prediction."""
+FORCE = (0, 1, 2)
+"""Those of them that are forces; a further one is airspeed."""
 CLIMB_M_S, FAST_M_S, TURN_RAD_S = 1.0, 5.0, 0.3
 
 
