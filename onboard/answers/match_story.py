@@ -16,9 +16,10 @@ from onboard.answers.words import (
 )
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.physics.catalogue import kind_of, title_of
+from onboard.core.physics.finding import Where
 from onboard.core.physics.wording import places
 from onboard.core.vehicle.places import AXES
-from onboard.core.vehicle.records import Compared, Difference, NotTestable, Place
+from onboard.core.vehicle.records import Compared, Difference, NotTestable
 
 Values = Mapping[str, Compared]
 SEVERITIES = {
@@ -280,7 +281,7 @@ def how_sure(match: Match) -> str:
     )
 
 
-def where(p: Place, speed: float = math.nan) -> str:
+def where(p: Where, speed: float = math.nan) -> str:
     """Where an effect acts: time, axis, kind of flight, speed, share."""
     span = f"{fixed(p.start_s, 0)} to {fixed(p.end_s, 0)} s"
     regime = REGIME_WORDS.get(p.regime, p.regime)

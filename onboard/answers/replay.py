@@ -12,16 +12,11 @@ import numpy as np
 
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
+from onboard.answers.calibration_document import advice_document
 from onboard.answers.compared import accelerometers_document, remarks
-from onboard.answers.document import (
-    FlightsDocument,
-    RecordingDocument,
-    ReplayDocument,
-    advice_document,
-    flight_document,
-    imu_document,
-)
+from onboard.answers.flight_document import FlightsDocument, flight_document
 from onboard.answers.recorded import unanswered
+from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage, Status
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample

@@ -9,7 +9,7 @@ from typing import Final
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding
-from onboard.core.vehicle.records import Compared, Difference, Place
+from onboard.core.vehicle.records import Compared, Difference
 
 SIMULATED_LAG_S: Final = 0.1
 """SIM_GPS1_LAG_MS by default: the receiver of the nominal simulator is this late."""
@@ -94,7 +94,7 @@ def _with_proof(name: str, values: Mapping[str, Compared], real: Diagnosis) -> D
         "sensor",
         values,
         found.share_of_mismatch,
-        _places(found),
+        found.where,
         tuple(c.name for c in found.confounders),
         found.held_out_before,
         found.held_out_after,
@@ -118,7 +118,7 @@ def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
         "sensor",
         values,
         real.share_of_mismatch,
-        _places(real),
+        real.where,
         tuple(c.name for c in real.confounders),
         real.held_out_before,
         real.held_out_after,
@@ -128,10 +128,6 @@ def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
 def _only_simulated(effect: Finding) -> Difference:
     values = {n: Compared(q.value, 0.0, q.sigma, q.unit) for n, q in effect.unknowns.items()}
     return Difference(effect.name, "sensor", values)
-
-
-def _places(effect: Finding) -> tuple[Place, ...]:
-    return tuple(Place(w.start_s, w.end_s, w.axis, w.regime, w.share) for w in effect.where)
 
 
 def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> dict[str, float]:
