@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 DIGITS: Final = 6
-"""Of a number in a file: the simulator's are of single precision [data sheet]."""
+"""Of a number in a file: as many as single precision surely keeps, which the simulator reads it
+with [data sheet]."""
 
 A = TypeVar("A", bound="DataclassInstance")
 

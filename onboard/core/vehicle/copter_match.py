@@ -28,7 +28,7 @@ from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import SURE
+from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, matched
 from onboard.core.vehicle.noise import rms
@@ -153,7 +153,7 @@ def _with_inflow(m: Matched, frame: CopterAirframe) -> CopterAirframe:
     """The reference current whose outflow gives the inflow that was found, if it surely differs."""
     k = m.model.index("inflow")
     found, sigma = float(m.fit.theta[k]), float(m.fit.sigma[k])
-    if found <= 0.0 or abs(found - frame.inflow) < (SURE + 1.0) * sigma:
+    if found <= 0.0 or abs(found - frame.inflow) < APART * sigma:
         return frame
     return replace(frame, refCurrent=frame.refCurrent * math.sqrt(frame.inflow / found))
 
