@@ -165,14 +165,8 @@ class History:
             self._pushed = True
             self._in_flight = self.script.in_flight
             self.story.say("pushes")
-            self._begin(
-                PushTransaction(
-                    self.plan,
-                    identifier="t1",
-                    system_id=1,
-                    allow_armed=self.script.in_flight,
-                )
-            )
+            armed = self.script.in_flight
+            self._begin(PushTransaction(self.plan, identifier="t1", system_id=1, allow_armed=armed))
 
     # The service
 
