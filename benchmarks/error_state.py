@@ -152,15 +152,22 @@ def _measured(gps: DataFrame, *, vertical: bool) -> list[Measurement]:
     """Velocity and position; GPS_RAW_INT's velocity has no vertical component."""
     from pyins import measurements
 
-    class Horizontal(measurements.NedVelocity):  # type: ignore[misc] # pyins has no types
-        """Velocity without its vertical component."""
+    velocity = measurements.NedVelocity(gps, VELOCITY_SD)
+    position = measurements.Position(gps, HEIGHT_SD if vertical else POSITION_SD)
+    return [velocity if vertical else _Horizontal(velocity), position]
 
-        def compute_matrices(self, *where: object) -> tuple[Array, ...] | None:
-            found = super().compute_matrices(*where)
-            return None if found is None else (found[0][:2], found[1][:2], found[2][:2, :2])
 
-    velocity = (measurements.NedVelocity if vertical else Horizontal)(gps, VELOCITY_SD)
-    return [velocity, measurements.Position(gps, HEIGHT_SD if vertical else POSITION_SD)]
+class _Horizontal:
+    """A measurement of velocity without its vertical component, as pyins' filters ask for one."""
+
+    def __init__(self, velocity: Measurement) -> None:
+        self._velocity = velocity
+        self.data = velocity.data
+
+    def compute_matrices(self, *where: object) -> tuple[Array, ...] | None:
+        """Innovation, Jacobian and covariance; None where nothing was measured."""
+        found = self._velocity.compute_matrices(*where)
+        return None if found is None else (found[0][:2], found[1][:2], found[2][:2, :2])
 
 
 def _line(name: str, what: str, error: Array, limit: Array, spent: float, unit: float) -> str:

@@ -8,20 +8,17 @@ diagnosis.  Each answer is hashed, and the hash printed, before ``diagnose`` run
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
-import pickle
 import sys
 import time
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.challenge import Measured, answers, kept, named, parser, summary
 from benchmarks.concealing import LEVELS, Challenge, Secret
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis
@@ -32,24 +29,7 @@ from onboard.mavlink.decode import Decoder
 from sitl.recording import FlightSpec, fly_messages, truth_record
 
 TIMING = ("gps_latency", "gps_smoothing", "imu_delay")
-NEAR = 0.1
-SIGMAS = 3.0
 ONSET_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """One unknown: truth, estimate, sigma."""
-
-    name: str
-    truth: float
-    value: float
-    sigma: float
-
-    @property
-    def right(self) -> bool:
-        """Within ten per cent or three sigma."""
-        return abs(self.value - self.truth) <= max(NEAR * abs(self.truth), SIGMAS * self.sigma)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +130,7 @@ def _measured(truth: dict[str, Any], said: Diagnosis) -> Iterable[Measured]:
         for key, true in _true_unknowns(record, truth).items():
             q = effect.unknowns.get(key)
             if q is not None:
-                yield Measured(f"{record['name']}.{key}", true, q.value, q.sigma)
+                yield Measured(f"{record['name']}.{key}", true, q.value, q.sigma, abs(true))
 
 
 def _onsets(truth: dict[str, Any], said: Diagnosis, calibrator: Calibrator) -> Iterable[float]:
@@ -168,17 +148,11 @@ def _onsets(truth: dict[str, Any], said: Diagnosis, calibrator: Calibrator) -> I
                 yield effect.intervals[-1][1] + late - record["end"] - delay
 
 
-def _named(outcomes: list[Outcome]) -> str:
-    """How many of how many, blank of none."""
-    wanted = [o for o in outcomes if o.wanted]
-    return f"{sum(o.identified for o in wanted)} of {len(wanted)}" if wanted else ""
-
-
 def _row(label: str, outcomes: list[Outcome]) -> str:
     """One line of the table."""
-    sized = [_named([o for o in outcomes if o.secret.level == level]) for level in LEVELS]
+    sized = [named([o for o in outcomes if o.secret.level == level]) for level in LEVELS]
     if not any(o.secret.kind == "single" for o in outcomes):
-        sized = ["", "", _named(outcomes)]
+        sized = ["", "", named(outcomes)]
     found = [o for o in outcomes if o.identified and o.wanted]
     all_measured = [m for o in found for m in o.measured]
     good = sum(m.right for m in all_measured)
@@ -246,27 +220,19 @@ def describe(o: Outcome) -> str:
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description="Sealed challenge of concealed effects.")
-    parser.add_argument("--count", type=int, default=40, help="so many, fairly drawn; 0: all")
-    parser.add_argument("--first", type=int, default=1000, help="first seed")
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--save", type=Path, help="keep the outcomes here")
-    chosen = parser.parse_args(arguments)
+    options = parser("Sealed challenge of concealed effects.", count=40, first=1000)
+    chosen = options.parse_args(arguments)
     secrets = Challenge(chosen.first).secrets()
     secrets = secrets[: chosen.count or len(secrets)]
-    outcomes = []
-    with ProcessPoolExecutor(max_workers=max(1, chosen.processes)) as pool:
-        for o in pool.map(one, secrets):
-            outcomes.append(o)
-            if o.false or (o.secret.testable and not o.identified):
-                print(describe(o), flush=True)
-            if chosen.save:
-                chosen.save.write_bytes(pickle.dumps(outcomes))
+
+    def tell(o: Outcome) -> str:
+        missed = o.secret.testable and not o.identified
+        return describe(o) if o.false or missed else ""
+
+    outcomes = kept(answers(one, secrets, chosen.processes), tell, chosen.save)
     print(table(outcomes))
     print(LEGEND)
-    made, took = np.array([o.seconds for o in outcomes]).T
-    print(f"seconds a recording: {np.mean(made):.1f} to make, {np.mean(took):.1f} to diagnose")
-    print(f"seals: {' '.join(o.seal for o in outcomes[:4])} ...")
+    print(summary(outcomes, "diagnose"))
 
 
 if __name__ == "__main__":

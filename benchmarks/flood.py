@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import multiprocessing
 import selectors
 import socket
 import tempfile
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message, mavlink
+from onboard.mavlink.link import Link
 from onboard.mavlink.parameter_messages import to_float32
 
 A_SECOND = 50_000
@@ -72,11 +77,15 @@ def fly(port: int) -> None:
     from sitl.builtin.server import Server
     from sitl.builtin.truth import Truth, random_imus
 
+    def up(autopilot: Autopilot) -> None:
+        autopilot.arm(force=True)
+        autopilot.take_off(200.0)
+
     async def forever() -> None:
         autopilot = Autopilot("copter", Truth(imus=random_imus(3), seed=3))
         server = Server(autopilot)
         await server.connect_udp("127.0.0.1", port)
-        server.request(lambda a: (a.arm(force=True), a.take_off(200.0)))  # type: ignore[arg-type, return-value]
+        server.request(up)
         await server.run()
 
     asyncio.run(forever())
@@ -146,76 +155,118 @@ def in_a_process(function: Callable[[int], None], port: int) -> SpawnProcess:
 
 
 async def watched(
-    attack: Callable[[int], None], vehicle: Callable[[int], None], seconds: float, *, first: bool
+    attack: Callable[[int], None],
+    vehicle: Callable[[int], None],
+    seconds: float,
+    selector: WatchedSelector,
+    *,
+    first: bool,
 ) -> dict[str, Any]:
-    """One row: the attack begins before the vehicle (``first``), or when it has been adopted."""
-    from tests.daemon.daemons import calibration, convinced
+    """One row: the attack begins before the vehicle (``first``), or when it has been adopted.
 
-    selector = asyncio.get_running_loop()._selector  # type: ignore[attr-defined]  # noqa: SLF001
+    Args:
+        attack: to be run in a process of its own.
+        vehicle: the same.
+        seconds: how long to measure.
+        selector: of the loop that this runs on.
+        first: which of them begins.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
-        service = Service(
-            from_mapping(
-                {
-                    "link": {"endpoints": [f"udpin:127.0.0.1:{port}"], "heartbeat_limit_s": 120.0},
-                    "push": {"disarmed_s": 2.0},
-                    "state": {"directory": str(Path(folder) / "state")},
-                    "http": {"port": 0},
-                },
-                source="flood",
-            )
-        )
-        sets = 0
-        send = service.link.send
+        service = listening(port, Path(folder))
+        others: list[SpawnProcess] = []
+        with counted(service.link) as sent:
+            task = asyncio.create_task(service.run())
+            await service.ready.wait()
+            try:
+                if first:
+                    others.append(in_a_process(attack, port))
+                    await asyncio.sleep(2.0)
+                began = time.monotonic()
+                others.append(in_a_process(vehicle, port))
+                await adopted(service)
+                found = time.monotonic() - began
+                quiet = await learned(service, standing=vehicle is stand)
+                if not first:
+                    others.append(in_a_process(attack, port))
+                    await asyncio.sleep(2.0)
+                row = await flooded(service, seconds, selector)
+                return {
+                    "found, s": f"{found:.1f}",
+                    "RAW_IMU/s before": f"{quiet:.1f}",
+                    **row,
+                    "PARAM_SET": sent["PARAM_SET"],
+                }
+            finally:
+                for other in others:
+                    other.kill()
+                service.stop()
+                await task
 
-        def counted(message: Message) -> None:
-            nonlocal sets
-            sets += message.get_type() == "PARAM_SET"
-            send(message)
 
-        service.link.send = counted  # type: ignore[method-assign]
-        task = asyncio.create_task(service.run())
-        await service.ready.wait()
-        others = [in_a_process(attack, port)] if first else []
-        await asyncio.sleep(2.0 if first else 0.0)
-        began = time.monotonic()
-        others.append(in_a_process(vehicle, port))
-        try:
-            async with asyncio.timeout(60.0):
-                while not service.link.presence.proven:  # noqa: ASYNC110
-                    await asyncio.sleep(0.01)
-            found = time.monotonic() - began
-            offset = tuple(to_float32(0.05 + 0.01 * i) for i in range(3))
-            if vehicle is stand:
-                convinced(service, calibration(in_force_offset=offset))
-            await asyncio.sleep(LEARNED_S)
-            counts = service.parts.traffic._counts  # noqa: SLF001
-            quiet = await rate(counts, QUIET_S)
-            if not first:
-                others.append(in_a_process(attack, port))
-                await asyncio.sleep(2.0)
-            selector.worst = selector.worst_cpu = 0.0
-            used = time.process_time()
-            flooded = await rate(counts, seconds)
-            used = (time.process_time() - used) / seconds
-            armed = service.parts.observed.condition(time.monotonic()).armed
-            return {
-                "found, s": f"{found:.1f}",
-                "RAW_IMU/s before": f"{quiet:.1f}",
-                "under attack": f"{flooded:.1f}",
-                "worst turn, ms": f"{1e3 * selector.worst:.0f}",
-                "of processor": f"{1e3 * selector.worst_cpu:.0f}",
-                "core": f"{used:.2f}",
-                "believed armed": armed,
-                "PARAM_SET": sets,
-            }
-        finally:
-            for other in others:
-                other.kill()
-            service.stop()
-            await task
+def listening(port: int, folder: Path) -> Service:
+    """The daemon, which is to listen to that port."""
+    settings = {
+        "link": {"endpoints": [f"udpin:127.0.0.1:{port}"], "heartbeat_limit_s": 120.0},
+        "push": {"disarmed_s": 2.0},
+        "state": {"directory": str(folder / "state")},
+        "http": {"port": 0},
+    }
+    return Service(from_mapping(settings, source="flood"))
+
+
+@contextlib.contextmanager
+def counted(link: Link) -> Iterator[Counter[str]]:
+    """While this lasts, how many messages of each type are sent."""
+    sent, send = Counter[str](), link.send
+
+    def counting(message: Message) -> None:
+        sent[message.get_type()] += 1
+        send(message)
+
+    with patch.object(link, "send", counting):
+        yield sent
+
+
+async def adopted(service: Service) -> None:
+    """Until the vehicle has been found."""
+    async with asyncio.timeout(60.0):
+        while not service.link.presence.proven:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+
+
+async def learned(service: Service, *, standing: bool) -> float:
+    """RAW_IMU a second without a flood, when it believes that it knows something worth writing."""
+    from tests.daemon.daemons import calibration, convinced
+
+    offset = tuple(to_float32(0.05 + 0.01 * i) for i in range(3))
+    if standing:
+        convinced(service, calibration(in_force_offset=offset))
+    await asyncio.sleep(LEARNED_S)
+    return await rate(heard(service), QUIET_S)
+
+
+async def flooded(service: Service, seconds: float, selector: WatchedSelector) -> dict[str, Any]:
+    """What is measured under attack."""
+    selector.worst = selector.worst_cpu = 0.0
+    used = time.process_time()
+    samples = await rate(heard(service), seconds)
+    used = (time.process_time() - used) / seconds
+    armed = service.parts.observed.condition(time.monotonic()).armed
+    return {
+        "under attack": f"{samples:.1f}",
+        "worst turn, ms": f"{1e3 * selector.worst:.0f}",
+        "of processor": f"{1e3 * selector.worst_cpu:.0f}",
+        "core": f"{used:.2f}",
+        "believed armed": armed,
+    }
+
+
+def heard(service: Service) -> dict[str, int]:
+    """Messages that came, by type."""
+    return service.parts.traffic._counts  # noqa: SLF001
 
 
 async def rate(counts: dict[str, int], seconds: float) -> float:
@@ -245,10 +296,9 @@ def main() -> None:
     for name, (attack, vehicle, first) in ROWS.items():
         if chosen.only and not any(word in name for word in chosen.only):
             continue
-        with asyncio.Runner(
-            loop_factory=lambda: asyncio.SelectorEventLoop(WatchedSelector())
-        ) as runner:
-            row = runner.run(watched(attack, vehicle, chosen.seconds, first=first))
+        selector = WatchedSelector()
+        with asyncio.Runner(loop_factory=partial(asyncio.SelectorEventLoop, selector)) as runner:
+            row = runner.run(watched(attack, vehicle, chosen.seconds, selector, first=first))
         print(name, row, flush=True)
 
 

@@ -7,23 +7,19 @@ answer is hashed, and the hash printed, before ``onboard match`` is started.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
-import pickle
 import struct
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from benchmarks.challenge import answers, kept, parser, summary
 from benchmarks.matching.adapter import Asked, MatchError, by_command
 from benchmarks.matching.concealing import ATTEMPTS, Challenge, Secret
 from benchmarks.matching.scoring import LEGEND, Outcome, describe, measured, table
@@ -102,45 +98,29 @@ def write(flight: Flight, path: Path) -> None:
             file.write(struct.pack(">Q", unix_us) + packed(message, packer))
 
 
-def challenged(secrets: list[Secret], processes: int, asked: Asked) -> Iterator[Outcome]:
-    """Outcomes in the order of the secrets."""
-    if processes <= 1:
-        yield from map(partial(one, asked=asked), secrets)
-        return
-    with ProcessPoolExecutor(max_workers=processes) as pool:
-        yield from pool.map(partial(one, asked=asked), secrets)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description="Sealed challenge of concealed airframes.")
-    parser.add_argument("--count", type=int, default=20, help="so many, fairly drawn; 0: all")
-    parser.add_argument("--first", type=int, default=5000, help="first seed")
-    parser.add_argument("--vehicle", choices=("copter", "plane"), help="these alone")
-    parser.add_argument("--name", help="single recordings of this effect alone")
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--save", type=Path, help="keep the outcomes here")
-    parser.add_argument("--all", action="store_true", help="say what was said of each")
-    chosen = parser.parse_args(arguments)
+    options = parser("Sealed challenge of concealed airframes.", count=20, first=5000)
+    options.add_argument("--vehicle", choices=("copter", "plane"), help="these alone")
+    options.add_argument("--name", help="single recordings of this effect alone")
+    options.add_argument("--all", action="store_true", help="say what was said of each")
+    chosen = options.parse_args(arguments)
     secrets = Challenge(chosen.first).secrets()
     if chosen.vehicle:
         secrets = [s for s in secrets if s.vehicle == chosen.vehicle]
     if chosen.name:
         secrets = [s for s in secrets if s.names == (chosen.name,)]
     secrets = secrets[: chosen.count or len(secrets)]
-    outcomes = []
-    for o in challenged(secrets, chosen.processes, by_command):
-        outcomes.append(o)
+
+    def tell(o: Outcome) -> str:
         missed = o.secret.testable and not o.identified
-        if chosen.all or o.false or missed or o.overlooked or o.said is None:
-            print(describe(o), flush=True)
-        if chosen.save:
-            chosen.save.write_bytes(pickle.dumps(outcomes))
+        wrong = o.false or missed or o.overlooked or o.said is None
+        return describe(o) if chosen.all or wrong else ""
+
+    outcomes = kept(answers(one, secrets, chosen.processes), tell, chosen.save)
     print(table(outcomes))
     print(LEGEND)
-    made_s, asked_s = np.array([o.seconds for o in outcomes]).T
-    print(f"seconds a recording: {np.mean(made_s):.1f} to make, {np.mean(asked_s):.1f} to match")
-    print(f"seals: {' '.join(o.seal[:16] for o in outcomes[:4])} ...")
+    print(summary(outcomes, "match"))
 
 
 if __name__ == "__main__":

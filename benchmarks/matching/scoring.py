@@ -8,34 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.challenge import Measured, named
 from benchmarks.matching.adapter import Said
 from benchmarks.matching.concealing import Secret
-
-NEAR = 0.1
-SIGMAS = 3.0
-NORMAL_95 = 1.96
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """One unknown: truth, estimate, sigma; ``size`` is what ten per cent are of."""
-
-    name: str
-    truth: float
-    value: float
-    sigma: float
-    size: float
-
-    @property
-    def right(self) -> bool:
-        """Within ten per cent or three sigma."""
-        sigma = self.sigma if np.isfinite(self.sigma) else 0.0
-        return abs(self.value - self.truth) <= max(NEAR * self.size, SIGMAS * sigma)
-
-    @property
-    def covered(self) -> bool:
-        """The truth is in the interval of 95 %."""
-        return abs(self.value - self.truth) <= NORMAL_95 * self.sigma
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +25,11 @@ class Outcome:
     seconds: tuple[float, float] = (0.0, 0.0)
     failure: str = ""
     details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def wanted(self) -> set[str]:
+        """Names that should be said."""
+        return set(self.secret.wanted)
 
     @property
     def found(self) -> set[str]:
@@ -99,14 +79,9 @@ truth within 1.96 sigma.  median: relative error.  lateral force: median error o
 not used, before and after, m/s^2."""
 
 
-def _named(outcomes: Sequence[Outcome]) -> str:
-    wanted = [o for o in outcomes if o.secret.wanted]
-    return f"{sum(o.identified for o in wanted)} of {len(wanted)}" if wanted else ""
-
-
 def _row(label: str, outcomes: Sequence[Outcome]) -> str:
     sized = [
-        _named([o for o in outcomes if o.secret.level == level]) for level in ("small", "large")
+        named([o for o in outcomes if o.secret.level == level]) for level in ("small", "large")
     ]
     values = [m for o in outcomes for m in o.measured if o.secret.testable]
     honest = [m for m in values if np.isfinite(m.sigma)]

@@ -1,7 +1,7 @@
 """``make simulate``: pushes under faults, many histories, each from its seed.
 
 ``python -m benchmarks.pushes --count 100000`` plays them; a history in which a rule does not hold
-(:mod:`benchmarks.pushes.play`) is printed with its seed, and ``--seed N`` plays that one alone.
+(:mod:`benchmarks.pushes.rules`) is printed with its seed, and ``--seed N`` plays that one alone.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks.pushes.faults import draw
-from benchmarks.pushes.play import BrokenRuleError, History
+from benchmarks.pushes.play import History
+from benchmarks.pushes.story import BrokenRuleError
 
 SHOWN = 3
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.pushes.faults import OFFSETS, Fault, Script, Weather
 from benchmarks.pushes.play import History
-from onboard.mavlink.parameter_messages import SendParamRead, SendParamSet
+from onboard.mavlink.parameter_messages import SendAction, SendParamRead
 
 BEGINS_S, ENDS_S = 2.5, 7.5
 """When a push without faults begins, and when it has ended."""
@@ -39,7 +39,7 @@ class ArmedHistory(History):
         self.autopilot.changed = self._changed
         self._was = dict(self.autopilot.ram)
 
-    def _check_sent(self, output: SendParamRead | SendParamSet) -> None:
+    def _check_sent(self, output: SendAction) -> None:
         super()._check_sent(output)
         if isinstance(output, SendParamRead):
             return

@@ -8,6 +8,7 @@ import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 from onboard.push import journal
 
@@ -93,11 +94,7 @@ class _Os:
 @contextlib.contextmanager
 def journals_on(disk: Disk) -> Iterator[None]:
     """While this lasts every journal writes to this disk."""
-    before = journal.os, journal._write_all, journal._sync_directory  # type: ignore[attr-defined]  # noqa: SLF001
-    journal.os = _Os(disk)  # type: ignore[assignment,attr-defined]
-    journal._write_all = disk.write  # noqa: SLF001
-    journal._sync_directory = disk.sync_directory  # noqa: SLF001
-    try:
+    with patch.multiple(
+        journal, os=_Os(disk), _write_all=disk.write, _sync_directory=disk.sync_directory
+    ):
         yield
-    finally:
-        journal.os, journal._write_all, journal._sync_directory = before  # type: ignore[attr-defined]  # noqa: SLF001

@@ -8,18 +8,18 @@ import math
 import random
 import struct
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import TypeVar
 
 from benchmarks.pushes.faults import Weather
 from onboard.mavlink.parameter_messages import (
+    SendAction,
     SendParamRead,
-    SendParamSet,
     TextReceived,
     ValueReceived,
 )
-from onboard.push.signals import Heartbeat
+from onboard.push.signals import Heartbeat, TransactionEvent
 
-Deliver: TypeAlias = Callable[[object], None]
+Packet = TypeVar("Packet")
 REPLY_S = 0.005
 QUEUE = 20
 
@@ -59,7 +59,7 @@ class Link:
         self.weather = weather
         self._agenda, self._rng = agenda, rng
 
-    def carry(self, packet: object, deliver: Deliver) -> None:
+    def carry(self, packet: Packet, deliver: Callable[[Packet], None]) -> None:
         """Deliver a packet, or not, or twice."""
         weather, rng = self.weather, self._rng
         if self.cut:
@@ -80,7 +80,11 @@ class Autopilot:
     """
 
     def __init__(
-        self, parameters: dict[str, float], agenda: Agenda, link: Link, hear: Deliver
+        self,
+        parameters: dict[str, float],
+        agenda: Agenda,
+        link: Link,
+        hear: Callable[[TransactionEvent], None],
     ) -> None:
         self.ram = {name: float32(value) for name, value in parameters.items()}
         self.stored = dict(self.ram)
@@ -105,7 +109,7 @@ class Autopilot:
         self._places: set[str] = set()
         agenda.at(0.3, self._beat)
 
-    def receive(self, action: object) -> None:
+    def receive(self, action: SendAction) -> None:
         """A packet has come."""
         if self._agenda.now < self.silent_until:
             return
@@ -113,7 +117,7 @@ class Autopilot:
             if self._reads < QUEUE and action.name in self.ram:
                 self._reads += 1
                 self._later(REPLY_S, lambda: self._read(action.name))
-        elif isinstance(action, SendParamSet):
+        else:
             self.set(action.name, action.value)
 
     def set(self, name: str, value: float) -> None:
@@ -169,7 +173,7 @@ class Autopilot:
             value = float32(value + self._rng.choice((1e-7, self._rng.uniform(-1.0, 1.0))))
         return ValueReceived(name, value)
 
-    def _say(self, event: object) -> None:
+    def _say(self, event: TransactionEvent) -> None:
         self._link.carry(event, self._hear)
 
 

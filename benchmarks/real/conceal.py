@@ -16,11 +16,12 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
+from benchmarks.real.command import building
 from benchmarks.real.concealed import KINDS
 from benchmarks.real.concealed_kind import Kind, about
 from benchmarks.real.flights import judged, told
 from benchmarks.real.outcomes import LEGEND, Outcome, Said, compared, table
-from benchmarks.real.split import WHERE, RealFlight, available
+from benchmarks.real.split import RealFlight
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.inputs.samples import Sample
@@ -121,18 +122,13 @@ def _worked(flight: RealFlight, names: Sequence[str]) -> list[Outcome]:
 def main(arguments: list[str] | None = None) -> None:
     """Conceal and print."""
     parser = argparse.ArgumentParser(description="Known errors put into real recordings.")
-    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
     parser.add_argument("--kinds", nargs="*", default=[], help="words of their names")
     parser.add_argument("--limit", type=int, default=15, help="so many, fairly drawn; 0: all")
-    parser.add_argument("--jobs", type=int, default=1)
-    chosen = parser.parse_args(arguments)
-    flights = available("building", chosen.flights)
-    if not flights:
-        print(WHERE)
-        return
-    kinds = chosen_kinds(chosen.kinds)
-    print(table(run(flights, kinds, limit=chosen.limit, jobs=chosen.jobs)))
-    print(LEGEND)
+    chosen, flights = building(parser, arguments)
+    if flights:
+        kinds = chosen_kinds(chosen.kinds)
+        print(table(run(flights, kinds, limit=chosen.limit, jobs=chosen.jobs)))
+        print(LEGEND)
 
 
 if __name__ == "__main__":

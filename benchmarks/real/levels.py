@@ -6,14 +6,13 @@ same: the filter's model of noise is not that of the flight.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.real.flights import Fit, fits
-from benchmarks.real.split import WHERE, available
+from benchmarks.real.command import fit_and_show
+from benchmarks.real.flights import Fit
 from benchmarks.real.whiteness import KINDS
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
 
@@ -154,15 +153,7 @@ def show(made: Sequence[Fit]) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Fit and print."""
-    parser = argparse.ArgumentParser(description="Noise levels on real flights.")
-    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
-    parser.add_argument("--jobs", type=int, default=1)
-    chosen = parser.parse_args(arguments)
-    flights = available("building", chosen.flights)
-    if not flights:
-        print(WHERE)
-        return
-    show(fits(flights, chosen.jobs))
+    fit_and_show("Noise levels on real flights.", show, arguments)
 
 
 if __name__ == "__main__":

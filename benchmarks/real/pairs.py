@@ -14,7 +14,6 @@ the chi-square of the two estimates against it, with what they share left out.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -22,8 +21,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.real.flights import Fit, fits
-from benchmarks.real.split import WHERE, available
+from benchmarks.real.command import fit_and_show
+from benchmarks.real.flights import Fit
+from benchmarks.real.split import RealFlight
 from onboard.core.estimate.joint import Single, disagreement, without_prior
 from onboard.core.estimate.relative import relative_of
 from onboard.core.estimate.shared_windows import shared_windows
@@ -203,21 +203,22 @@ def summary(pairs: Sequence[Pair], agreed: Sequence[Agreement]) -> list[str]:
     ]
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Fit and print."""
-    parser = argparse.ArgumentParser(description="Pairs of accelerometers on real flights.")
-    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
-    parser.add_argument("--jobs", type=int, default=1)
-    chosen = parser.parse_args(arguments)
-    flights = [f for f in available("building", chosen.flights) if len(f.imus) > 1]
-    if not flights:
-        print(WHERE)
-        return
-    made = fits(flights, chosen.jobs)
+def paired(flights: Sequence[RealFlight]) -> list[RealFlight]:
+    """Those with more than one accelerometer."""
+    return [f for f in flights if len(f.imus) > 1]
+
+
+def show(made: Sequence[Fit]) -> None:
+    """Print both tables."""
     pairs = run(made)
     print(table(pairs, agreements(made)))
     print()
     print(own_table(pairs))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Fit and print."""
+    fit_and_show("Pairs of accelerometers on real flights.", show, arguments, paired)
 
 
 if __name__ == "__main__":

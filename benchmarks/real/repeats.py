@@ -12,15 +12,15 @@ the parameters in force.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.real.flights import Fit, fits
-from benchmarks.real.split import WHERE, available
+from benchmarks.real.command import fit_and_show
+from benchmarks.real.flights import Fit
+from benchmarks.real.split import RealFlight
 from onboard.core.estimate.dead_reckoning import free_drift
 from onboard.core.estimate.limits import PRIOR_SHARE
 from onboard.core.estimate.result import SIX_NAMES
@@ -203,18 +203,14 @@ def show(made: Sequence[Fit]) -> None:
     print("\n".join(summary(scatter, left_out)))
 
 
+def repeated(flights: Sequence[RealFlight]) -> list[RealFlight]:
+    """Those of vehicles that flew more than once."""
+    return [f for f in flights if sum(o.vehicle == f.vehicle for o in flights) > 1]
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Fit and print."""
-    parser = argparse.ArgumentParser(description="Repeated flights of one vehicle.")
-    parser.add_argument("--flights", nargs="*", default=[], help="of those for building")
-    parser.add_argument("--jobs", type=int, default=1)
-    chosen = parser.parse_args(arguments)
-    flights = available("building", chosen.flights)
-    repeated = [f for f in flights if sum(o.vehicle == f.vehicle for o in flights) > 1]
-    if not repeated:
-        print(WHERE)
-        return
-    show(fits(repeated, chosen.jobs))
+    fit_and_show("Repeated flights of one vehicle.", show, arguments, repeated)
 
 
 if __name__ == "__main__":

@@ -7,15 +7,19 @@ contradict each other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
 from onboard.answers.chronicle import Chronicle, Course, Curve, Figures, Span
 from onboard.core.estimate.observability import Observability
 
-LEAST_PAUSE_S = 45.0
-PAUSE_SHARE = 0.1
-"""Of the longest flight: what is drawn between two, so that a curve of few points shows a gap."""
+LEAST_PAUSE_S: Final = 45.0
+"""Drawn between two flights at least, s: a chart shows a gap that is longer than four usual steps,
+and the points of a short flight's course are a batch of 10 s apart [bound]."""
+PAUSE_SHARE: Final = 0.1
+"""The same as a share of the longest flight: four steps of a course of 60 points are 4 / 60 of it
+[bound]."""
 
 
 class Chronicles:

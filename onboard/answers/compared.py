@@ -8,13 +8,8 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from onboard.answers.document import (
-    AccelerometersDocument,
-    JointDocument,
-    PairDocument,
-    finite,
-    numbers,
-)
+from onboard.answers.document_numbers import finite, numbers
+from onboard.answers.replay_document import AccelerometersDocument, JointDocument, PairDocument
 from onboard.core.estimate.common_cause import in_words
 from onboard.core.estimate.comparison import Comparison, PairDifference
 from onboard.core.estimate.joint import Joint

@@ -11,18 +11,16 @@ from collections.abc import Sequence
 import msgspec
 
 from onboard.answers.advice import Advice
-from onboard.answers.document import (
+from onboard.answers.calibration_document import (
     AdviceDocument,
     CalibrationDocument,
-    Number,
     advice_document,
     calibration_document,
-    finite,
-    timing_document,
 )
+from onboard.answers.document_numbers import Number, finite, timing_document
 from onboard.answers.verdict import unused_in_words
 from onboard.answers.words import DISTRUST
-from onboard.core.diagnosis.records import Diagnosis, Mismatch, Rung, Unused
+from onboard.core.diagnosis.records import Ambiguity, Diagnosis, Mismatch, NotTestable, Rung, Unused
 from onboard.core.physics.finding import Finding, Where
 from onboard.push.diagnosed import headline, severity_of_effect
 
@@ -191,11 +189,8 @@ def explain_document(
         note=" ".join(x for x in (diagnosis.note, *unused_in_words(diagnosis)) if x),
         mismatch=_mismatch(diagnosis.mismatch),
         effects=[_effect(e, autopilot) for e in diagnosis.effects],
-        ambiguous=[
-            AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart)
-            for a in diagnosis.ambiguous
-        ],
-        not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in diagnosis.not_testable],
+        ambiguous=ambiguity_documents(diagnosis.ambiguous),
+        not_testable=not_testable_documents(diagnosis.not_testable),
         ladder=[_rung(rung) for rung in diagnosis.ladder],
         unused=[_unused(stretch) for stretch in diagnosis.unused],
         advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
@@ -214,7 +209,7 @@ def _mismatch(m: Mismatch) -> MismatchDocument:
         held_out_whitened_rms_after=finite(m.held_out_after),
         held_out_velocity_rms_before_m_s=finite(m.held_out_velocity_before),
         held_out_velocity_rms_after_m_s=finite(m.held_out_velocity_after),
-        where=[_where(w) for w in m.where],
+        where=[where_document(w) for w in m.where],
         fixes=m.fixes,
         fixes_believed=m.believed,
     )
@@ -254,7 +249,7 @@ def _effect(e: Finding, autopilot: str) -> EffectDocument:
         held_out_whitened_rms_after=finite(e.held_out_after),
         parameters=dict(e.parameters) if autopilot == "ardupilot" else {},
         cure=e.cure,
-        where=[_where(w) for w in e.where],
+        where=[where_document(w) for w in e.where],
         rivals=[RivalDocument(name=r.name, delta_bic=finite(r.delta_bic)) for r in e.confounders],
         intervals=[[float(a), float(b)] for a, b in e.intervals],
         formula=e.formula,
@@ -263,7 +258,8 @@ def _effect(e: Finding, autopilot: str) -> EffectDocument:
     )
 
 
-def _where(w: Where) -> WhereDocument:
+def where_document(w: Where) -> WhereDocument:
+    """A place of a mismatch or of an effect."""
     return WhereDocument(
         start_s=finite(w.start_s),
         end_s=finite(w.end_s),
@@ -271,3 +267,13 @@ def _where(w: Where) -> WhereDocument:
         regime=w.regime,
         share=finite(w.share),
     )
+
+
+def ambiguity_documents(every: Sequence[Ambiguity]) -> list[AmbiguityDocument]:
+    """Effects that a flight cannot tell apart."""
+    return [AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart) for a in every]
+
+
+def not_testable_documents(every: Sequence[NotTestable]) -> list[NotTestableDocument]:
+    """Effects that a recording cannot speak about."""
+    return [NotTestableDocument(name=n.name, why=n.why) for n in every]

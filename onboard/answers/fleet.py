@@ -11,9 +11,9 @@ from typing import Protocol
 import msgspec
 
 from onboard.answers.chronicle import Chronicle
-from onboard.answers.document import ReplayDocument
 from onboard.answers.recorded import Recorded
 from onboard.answers.replay import Progress, Replay, replay
+from onboard.answers.replay_document import ReplayDocument
 from onboard.errors import OnboardError, UsageError
 
 SCHEMA = "onboard.fleet/1"

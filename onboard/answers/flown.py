@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -36,13 +36,15 @@ from onboard.core.vehicle.spans import grounded_spans
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
-FASTEST_HZ = 100.0
-"""Inertial samples beyond this rate are averaged: no vehicle's force changes faster [physics]."""
-UNKNOWN_FORCE = 0.05
-"""Sigma of the force, m/s^2, where the sensor level found nothing: a factory's calibration
-[data sheet]."""
-LEAST_FORCE = 0.002
-"""Sigma of the force that no calibration goes below, m/s^2 [physics: quantisation, filters]."""
+FASTEST_HZ: Final = 100.0
+"""Inertial samples beyond this rate are averaged: rotors follow a command within hundredths of a
+second and a vehicle more slowly, so that what is faster is vibration [physics]."""
+UNKNOWN_FORCE: Final = 0.05
+"""Sigma of the force on each axis, m/s^2, where the sensor level found nothing: the offset's sigma
+that a calibration has to reach; a sensor without one may be off by ten times that [tuned]."""
+LEAST_FORCE: Final = 0.002
+"""Sigma of the force that no calibration goes below, m/s^2: numbers of 16 bits for 16 g either way
+are in steps of 0.005, which are rounded by 0.0014 RMS [physics]."""
 
 S = TypeVar("S", Outputs, Battery, AirData)
 

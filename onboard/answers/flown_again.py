@@ -11,26 +11,31 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from onboard.answers.match import Match
+from onboard.answers.match import SAME, Match
+from onboard.answers.sensor_level import SIMULATED_PERIOD_S
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.wind_profile import LOWEST_M, TOP_M
+from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.records import AxisMismatch
 from onboard.errors import RecordingError
 from onboard.recordings.opening import open_recording
 
-STEP_S = 0.2
-"""Of the grid on which two flights are laid side by side: that of the receiver."""
-LEAST_OVERLAP = 0.6
-MOVING_M_S = 1.0
-ALIKE_SHARE = 0.05
-"""Share by which a number found twice may differ."""
-SURE = 3.0
+STEP_S: Final = SIMULATED_PERIOD_S
+"""Step of the grid on which two flights are laid side by side, s: the simulator's receiver says no
+more of the motion between two fixes [data sheet]."""
+LEAST_OVERLAP: Final = 0.6
+"""Share of the shorter flight that must lie beside the other: short of what it flies, standing
+before one flight beside standing after the other would fit best [tuned]."""
+MOVING_M_S: Final = 1.0
+"""Speed from which a step counts as motion, m/s: three times what a receiver may say of a vehicle
+that stands [data sheet]."""
 FLOORS = {"wind": 0.15, "thrust_tilt": 0.005, "motor_lag": 0.01, "wind_profile": 0.05}
-"""Differences that do not matter, in the unit of the effect's unknowns."""
+"""Differences that do not matter, in the unit of the effect's unknowns [use]."""
 AIR = ("wind", "wind_profile", "turbulence")
 
 
@@ -113,7 +118,7 @@ def numbers_twice(first: Match, second: Match) -> dict[str, Twice]:
             if effect.name == "wind":
                 other = replace(other, real=_at_one_height(first, second) * other.real)
             sigma = math.hypot(value.sigma, other.sigma)
-            most = max(SURE * sigma, ALIKE_SHARE * abs(value.real), FLOORS.get(effect.name, 0.0))
+            most = max(APART * sigma, SAME * abs(value.real), FLOORS.get(effect.name, 0.0))
             agrees = abs(value.real - other.real) <= most
             out[key] = Twice(value.real, other.real, sigma, value.unit, agrees)
     return out

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from onboard.core.vehicle.copter import Outputs
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.flight import Flight, flight_of
-from onboard.core.vehicle.limits import FEWEST_STEPS
+from onboard.core.vehicle.limits import APART, FEWEST_STEPS
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
@@ -45,14 +46,14 @@ NAMES = {
     ),
 }
 """Catalogue by vehicle."""
-SURE = 3.0
-"""Sigmas by which two recordings must differ beyond what matters [probability]."""
-SAME = 0.05
+SAME: Final = 0.05
 """Share of a number within which two vehicles are the same [use]."""
 DESCRIBING = ("lowest", "capacity", "rms_below_5_hz")
 """Numbers that tell of the flight, not of the vehicle."""
-SLOW_M_S, FAST_M_S = 3.0, 7.0
-"""Speed over ground that a tenth of the flight is slower than: of a copter, of a plane."""
+SLOW_M_S: Final = 3.0
+FAST_M_S: Final = 7.0
+"""Speed over ground that a tenth of the flight is slower than, m/s, of a copter and of a plane: the
+one stops now and then, the other cannot [physics]."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
 
 
@@ -209,7 +210,7 @@ def _apart(real: VehicleMatch, simulated: VehicleMatch) -> tuple[Difference, ...
             if key in DESCRIBING or not math.isfinite(a.real + b.real):
                 continue
             floor = max(a.floor, b.floor, SAME * abs(b.real))
-            differs = differs or abs(a.real - b.real) > floor + SURE * sigma
+            differs = differs or abs(a.real - b.real) > floor + APART * sigma
         if differs:
             base = ours or Difference(name, "vehicle", {})
             out.append(
@@ -322,11 +323,11 @@ def _drag_settings(vehicle: VehicleMatch) -> list[Setting]:
     """EK3_DRAG_*: what EKF3 needs to find the wind of this vehicle."""
     out = []
     c = vehicle.numbers.get("rotor_drag.mcoef")
-    if c is not None and c.real > 3.0 * c.sigma:
+    if c is not None and c.real > APART * c.sigma:
         out.append(Setting("EK3_DRAG_MCOEF", c.real, c.sigma, "rotor_drag"))
     for axis in "xy":
         k = vehicle.numbers.get(f"body_drag.{axis}")
-        if k is not None and k.real > 3.0 * k.sigma:
+        if k is not None and k.real > APART * k.sigma:
             name = f"EK3_DRAG_BCOEF_{axis.upper()}"
             out.append(Setting(name, 1.0 / k.real, k.sigma / k.real**2, "body_drag"))
     return out

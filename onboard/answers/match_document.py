@@ -5,17 +5,22 @@ Every number is finite; what is not known is ``null``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import msgspec
 
-from onboard.answers.document import finite
+from onboard.answers.document_numbers import finite
 from onboard.answers.explain_document import (
     AmbiguityDocument,
     NotTestableDocument,
     WhereDocument,
+    ambiguity_documents,
+    not_testable_documents,
+    where_document,
 )
 from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
-from onboard.core.vehicle.records import Difference
+from onboard.core.vehicle.records import AxisMismatch, Difference
 
 MATCH_SCHEMA = "onboard.match/1"
 
@@ -117,13 +122,7 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
 def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDocument:
     """The document of a match, with its verification if there was one."""
     vehicle = match.vehicle
-    mismatch = {
-        axis: HeldOutDocument(before=finite(m.before), after=finite(m.after))
-        for axis, m in vehicle.mismatch.items()
-    }
-    mismatch["velocity_after_10s"] = HeldOutDocument(
-        before=finite(vehicle.alone_before), after=finite(vehicle.alone_after)
-    )
+    alone = AxisMismatch(vehicle.alone_before, vehicle.alone_after)
     return MatchDocument(
         vehicle=vehicle.vehicle,
         recordings=MatchedRecordings(
@@ -135,14 +134,11 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
         flight_s=finite(vehicle.seconds),
         effects=[_effect(d) for d in match.effects],
         wind=_wind(match),
-        mismatch=mismatch,
+        mismatch=_mismatch({**vehicle.mismatch, "velocity_after_10s": alone}),
         settings={s.name: s.value for s in match.settings},
         frame=dict(match.frame),
-        ambiguous=[
-            AmbiguityDocument(names=list(a.names), tell_apart=a.tell_apart)
-            for a in vehicle.ambiguous
-        ],
-        not_testable=[NotTestableDocument(name=n.name, why=n.why) for n in match.not_testable],
+        ambiguous=ambiguity_documents(vehicle.ambiguous),
+        not_testable=not_testable_documents(match.not_testable),
         verified=None if verified is None else _verified(verified),
     )
 
@@ -161,10 +157,7 @@ def _verified(v: FlownAgain) -> VerifiedDocument:
             )
             for key, n in v.numbers.items()
         },
-        mismatch={
-            key: HeldOutDocument(before=finite(m.before), after=finite(m.after))
-            for key, m in v.mismatch.items()
-        },
+        mismatch=_mismatch(v.mismatch),
         effects_left=list(v.left),
     )
 
@@ -183,19 +176,18 @@ def _effect(d: Difference) -> MatchedEffectDocument:
             for key, v in d.values.items()
         },
         share=finite(d.share),
-        where=[
-            WhereDocument(
-                start_s=finite(p.start_s),
-                end_s=finite(p.end_s),
-                axis=p.axis,
-                regime=p.regime,
-                share=finite(p.share),
-            )
-            for p in d.where
-        ],
+        where=[where_document(w) for w in d.where],
         rivals=list(d.rivals),
-        held_out=HeldOutDocument(before=finite(d.held_out_before), after=finite(d.held_out_after)),
+        held_out=_held_out(d.held_out_before, d.held_out_after),
     )
+
+
+def _mismatch(every: Mapping[str, AxisMismatch]) -> dict[str, HeldOutDocument]:
+    return {key: _held_out(m.before, m.after) for key, m in every.items()}
+
+
+def _held_out(before: float, after: float) -> HeldOutDocument:
+    return HeldOutDocument(before=finite(before), after=finite(after))
 
 
 def _wind(match: Match) -> WindDocument | None:

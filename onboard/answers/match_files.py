@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from typing import Final
 
 from onboard.answers.match import Match
 from onboard.answers.match_words import number
 
-DIGITS = 7
+DIGITS: Final = 7
+"""Of a parameter: the 24 bits of single precision are 7.2 decimal digits [data sheet]."""
 
 
 def settings_text(match: Match) -> str:

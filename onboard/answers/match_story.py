@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from onboard.answers.match import Match
 from onboard.answers.words import (
@@ -16,9 +17,11 @@ from onboard.answers.words import (
 )
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.physics.catalogue import kind_of, title_of
+from onboard.core.physics.finding import Where
 from onboard.core.physics.wording import places
+from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.places import AXES
-from onboard.core.vehicle.records import Compared, Difference, NotTestable, Place
+from onboard.core.vehicle.records import Compared, Difference, NotTestable
 
 Values = Mapping[str, Compared]
 SEVERITIES = {
@@ -38,8 +41,8 @@ AXIS_WORDS = {
     AXES[-1]: "in the airspeed",
 }
 REGIME_WORDS = {"fast": "fast flight", "slow": "slow flight"}
-ALIKE = 0.005
-"""Numbers that differ by less are said to be the same."""
+ALIKE: Final = 0.005
+"""Share by which numbers must differ to be said to: less would be said as 0 % [bound]."""
 
 
 def whole(value: float, sigma: float, unit: str = "") -> str:
@@ -137,7 +140,7 @@ def _rotor_drag(v: Values) -> str:
 def _body_drag(v: Values) -> str:
     areas = {axis: v[f"area_by_mass_{axis}"] for axis in "xy"}
     hows = {
-        axis: f"{_times(a)} in the simulation" if a.real > 2.0 * a.sigma else "not at all"
+        axis: f"{_times(a)} in the simulation" if a.real > SURE * a.sigma else "not at all"
         for axis, a in areas.items()
     }
     sizes = [f"{axis} {whole(a.real, a.sigma)} m²/kg" for axis, a in areas.items()]
@@ -188,7 +191,7 @@ def _tilt(v: Values) -> str:
     parts = []
     for axis, ways in (("x", ("forward", "backward")), ("y", ("to the right", "to the left"))):
         t = v[axis]
-        if abs(t.real) > 2.0 * t.sigma:
+        if abs(t.real) > SURE * t.sigma:
             size = whole(math.degrees(abs(t.real)), math.degrees(t.sigma))
             parts.append(f"{size}° {ways[0 if t.real > 0.0 else 1]}")
     return (
@@ -222,7 +225,7 @@ def _coefficients(what: str, names: Mapping[str, str]) -> Callable[[Values], str
 
 
 def _apart(v: Compared) -> bool:
-    return abs(v.real - v.simulation) > max(2.0 * v.sigma, ALIKE * abs(v.simulation))
+    return abs(v.real - v.simulation) > max(SURE * v.sigma, ALIKE * abs(v.simulation))
 
 
 def _airspeed(v: Values) -> str:
@@ -280,7 +283,7 @@ def how_sure(match: Match) -> str:
     )
 
 
-def where(p: Place, speed: float = math.nan) -> str:
+def where(p: Where, speed: float = math.nan) -> str:
     """Where an effect acts: time, axis, kind of flight, speed, share."""
     span = f"{fixed(p.start_s, 0)} to {fixed(p.end_s, 0)} s"
     regime = REGIME_WORDS.get(p.regime, p.regime)

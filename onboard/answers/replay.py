@@ -12,20 +12,15 @@ import numpy as np
 
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
+from onboard.answers.calibration_document import advice_document
 from onboard.answers.compared import accelerometers_document, remarks
-from onboard.answers.document import (
-    FlightsDocument,
-    RecordingDocument,
-    ReplayDocument,
-    advice_document,
-    flight_document,
-    imu_document,
-)
+from onboard.answers.flight_document import FlightsDocument, flight_document
 from onboard.answers.recorded import unanswered
+from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.core.estimate.comparison import Comparison
-from onboard.core.estimate.result import Calibration, Coverage, Status
+from onboard.core.estimate.result import Calibration, Coverage
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.maths.accelerometer import parameter_names
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.opening import open_recording
@@ -314,30 +309,12 @@ class Vehicle:
     def unanswered(self, imu: int) -> Calibration:
         """What to say of an accelerometer of which the estimator could make nothing."""
         names = parameter_names(imu)
-        scale, offset = self._three(names.scale, 1.0), self._three(names.offset, 0.0)
-        unknown = float("nan")
-        return Calibration(
-            imu=imu,
-            status=Status.INSUFFICIENT,
-            scale=scale,
-            offset=offset,
-            scale_sigma=(unknown,) * 3,
-            offset_sigma=(unknown,) * 3,
-            covariance=((unknown,) * 6,) * 6,
-            observable=(False,) * 6,
-            note=self.silence(imu),
-            in_force_scale=scale,
-            in_force_offset=offset,
+        in_force = SixParameters(self._three(names.scale, 1.0), self._three(names.offset, 0.0))
+        return Calibration.unanswered(
+            imu,
+            in_force,
+            self.silence(imu),
             parameters_known=all(name in self._parameters for name in names.six),
-            timing={},
-            trusted_s=0.0,
-            rejected={},
-            whitened_rms_before=unknown,
-            whitened_rms_after=unknown,
-            held_out_before=unknown,
-            held_out_after=unknown,
-            velocity_rms_before=unknown,
-            velocity_rms_after=unknown,
             coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do()),
         )
 

@@ -9,17 +9,19 @@ from typing import Final
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding
-from onboard.core.vehicle.records import Compared, Difference, Place
+from onboard.core.vehicle.limits import APART, SURE
+from onboard.core.vehicle.records import Compared, Difference
 
 SIMULATED_LAG_S: Final = 0.1
-"""SIM_GPS1_LAG_MS by default: the receiver of the nominal simulator is this late."""
+"""SIM_GPS1_LAG_MS by default: the nominal simulator's receiver is this late, s [data sheet]."""
 SIMULATED_PERIOD_S: Final = 0.2
-"""Its fixes are so far apart."""
+"""Its fixes are so far apart, s [data sheet]."""
 LAG_FLOOR_S: Final = 0.05
 WINDOW_FLOOR_S: Final = 0.15
-"""What timing must differ by to be an effect (contracts of ``explain``)."""
-SURE: Final = 2.0
-"""Sigmas by which it must exceed that."""
+"""What timing must differ by to be an effect, s (contracts of ``explain``) [use]."""
+SCALE_FLOOR: Final = 0.005
+OFFSET_FLOOR: Final = 0.02
+"""What a scale (1) and an offset (m/s^2) must differ by to be worth a setting [use]."""
 TIMING_NAMES = ("gps_latency", "gps_smoothing")
 
 
@@ -94,7 +96,7 @@ def _with_proof(name: str, values: Mapping[str, Compared], real: Diagnosis) -> D
         "sensor",
         values,
         found.share_of_mismatch,
-        _places(found),
+        found.where,
         tuple(c.name for c in found.confounders),
         found.held_out_before,
         found.held_out_after,
@@ -110,7 +112,7 @@ def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
         value, sigma = (0.0, 0.0) if other is None else (other.value, other.sigma)
         both = math.hypot(q.sigma, sigma)
         values[name] = Compared(value, q.value, both, q.unit)
-        apart = apart or abs(q.value - value) > (SURE + 1.0) * both
+        apart = apart or abs(q.value - value) > APART * both
     if not apart:
         return None
     return Difference(
@@ -118,7 +120,7 @@ def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
         "sensor",
         values,
         real.share_of_mismatch,
-        _places(real),
+        real.where,
         tuple(c.name for c in real.confounders),
         real.held_out_before,
         real.held_out_after,
@@ -128,10 +130,6 @@ def _difference(real: Finding, simulation: Finding | None) -> Difference | None:
 def _only_simulated(effect: Finding) -> Difference:
     values = {n: Compared(q.value, 0.0, q.sigma, q.unit) for n, q in effect.unknowns.items()}
     return Difference(effect.name, "sensor", values)
-
-
-def _places(effect: Finding) -> tuple[Place, ...]:
-    return tuple(Place(w.start_s, w.end_s, w.axis, w.regime, w.share) for w in effect.where)
 
 
 def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -145,8 +143,8 @@ def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> di
     del parameters
     out: dict[str, float] = {}
     for i, axis in enumerate("XYZ"):
-        if abs(c.scale[i] - c.in_force_scale[i]) > 0.005 + SURE * c.scale_sigma[i]:
+        if abs(c.scale[i] - c.in_force_scale[i]) > SCALE_FLOOR + SURE * c.scale_sigma[i]:
             out[f"SIM_ACC1_SCAL_{axis}"] = c.scale[i]
-        if abs(c.offset[i] - c.in_force_offset[i]) > 0.02 + SURE * c.offset_sigma[i]:
+        if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * c.offset_sigma[i]:
             out[f"SIM_ACC1_BIAS_{axis}"] = c.offset[i]
     return out

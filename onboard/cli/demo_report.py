@@ -10,7 +10,12 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from onboard.answers.document import PushedDocument, RecordingDocument, ReplayDocument, imu_document
+from onboard.answers.replay_document import (
+    PushedDocument,
+    RecordingDocument,
+    ReplayDocument,
+    imu_document,
+)
 from onboard.core.estimate.result import Calibration
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 

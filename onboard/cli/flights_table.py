@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from rich import box
 from rich.console import RenderableType
@@ -12,7 +13,8 @@ from rich.text import Text
 
 from onboard.answers.answer import FlightAnswer
 
-NAME = 18
+NAME: Final = 18
+"""Letters of a file's name: what six numbers and a chi-square leave of 80 columns [bound]."""
 HEADS = ("scale x", "y", "z", "offset x", "y", "z")
 UNKNOWN = "-"
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+from benchmarks.challenge import Measured
 from benchmarks.matching import concealing
 from benchmarks.matching.adapter import MatchError, Said, said
 from benchmarks.matching.concealing import NAMES, UNSHOWN, Challenge, Secret
 from benchmarks.matching.runner import made, one, saturated
-from benchmarks.matching.scoring import Measured, Outcome, measured, table
+from benchmarks.matching.scoring import Outcome, measured, table
 from sitl.builtin.airframe.differences import differences
 from sitl.recording import truth_record
 

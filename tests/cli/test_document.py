@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.answers.document import (
+from onboard.answers.replay_document import (
     PushedDocument,
     RecordingDocument,
     ReplayDocument,

@@ -5,7 +5,10 @@ import math
 import os
 from contextlib import asynccontextmanager
 
+import pytest
+
 from onboard.core.estimate.result import Calibration, Coverage, Status
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.worker import Worker
 from onboard.daemon.process.service import Service
@@ -20,6 +23,7 @@ from sitl.virtual_time import VirtualTimeLoop
 
 EPOCH = 1_800_000_000.0
 """Unix time at which virtual time begins, s."""
+SIX = parameter_names(1).six
 
 
 class KnownWorker(Worker):
@@ -161,3 +165,23 @@ def convinced(service, *calibrations, missing="", modelled=False, effects=()):
         believe()
 
     learner.identify = first
+
+
+WANTED = calibration()
+"""A confident answer of the first accelerometer."""
+
+
+def in_force(vehicle):
+    """The six of the first accelerometer, as the vehicle holds them."""
+    return tuple(vehicle.parameters[name] for name in SIX)
+
+
+def pushed(vehicle):
+    """Whether it holds the confident answer."""
+    return in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+
+
+def held_back(service):
+    """Why the first proposal is not written, by objection."""
+    proposals = service.snapshot().push.proposals
+    return proposals[0].held_back if proposals else {}

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from onboard.cli.main import cli
 from onboard.daemon.outlets.parameter_view import FINDINGS
 from sitl.builtin.effects import TemperatureDrift
-from tests.daemon.daemons import until
+from tests.daemon.daemons import held_back, until
 from tests.daemon.flights import TRUE_SIX, GroundStation, flying, six
 
 pytestmark = pytest.mark.virtual_time
@@ -24,11 +24,6 @@ WARMING = TemperatureDrift(x=0.01, y=-0.008, z=0.01)
 def only_physics(document):
     """A policy so wide that nothing but the diagnosis stands against a push."""
     return document
-
-
-def held_back(service):
-    proposals = service.snapshot().push.proposals
-    return proposals[0].held_back if proposals else {}
 
 
 def antenna_known(service):

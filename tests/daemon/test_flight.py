@@ -5,7 +5,7 @@ import pytest
 
 from onboard.answers.replay import read
 from onboard.core.estimate.calibrator import Calibrator
-from tests.daemon.daemons import until
+from tests.daemon.daemons import held_back, until
 from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, six
 
 pytestmark = pytest.mark.virtual_time
@@ -16,11 +16,6 @@ def in_a_hurry(document, tmp_path):
     """A short flight cannot show everything as well as the default policy wants to know it."""
     document["recording"] = {"enabled": True, "directory": str(tmp_path / "recordings")}
     return document
-
-
-def held_back(service):
-    proposals = service.snapshot().push.proposals
-    return proposals[0].held_back if proposals else {}
 
 
 @pytest.mark.slow

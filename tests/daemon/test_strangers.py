@@ -6,14 +6,11 @@ import contextlib
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.core.maths.accelerometer import parameter_names
-from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.daemons import SIX, WANTED, convinced, in_force, until
 from tests.daemon.standing_vehicle import Vehicle
 from tests.daemon.strangers import Stranger
 
 pytestmark = pytest.mark.virtual_time
-SIX = parameter_names(1).six
-WANTED = calibration()
 NEW = WANTED.scale + WANTED.offset
 
 
@@ -38,10 +35,6 @@ async def repeated(what, period):
     finally:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-
-
-def in_force(vehicle):
-    return tuple(vehicle.parameters[name] for name in SIX)
 
 
 def as_disarmed_vehicle(stranger, vehicle):

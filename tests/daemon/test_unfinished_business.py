@@ -4,22 +4,18 @@ import asyncio
 
 import pytest
 
-from onboard.core.maths.accelerometer import parameter_names
-from tests.daemon.daemons import calibration, convinced, made, until
+from tests.daemon.daemons import (
+    SIX,
+    WANTED,
+    convinced,
+    held_back,
+    in_force,
+    made,
+    until,
+)
 from tests.daemon.standing_vehicle import Vehicle
 
 pytestmark = pytest.mark.virtual_time
-SIX = parameter_names(1).six
-WANTED = calibration()
-
-
-def in_force(vehicle):
-    return tuple(vehicle.parameters[name] for name in SIX)
-
-
-def held_back(service):
-    proposals = service.snapshot().push.proposals
-    return proposals[0].held_back if proposals else {}
 
 
 def notices(service, kind):

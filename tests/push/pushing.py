@@ -6,6 +6,7 @@ from onboard.core.maths.accelerometer import parameter_names
 from onboard.errors import StateError
 from onboard.push.entries import Closed, Planned, Result, Undoing, Writing, audit
 from onboard.push.journal import Journal
+from onboard.push.limits import UNCHANGED
 from onboard.push.plan import Baseline, Change, PushPlan, Vehicle
 from onboard.push.signals import Finished, Heartbeat, JournalFailed, JournalWritten, Record
 from onboard.push.transaction import PushTransaction
@@ -180,3 +181,28 @@ class PushWorld(World):
 
 
 __all__ = ["NEW", "OLD", "CrashError", "PushWorld", "Weather", "make_plan"]
+
+
+def finish(world, **kwargs):
+    """The outcome of a push that ends, in which nothing forbidden was written."""
+    assert world.run_through(**kwargs)
+    (outcome,) = world.outcomes
+    assert world.only_allowed_names_were_written()
+    assert all(
+        not all(abs(state[n]) < UNCHANGED for n in world.plan.names[3:])
+        for state in world.autopilot.states
+    )
+    return outcome
+
+
+def when_written(world, count, what):
+    """Call ``what`` just after the autopilot has taken ``count`` writes."""
+    original = world.autopilot.receive
+
+    def receive(action, now):
+        before = len(world.autopilot.history)
+        original(action, now)
+        if before < count <= len(world.autopilot.history):
+            world.at(now, what)
+
+    world.autopilot.receive = receive

@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks.pushes.faults import KINDS, draw
-from benchmarks.pushes.play import BrokenRuleError, History
+from benchmarks.pushes.play import History
+from benchmarks.pushes.story import BrokenRuleError
 
 BATCH = 200
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from onboard.answers.match import Match, Setting
 from onboard.core.diagnosis.records import Ambiguity, NotTestable, Verdict
+from onboard.core.physics.finding import Where
 from onboard.core.vehicle.records import (
     Alone,
     AxisMismatch,
@@ -16,7 +17,6 @@ from onboard.core.vehicle.records import (
     Curve,
     Difference,
     ForceSeries,
-    Place,
     VehicleMatch,
     WindEstimate,
 )
@@ -26,7 +26,7 @@ WIND = Difference(
     "vehicle",
     {"north": Compared(0.0, -3.0, 0.02, "m/s"), "east": Compared(0.0, 4.0, 0.02, "m/s")},
     0.9,
-    (Place(10.0, 22.0, "body_y", "turning", 0.4),),
+    (Where(10.0, 22.0, "body_y", "turning", 0.4),),
     (),
     1.687,
     0.0811,
@@ -36,7 +36,7 @@ ROTORS = Difference(
     "vehicle",
     {"mcoef": Compared(0.248, 0.497, 0.003, "1/s")},
     0.1,
-    (Place(30.0, 42.0, "body_x", "fast", 0.3),),
+    (Where(30.0, 42.0, "body_x", "fast", 0.3),),
     ("body_drag",),
     0.283,
     0.0811,

@@ -2,6 +2,8 @@
 
 import math
 
+import msgspec
+
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.daemon.view.snapshot import (
     CalibrationView,
@@ -211,3 +213,39 @@ def _link(second):
         messages=rates,
         counters={"frames": second * 170, "lost": second // 5, "bad_frames": 0, "reboots": 0},
     )
+
+
+def holding(held_back, *, approvable=False):
+    """The push at the end of the story, held back for these reasons."""
+    push = story(160).push
+    proposals = tuple(
+        msgspec.structs.replace(p, held_back=held_back, approvable=approvable)
+        for p in push.proposals
+    )
+    return msgspec.structs.replace(push, approval_needed=False, proposals=proposals)
+
+
+DIAGNOSIS = {
+    "schema": "onboard.explain/1",
+    "verdict": "partly_explained",
+    "headline": "Physics is missing from the model; a part of it was found.",
+    "severity": "warning",
+    "recording": {"imu": 1},
+    "mismatch": {
+        "held_out_velocity_rms_before_m_s": 0.65,
+        "held_out_velocity_rms_after_m_s": 0.055,
+    },
+    "effects": [
+        {
+            "name": "gps_latency",
+            "unknowns": {"delay": {"value": 0.21, "sigma": 0.004, "unit": "s"}},
+            "share_of_mismatch": 0.83,
+            "parameters": {"GPS1_DELAY_MS": 210},
+            "cure": "",
+        }
+    ],
+    "ambiguous": [
+        {"names": ["cross_axis", "mount_tilt"], "tell_apart": "fly banked turns both ways"}
+    ],
+    "not_testable": [{"name": "temperature_drift", "why": "no temperature in the recording"}],
+}

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from onboard.core.maths.accelerometer import (
     parameters_of,
 )
 from onboard.core.maths.arrays import Array, Vector3, vector3
+
+UNKNOWN: Final = (math.nan, math.nan, math.nan)
+"""Three numbers that nobody can say."""
 
 
 def merged_calibration(
@@ -84,28 +88,20 @@ def merged_calibration(
 
 def unknown_six(c: Calibration, in_force: SixParameters) -> Calibration:
     """The record of an accelerometer of whose flights nobody can say which are right."""
-    nan = float("nan")
+    nothing = Calibration.unanswered(
+        c.imu, in_force, c.note, parameters_known=c.parameters_known, coverage=c.coverage
+    )
     return replace(
-        c,
-        status=Status.INSUFFICIENT,
-        scale=(nan,) * 3,
-        offset=(nan,) * 3,
-        scale_sigma=(nan,) * 3,
-        offset_sigma=(nan,) * 3,
-        covariance=((nan,) * 6,) * 6,
-        observable=(False,) * 6,
-        in_force_scale=in_force.scale,
-        in_force_offset=in_force.offset,
-        timing={},
-        predictive_gain=nan,
-        certificate=None,
-        dead_reckoning=None,
-        whitened_rms_before=nan,
-        whitened_rms_after=nan,
-        held_out_before=nan,
-        held_out_after=nan,
-        velocity_rms_before=nan,
-        velocity_rms_after=nan,
+        nothing,
+        scale=UNKNOWN,
+        offset=UNKNOWN,
+        trusted_s=c.trusted_s,
+        rejected=c.rejected,
+        prior_sigma=c.prior_sigma,
+        load_mean=c.load_mean,
+        load_square=c.load_square,
+        temperature=c.temperature,
+        extra=c.extra,
     )
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Self
 
+from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Vector3
 
 Six = tuple[float, float, float, float, float, float]
@@ -109,3 +110,40 @@ class Calibration:
     dead_reckoning: DeadReckoning | None = None
     temperature: Estimate | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def unanswered(
+        cls,
+        imu: int,
+        in_force: SixParameters,
+        note: str,
+        *,
+        parameters_known: bool,
+        coverage: Coverage,
+    ) -> Self:
+        """The record of an accelerometer of which nobody can say more than what is in force."""
+        nan = float("nan")
+        return cls(
+            imu=imu,
+            status=Status.INSUFFICIENT,
+            scale=in_force.scale,
+            offset=in_force.offset,
+            scale_sigma=(nan,) * 3,
+            offset_sigma=(nan,) * 3,
+            covariance=((nan,) * 6,) * 6,
+            observable=(False,) * 6,
+            note=note,
+            in_force_scale=in_force.scale,
+            in_force_offset=in_force.offset,
+            parameters_known=parameters_known,
+            timing={},
+            trusted_s=0.0,
+            rejected={},
+            whitened_rms_before=nan,
+            whitened_rms_after=nan,
+            held_out_before=nan,
+            held_out_after=nan,
+            velocity_rms_before=nan,
+            velocity_rms_after=nan,
+            coverage=coverage,
+        )

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.vehicle.airframe_file import with_numbers
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 
+POSITIVE = ("mass", "refSpd", "maxVoltage", "hoverThrOut", "disc_area", "refVoltage")
+"""Keys of a file that are divided by, or a root is taken of."""
 LEAST_BODY_DRAG = 1e-4
 """m^2/kg; a file cannot have rotors' drag and none at all of the body: its reference test gives
 what is left over to the body."""
@@ -52,19 +55,7 @@ class CopterAirframe:
         Raises:
             ValueError: a key that should be a number is none, or cannot be.
         """
-        known = {f.name for f in fields(cls)}
-        numbers: dict[str, float] = {}
-        for name, value in given.items():
-            if name not in known:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"{name} is not a number")  # noqa: TRY004 - of a file
-            numbers[name] = float(value)
-        frame = replace(cls(), **numbers)
-        for name in ("mass", "refSpd", "maxVoltage", "hoverThrOut", "disc_area", "refVoltage"):
-            if not getattr(frame, name) > 0.0:
-                raise ValueError(f"{name} must be positive")
-        return frame
+        return with_numbers(cls(), given, POSITIVE)
 
     @property
     def reference_density(self) -> float:

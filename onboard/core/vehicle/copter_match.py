@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import NAN
 from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.airframe_file import DIGITS, numbers_of_file
 from onboard.core.vehicle.battery import fitted_battery
 from onboard.core.vehicle.copter import (
     Outputs,
@@ -28,23 +28,10 @@ from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import SURE
-from onboard.core.vehicle.matching import (
-    Matched,
-    ambiguous_of,
-    differences,
-    drifts_of,
-    is_explained,
-    matched,
-    mismatch_of,
-    not_testable_of,
-    note_of,
-    numbers_of,
-    rms,
-    series_of,
-    wind_of,
-    windless,
-)
+from onboard.core.vehicle.limits import APART
+from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
+from onboard.core.vehicle.matching import Matched, matched
+from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Signals
 
@@ -60,8 +47,6 @@ RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("thrust_tilt", {"by_components": True}),
 )
 """Where an effect was found, another form of the model: that which predicts better is taken."""
-DIGITS = 6
-"""Of the numbers of a frame file: parameters are of single precision [data sheet]."""
 
 
 def match_copter(
@@ -86,34 +71,19 @@ def match_copter(
             other = matched(copter_model(flight, frame, force_sigma, other_form))
             if rms(other.held) < rms(found.held):
                 variant, found = other_form, other
-    alone = drifts_of(found)
     effects = tuple(
         _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
     )
     absent = copter_missing(flight, frame)
-    untested = not_testable_of(found, absent, MANOEUVRES | _manoeuvres(found))
-    return VehicleMatch(
-        vehicle="copter",
+    untested = not_testable_of(found, absent, MANOEUVRES)
+    return vehicle_match(
+        found,
+        "copter",
+        untested,
         effects=effects,
-        wind=wind_of(found),
-        mismatch=mismatch_of(found),
-        alone_before=float(alone.before[-1]) if alone else NAN,
-        alone_after=float(alone.after[-1]) if alone else NAN,
-        alone=alone,
-        ambiguous=ambiguous_of(found),
-        not_testable=windless(untested, found),
-        numbers=numbers_of(found),
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
-        series=series_of(found),
-        seconds=len(found.model.flight) * found.model.flight.step_s,
-        explained=is_explained(found),
-        note=note_of(found),
     )
-
-
-def _manoeuvres(m: Matched) -> dict[str, str]:
-    return {e.name: e.manoeuvre for e in m.model.effects if e.name}
 
 
 def _with_battery(
@@ -171,9 +141,7 @@ def _frame(
         if battery is not None:
             made = replace(made, battCapacityAh=battery[0], refBatRes=battery[1])
         made = replace(made, maxVoltage=full_voltage(model.flight, frame))
-    out: dict[str, float | list[float]] = {
-        k: float(f"{v:.{DIGITS}g}") for k, v in asdict(made).items()
-    }
+    out = numbers_of_file(made)
     if "thrust_tilt" in names:
         x, y = theta[model.indices("thrust_tilt")].tolist()
         for k in range(int(made.num_motors)):
@@ -185,7 +153,7 @@ def _with_inflow(m: Matched, frame: CopterAirframe) -> CopterAirframe:
     """The reference current whose outflow gives the inflow that was found, if it surely differs."""
     k = m.model.index("inflow")
     found, sigma = float(m.fit.theta[k]), float(m.fit.sigma[k])
-    if found <= 0.0 or abs(found - frame.inflow) < (SURE + 1.0) * sigma:
+    if found <= 0.0 or abs(found - frame.inflow) < APART * sigma:
         return frame
     return replace(frame, refCurrent=frame.refCurrent * math.sqrt(frame.inflow / found))
 

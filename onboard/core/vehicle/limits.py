@@ -88,6 +88,9 @@ FALSE_ALARM: Final = 1e-3
 by the number of effects that are tried [probability]."""
 SURE: Final = 2.0
 """Sigmas by which a difference must exceed what matters [probability: one in 44]."""
+APART: Final = 3.0
+"""Sigmas by which two findings of one number differ, or a number from the airframe's that is not
+tested as an effect: one in 370 by chance [probability]."""
 TESTABLE: Final = 3.0
 """Sigmas in the largest plausible size that make an effect testable [probability]."""
 ALIKE: Final = 0.7

@@ -68,6 +68,10 @@ class ForceModel:
             at += len(effect.unknowns)
         return out
 
+    def effect(self, name: str) -> Effect:
+        """The effect of this name, which is in the model."""
+        return next(e for e in self.effects if e.name == name)
+
     def index(self, unknown: str) -> int:
         """Place of an unknown by its own name, of the first effect that has it.
 

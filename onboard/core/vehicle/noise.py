@@ -157,3 +157,8 @@ def _scored(
     log_step = 0.5 * n * math.log(_recursion(step_s, tau, white).variance)
     score = -log_size - log_step - 0.5 * float(e @ e) / size**2
     return score, AxisNoise(size, size * level / mean, tau, white)
+
+
+def rms(x: Array) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(x**2))) if x.size else float("nan")

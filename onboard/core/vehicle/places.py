@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.physics.finding import Where
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.records import Place
 
 MOST = 4
 LEAST_SHARE = 0.05
 AXES = ("x", "y", "z", "airspeed")
+"""Names of the columns of a prediction."""
+FORCE = (0, 1, 2)
+"""Those of them that are forces; a further one is airspeed."""
 CLIMB_M_S, FAST_M_S, TURN_RAD_S = 1.0, 5.0, 0.3
 
 
@@ -30,7 +33,7 @@ def regime_of(flight: Flight, mine: Mask) -> str:
 
 def places_of(
     flight: Flight, made: Array, axes: tuple[int, ...], block: Array
-) -> tuple[Place, ...]:
+) -> tuple[Where, ...]:
     """Blocks in which an effect moves the force most, neighbours joined.
 
     Args:
@@ -60,7 +63,7 @@ def places_of(
         t = flight.t[mine] - flight.t[0]
         share = sum(by_block[b] for b in group)
         out.append(
-            Place(
+            Where(
                 float(t[0]),
                 float(t[-1]),
                 axis if axis == AXES[-1] else f"body_{axis}",

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.vehicle.airframe_file import with_numbers
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 
+POSITIVE = ("s", "b", "oswald")
+"""Keys of a file that are divided by."""
 MASS_KG = 2.0
 HOVER_THROTTLE = 0.7
 """Throttle that carries the nominal plane's weight; neither is in the coefficient file."""
@@ -46,19 +49,7 @@ class PlaneAirframe:
         Raises:
             ValueError: a key that should be a number is none, or cannot be.
         """
-        known = {f.name for f in fields(cls)}
-        numbers: dict[str, float] = {}
-        for name, value in given.items():
-            if name not in known:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"{name} is not a number")  # noqa: TRY004 - of a file
-            numbers[name] = float(value)
-        made = replace(cls(), **numbers)
-        for name in ("s", "b", "oswald"):
-            if not getattr(made, name) > 0.0:
-                raise ValueError(f"{name} must be positive")
-        return made
+        return with_numbers(cls(), given, POSITIVE)
 
     @property
     def induced(self) -> float:

@@ -3,40 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import NAN
+from onboard.core.vehicle.airframe_file import numbers_of_file
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import FEWEST_STEPS
-from onboard.core.vehicle.matching import (
-    Matched,
-    ambiguous_of,
-    differences,
-    drifts_of,
-    is_explained,
-    matched,
-    mismatch_of,
-    not_testable_of,
-    note_of,
-    numbers_of,
-    series_of,
-    wind_of,
-    windless,
-)
+from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
+from onboard.core.vehicle.matching import Matched, matched
 from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_curves import plane_curves
 from onboard.core.vehicle.records import Difference, VehicleMatch
 
 MANOEUVRES = {e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, WindProfile)}
-DIGITS = 6
 
 
 def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> VehicleMatch | None:
@@ -57,27 +43,15 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     if len(flying) >= FEWEST_STEPS and float(np.linalg.norm(wind)) > 1.0:
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma))
-    alone = drifts_of(found)
     effects = differences(found)
-    manoeuvres = MANOEUVRES | {e.name: e.manoeuvre for e in found.model.effects if e.name}
-    untested = not_testable_of(found, plane_missing(flying), manoeuvres)
-    return VehicleMatch(
-        vehicle="plane",
+    untested = not_testable_of(found, plane_missing(flying), MANOEUVRES)
+    return vehicle_match(
+        found,
+        "plane",
+        untested,
         effects=effects,
-        wind=wind_of(found),
-        mismatch=mismatch_of(found),
-        alone_before=float(alone.before[-1]) if alone else NAN,
-        alone_after=float(alone.after[-1]) if alone else NAN,
-        alone=alone,
-        ambiguous=ambiguous_of(found),
-        not_testable=windless(untested, found),
-        numbers=numbers_of(found),
         frame=_coefficients(found, frame, effects),
         curves=plane_curves(found, frame),
-        series=series_of(found),
-        seconds=len(found.model.flight) * found.model.flight.step_s,
-        explained=is_explained(found),
-        note=note_of(found),
     )
 
 
@@ -98,4 +72,4 @@ def _coefficients(
     if "side_force" in names:
         c_y_b, c_y_deltar = m.fit.theta[m.model.indices("side_force")].tolist()
         made = replace(made, c_y_b=c_y_b, c_y_deltar=c_y_deltar)
-    return {k: float(f"{v:.{DIGITS}g}") for k, v in asdict(made).items()}
+    return numbers_of_file(made)

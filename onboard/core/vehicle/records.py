@@ -13,7 +13,7 @@ import numpy as np
 
 from onboard.core.diagnosis.records import Ambiguity, NotTestable, Verdict
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.finding import NAN
+from onboard.core.physics.finding import NAN, Where
 
 EMPTY = np.zeros(0)
 __all__ = ["Ambiguity", "NotTestable", "Verdict"]
@@ -35,17 +35,6 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where an effect acts: seconds since the start, body axis, kind of flight, share of it."""
-
-    start_s: float
-    end_s: float
-    axis: str
-    regime: str
-    share: float
-
-
-@dataclass(frozen=True, slots=True)
 class Difference:
     """One effect that was found.
 
@@ -57,7 +46,7 @@ class Difference:
     level: str
     values: Mapping[str, Compared]
     share: float = NAN
-    where: tuple[Place, ...] = ()
+    where: tuple[Where, ...] = ()
     rivals: tuple[str, ...] = ()
     held_out_before: float = NAN
     held_out_after: float = NAN

@@ -25,7 +25,7 @@ from onboard.core.vehicle.limits import (
     TURBULENCE_FLOOR_M_S,
 )
 from onboard.core.vehicle.model import ForceModel
-from onboard.core.vehicle.noise import whitened
+from onboard.core.vehicle.noise import rms, whitened
 from onboard.core.vehicle.places import AXES
 from onboard.core.vehicle.windows import windows_of
 
@@ -85,8 +85,8 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
         level = FALSE_ALARM / (len(numbers) * len(whole.axes))
         for b, count, its in zip(numbers.tolist(), rows.tolist(), energy.tolist(), strict=True):
             mine = block == b
-            force = _rms(residual[mine, k])
-            matters = force > TURBULENCE_FLOOR_M_S * _rms(sensitivity[mine, k])
+            force = rms(residual[mine, k])
+            matters = force > TURBULENCE_FLOOR_M_S * rms(sensitivity[mine, k])
             dof = max(round(share * count), 1)
             if matters and survival(dof * its / (usual * count), dof) < level:
                 start, end = float(t[mine][0]), float(t[mine][-1]) + windows.length_s
@@ -173,7 +173,3 @@ def _scatter(ratio: Array, rows: Array) -> tuple[float, float]:
     spread = 1.4826 * float(np.median(np.abs(logarithm - np.median(logarithm))))
     expected = math.sqrt(2.0 / float(np.median(rows)))
     return usual, min(1.0, (expected / max(spread, 1e-9)) ** 2)
-
-
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(x**2)))

@@ -74,28 +74,15 @@ class Parts:
             StateError: the journal is locked or damaged.
         """
         directory = configuration.state.path()
-        notices, witness, board, parameters = (
-            Notices(wall_clock),
-            Witness(),
-            Board(),
-            ParameterWatch(),
-        )
+        notices, witness = Notices(wall_clock), Witness()
+        board, parameters = Board(), ParameterWatch()
         signing_file = SigningFile(directory / "signing.json")
         signing = settings.signing(configuration.link, wall_clock, signing_file.load())
-        endpoints = settings.endpoints(configuration.link)
         recorder = settings.recorder(configuration.recording, directory, wall_clock)
+        link = _link(configuration, signing, recorder, clock, wall_clock)
         journal = Journal(directory / "journal.jsonl")
         ledger = Ledger(journal, wall_clock)
         proposals = _proposals(configuration, ledger)
-        link = Link(
-            endpoints,
-            system=configuration.link.system_id or None,
-            component=configuration.link.component_id or None,
-            signing=signing,
-            recorder=recorder,
-            clock=clock,
-            wall_clock=wall_clock,
-        )
         observed = Observed()
         pusher = Pusher(ledger, proposals, witness, notices)
         situation = Situation(link, board, parameters, witness, proposals)
@@ -131,6 +118,24 @@ class Parts:
     def participants(self) -> tuple[Participant, ...]:
         """Those that speak with the autopilot."""
         return self.streams, self.board, self.parameters, self.pusher
+
+
+def _link(
+    configuration: Configuration,
+    signing: Signing | None,
+    recorder: Recorder | None,
+    clock: Callable[[], float],
+    wall_clock: Callable[[], float],
+) -> Link:
+    return Link(
+        settings.endpoints(configuration.link),
+        system=configuration.link.system_id or None,
+        component=configuration.link.component_id or None,
+        signing=signing,
+        recorder=recorder,
+        clock=clock,
+        wall_clock=wall_clock,
+    )
 
 
 def _proposals(configuration: Configuration, ledger: Ledger) -> Proposals:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import cast
 
-from onboard.answers.document import worth_document
+from onboard.answers.calibration_document import worth_document
 from onboard.answers.knowledge import seen
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Six
 from onboard.core.maths.accelerometer import parameter_names

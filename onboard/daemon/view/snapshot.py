@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from onboard.answers.document import WorthDocument
+from onboard.answers.calibration_document import WorthDocument
 
 Three: TypeAlias = tuple[float | None, float | None, float | None]
 SCHEMA = "onboard.state/1"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -37,6 +38,25 @@ PITOT_NOISE = 0.15
 WIND_LATE_S, WIND_WRONG = 20.0, 0.4
 
 
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """What an airframe has to follow: n samples.
+
+    Attributes:
+        v_n: (n, 3) velocity, m/s NED.
+        f_n: (n, 3) specific force that makes it, m/s^2 NED.
+        wind_n: (n, 3) velocity of the air, m/s NED.
+        rho: (n,) density, kg/m^3.
+        aloft: (n,) 0 on the ground to 1 in the air.
+    """
+
+    v_n: Array
+    f_n: Array
+    wind_n: Array
+    rho: Array
+    aloft: Array
+
+
 def flown(motion: Motion, craft: Craft, air: Air, environment: Environment) -> Trajectory:
     """The trajectory of a commanded motion in moving air.
 
@@ -57,18 +77,11 @@ def flown(motion: Motion, craft: Craft, air: Air, environment: Environment) -> T
     wind_n = aloft[:, None] * air.steady(-p_n[:, 2], t) + unsteady
     rho = air.density_ratio * density(environment.altitude - p_n[:, 2])
     f_n = specific_force_n(v_n, environment)
-    make = _copter if isinstance(craft, Airframe) else _plane
-    R, throttle, outputs = make(
-        craft,  # type: ignore[arg-type]
-        motion,
-        air,
-        environment,
-        v_n=v_n,
-        f_n=f_n,
-        wind_n=wind_n,
-        rho=rho,
-        aloft=aloft,
-    )
+    course = _Course(v_n, f_n, wind_n, rho, aloft)
+    if isinstance(craft, Airframe):
+        R, throttle, outputs = _copter(craft, motion, environment, course)
+    else:
+        R, throttle, outputs = _plane(craft, motion, air, environment, course)
     return Trajectory(
         R_nb=R,
         w_b=body_rate(R, v_n, environment),
@@ -112,20 +125,15 @@ def idle(craft: Craft, n: int, altitude: float, consumed: float) -> Outputs:
 def _copter(
     frame: Airframe,
     motion: Motion,
-    air: Air,  # noqa: ARG001
     environment: Environment,
-    *,
-    v_n: Array,
-    f_n: Array,
-    wind_n: Array,
-    rho: Array,
-    aloft: Array,  # noqa: ARG001
+    course: _Course,
 ) -> tuple[Array, Array, Outputs]:
+    v_n, wind_n, rho = course.v_n, course.wind_n, course.rho
     t = np.arange(motion.n, dtype=np.float64) * DT
     begin, end = motion.in_air_s
     mass = frame.mass_over(t)
     air_n = v_n - wind_n
-    balance = copter_force.balanced(frame, f_n, air_n, motion.yaw, mass=mass, density=rho)
+    balance = copter_force.balanced(frame, course.f_n, air_n, motion.yaw, mass=mass, density=rho)
     lifting = envelope(motion.n, begin - SPIN_UP_S, end + SPIN_UP_S, SPIN_UP_S)
     outputs = copter_force.outputs(
         frame,
@@ -150,23 +158,19 @@ def _plane(
     motion: Motion,
     air: Air,
     environment: Environment,
-    *,
-    v_n: Array,
-    f_n: Array,
-    wind_n: Array,
-    rho: Array,
-    aloft: Array,
+    course: _Course,
 ) -> tuple[Array, Array, Outputs]:
+    v_n, wind_n, rho = course.v_n, course.wind_n, course.rho
     t = np.arange(motion.n, dtype=np.float64) * DT
     mass = wing.mass_over(t)
     air_n = v_n - wind_n
     balance = wing_force.balanced(
         wing,
-        f_n,
+        course.f_n,
         air_n,
         motion.bank,
         course=_course(air_n, motion.start.yaw),
-        aloft=aloft,
+        aloft=course.aloft,
         mass=mass,
         density=rho,
     )

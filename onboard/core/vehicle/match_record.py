@@ -1,0 +1,223 @@
+"""A matched model as the record of the vehicle level: what was found, how well, and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.diagnosis.records import Ambiguity, NotTestable
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.finding import NAN
+from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.flown_alone import drift_alone
+from onboard.core.vehicle.limits import TURBULENCE_FLOOR_M_S
+from onboard.core.vehicle.matching import Matched, held_out
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import rms
+from onboard.core.vehicle.places import AXES, FORCE, places_of
+from onboard.core.vehicle.records import (
+    Alone,
+    AxisMismatch,
+    Compared,
+    Curve,
+    Difference,
+    ForceSeries,
+    VehicleMatch,
+)
+from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
+from onboard.core.vehicle.wind_record import wind_of
+
+
+def vehicle_match(
+    m: Matched,
+    vehicle: str,
+    untested: tuple[NotTestable, ...],
+    *,
+    effects: tuple[Difference, ...],
+    frame: Mapping[str, float | list[float]],
+    curves: tuple[Curve, ...],
+) -> VehicleMatch:
+    """The record of the vehicle level.
+
+    Args:
+        m: what was found.
+        vehicle: its kind.
+        untested: effects that this flight could not have shown, a wind's profile included.
+        effects: those that were found.
+        frame: keys of an airframe's file that flies like the recording.
+        curves: laws with their data.
+    """
+    alone = drifts_of(m)
+    return VehicleMatch(
+        vehicle=vehicle,
+        effects=effects,
+        wind=wind_of(m),
+        mismatch=mismatch_of(m),
+        alone_before=float(alone.before[-1]) if alone else NAN,
+        alone_after=float(alone.after[-1]) if alone else NAN,
+        alone=alone,
+        ambiguous=ambiguous_of(m),
+        not_testable=windless(untested, m),
+        numbers=numbers_of(m),
+        frame=frame,
+        curves=curves,
+        series=series_of(m),
+        seconds=len(m.model.flight) * m.model.flight.step_s,
+        explained=is_explained(m),
+        note=note_of(m),
+    )
+
+
+def differences(m: Matched) -> tuple[Difference, ...]:
+    """The effects that were chosen, and turbulence, with their evidence."""
+    fit, chosen = m.fit, m.chosen
+    whole = sum(max(chosen.gains[n], 0.0) for n in chosen.effects)
+    out = []
+    for name in chosen.effects:
+        without = tuple(n for n in chosen.effects if n != name)
+        places = m.model.indices(name)
+        effect = m.model.effect(name)
+        shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
+        apart = fit.theta[places] - m.model.nominal[places]
+        columns = [
+            k for k, a in enumerate(m.model.axes) if (a in FORCE) != (name == AirspeedScale.name)
+        ]
+        out.append(
+            Difference(
+                name,
+                "vehicle",
+                {s.name: Compared(s.nominal, s.value, s.sigma, s.unit) for s in shown},
+                max(chosen.gains[name], 0.0) / whole if whole > 0.0 else 0.0,
+                places_of(
+                    m.model.flight, fit.jacobian[:, :, places] @ apart, m.model.axes, fit.block
+                ),
+                chosen.rivals[name],
+                rms(held_out(m.choices, without)[:, columns]),
+                rms(m.held[:, columns]),
+            )
+        )
+    if m.turbulence.found:
+        t = m.turbulence
+        value = {
+            "rms": Compared(0.0, t.whole, t.whole_sigma, "m/s"),
+            "rms_below_5_hz": Compared(0.0, t.rms, t.sigma, "m/s"),
+        }
+        out.append(Difference("turbulence", "vehicle", value, 0.0))
+    return tuple(out)
+
+
+def not_testable_of(
+    m: Matched, absent: Mapping[str, str], manoeuvres: Mapping[str, str]
+) -> tuple[NotTestable, ...]:
+    """What this flight could not have shown, why, and what would.
+
+    Args:
+        m: what was found.
+        absent: why some effects are not in the model, by name.
+        manoeuvres: that would show them, by name; those of the model's effects are their own.
+    """
+    shown_by = dict(manoeuvres) | {e.name: e.manoeuvre for e in m.model.effects if e.name}
+    why = dict(absent)
+    for name in m.chosen.untestable:
+        why.setdefault(name, "the flight would not have shown it")
+    return tuple(
+        NotTestable(name, f"{reason}; {shown_by[name]}" if shown_by.get(name) else reason)
+        for name, reason in why.items()
+    )
+
+
+def windless(untested: tuple[NotTestable, ...], m: Matched) -> tuple[NotTestable, ...]:
+    """A calm has no profile: that is the reason, not the flight."""
+    if "wind" in m.chosen.effects:
+        return untested
+    why = "there was no wind to have one"
+    return tuple(replace(n, why=why) if n.name == "wind_profile" else n for n in untested)
+
+
+def ambiguous_of(m: Matched) -> tuple[Ambiguity, ...]:
+    """Pairs that this flight cannot tell apart."""
+    return tuple(
+        Ambiguity((name, *rivals), m.model.effect(rivals[0]).manoeuvre)
+        for name, rivals in m.chosen.rivals.items()
+        if rivals
+    )
+
+
+def mismatch_of(m: Matched) -> dict[str, AxisMismatch]:
+    """RMS by axis on flight not used, before and after."""
+    return {
+        AXES[axis]: AxisMismatch(rms(m.nominal[:, k]), rms(m.held[:, k]))
+        for k, axis in enumerate(m.model.axes)
+        if axis in FORCE
+    }
+
+
+def drifts_of(m: Matched) -> Alone | None:
+    """How velocity drifts when the nominal model, and the found one, fly on alone."""
+    before = _drift(m.model, m.model.nominal, m.nominal)
+    after = _drift(m.model, m.fit.theta, m.held)
+    if not len(before):
+        return None
+    t: Array = m.model.flight.step_s * np.arange(1.0, len(before) + 1.0)
+    return Alone(t, before, after)
+
+
+def series_of(m: Matched) -> ForceSeries:
+    """Forces over time, for a report."""
+    columns = [k for k, axis in enumerate(m.model.axes) if axis in FORCE]
+    measured = m.model.measured()[:, columns]
+    t = m.model.flight.t - m.model.flight.t[0]
+    axes = tuple(AXES[m.model.axes[k]] for k in columns)
+    before, after = measured - m.nominal[:, columns], measured - m.held[:, columns]
+    speed = np.linalg.norm(m.model.flight.v_n, axis=1)
+    return ForceSeries(t, axes, measured, before, after, speed)
+
+
+def numbers_of(m: Matched) -> dict[str, Compared]:
+    """Every unknown of the model, by ``effect.unknown``, and as the document shows it."""
+    out: dict[str, Compared] = {}
+    at = 0
+    sigmas = m.fit.sigma
+    for effect in m.model.effects:
+        end = at + len(effect.unknowns)
+        values, spread = m.fit.theta[at:end].tolist(), sigmas[at:end].tolist()
+        prefix = f"{effect.name}." if effect.name else ""
+        for s in effect.shown(values, spread):
+            out[prefix + s.name] = Compared(s.nominal, s.value, s.sigma, s.unit)
+        for u, value, sigma in zip(effect.unknowns, values, spread, strict=True):
+            out[prefix + u.name] = Compared(u.nominal, value, sigma, u.unit, u.floor)
+        at = end
+    return out
+
+
+def is_explained(m: Matched) -> bool:
+    """Whether what is left is less than what errors of the velocity or the gusts found make."""
+    if m.remainders:
+        return False
+    if m.turbulence.found:
+        return True
+    left = [
+        rms(m.held[:, k]) / max(rms(m.fit.sensitivity[:, k]), 1e-6)
+        for k, axis in enumerate(m.model.axes)
+        if axis in (0, 1)
+    ]
+    return max(left, default=0.0) < TURBULENCE_FLOOR_M_S
+
+
+def note_of(m: Matched) -> str:
+    """What a person must know of flight that is not described or was not used; may be empty."""
+    said = remainder_sentence(m.remainders), left_out_sentence(m.left_out)
+    return "; ".join(s for s in said if s)
+
+
+def _drift(model: ForceModel, theta: Array, residual: Array) -> Array:
+    n = len(model.flight)
+    error, slope = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    columns = [k for k, axis in enumerate(model.axes) if axis in FORCE]
+    axes = [model.axes[k] for k in columns]
+    error[:, axes] = -residual[:, columns]
+    # Moving air one way is moving the vehicle the other way.
+    slope[:, axes] = -model.gust_slope(theta)[:, columns]
+    return drift_alone(model.flight, error, slope)

@@ -1,0 +1,13 @@
+"""What the tests of a push share."""
+
+import pytest
+
+from tests.push.pushing import PushWorld
+
+
+@pytest.fixture(params=["eager", "patient"])
+def world(tmp_path, request):
+    w = PushWorld(tmp_path / "journal.jsonl")
+    w.eager = request.param == "eager"
+    yield w
+    w.journal.close()

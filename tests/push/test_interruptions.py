@@ -1,0 +1,237 @@
+"""A push that something happens to after its first write: it goes back, or stays open."""
+
+import pytest
+
+from onboard.mavlink.parameter_messages import SendParamSet
+from onboard.push.entries import Planned, Result, audit
+from onboard.push.signals import Cancelled, LinkLost, Reason, Rebooted, VehicleReport
+from tests.push.pushing import finish, make_plan, when_written
+
+
+@pytest.mark.parametrize("count", range(1, 7))
+class TestInTheMiddle:
+    """Something happens just after write number ``count`` took effect."""
+
+    def test_arming_rolls_a_landed_push_back(self, world, count):
+        when_written(world, count, lambda: world.feed(VehicleReport(armed=True)))
+        outcome = finish(world)
+        assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.ARMED)
+        assert world.holds() == world.journal_says() == "old"
+
+    def test_armed_is_what_an_in_flight_push_expects(self, world, count):
+        report = VehicleReport(armed=True, ekf_healthy=True)
+        when_written(world, count, lambda: world.feed(report))
+        assert finish(world, allow_armed=True).result is Result.COMPLETED
+
+    def test_unhealthy_ekf_rolls_an_in_flight_push_back(self, world, count):
+        report = VehicleReport(armed=True, ekf_healthy=False)
+        when_written(world, count, lambda: world.feed(report))
+        outcome = finish(world, allow_armed=True)
+        assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.EKF_UNHEALTHY)
+        assert world.holds() == "old"
+
+    def test_cancelling_rolls_back(self, world, count):
+        when_written(world, count, lambda: world.feed(Cancelled("the operator said so")))
+        outcome = finish(world)
+        assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.CANCELLED)
+        assert outcome.sentence == "the operator said so"
+        assert world.holds() == "old"
+
+    @pytest.mark.parametrize("noticed", [True, False])
+    def test_reboot_that_loses_unsaved_values(self, world, count, noticed):
+        def reboot():
+            world.autopilot.reboot(world.now, silence=2.0)
+            if noticed:
+                world.feed(Rebooted())
+
+        world.autopilot.store_delay = 0.3
+        when_written(world, count, reboot)
+        outcome = finish(world)
+        if noticed:
+            assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.REBOOTED)
+        assert world.holds() == world.journal_says()
+        assert world.holds() in {"old", "new"}
+
+    def test_long_reboot_is_left_open_and_undone_later(self, world, count):
+        def reboot():
+            world.autopilot.reboot(world.now, silence=30.0)
+            world.feed(Rebooted())
+
+        when_written(world, count, reboot)
+        outcome = finish(world)
+        assert outcome.result is Result.INTERRUPTED
+        assert outcome.open
+        assert world.restart(wait=60.0) == 1
+        assert world.holds() == world.journal_says() == "old"
+
+    @pytest.mark.parametrize("name", ["INS_ACCOFFS_X", "INS_ACCSCAL_Z"])
+    @pytest.mark.parametrize("value", [0.77, None])
+    def test_write_of_a_ground_station_stops_it_and_stands(self, world, count, name, value):
+        """``None``: the ground station sets the old value; nobody can tell that from ours."""
+        value = world.plan.before[name] if value is None else value
+        when_written(world, count, lambda: world.autopilot.set_by_other(name, value, world.now))
+        outcome = finish(world)
+        others = {n for n in world.plan.names if n != name}
+        six = world.autopilot.ram
+        if outcome.result is Result.COMPLETED:  # we had not come to that name yet
+            assert value == world.plan.before[name]
+            assert world.holds() == "new"
+        else:
+            assert outcome.result is Result.ROLLED_BACK
+            assert all(six[n] == world.plan.before[n] for n in others)
+            assert six[name] == pytest.approx(value, abs=1e-6)
+        if value == 0.77:
+            assert outcome.reason is Reason.CHANGED_BY_OTHER
+            assert outcome.left == (name,)
+
+    def test_full_calibration_by_a_ground_station_stands_as_it_is(self, world, count):
+        def calibrate():
+            for i, n in enumerate(world.plan.names):
+                world.autopilot.set_by_other(n, 0.9 + 0.01 * i, world.now)
+
+        when_written(world, count, calibrate)
+        outcome = finish(world)
+        assert outcome.reason is Reason.CHANGED_BY_OTHER
+        values = {n: world.autopilot.ram[n] for n in world.plan.names}
+        assert values == pytest.approx(
+            {n: 0.9 + 0.01 * i for i, n in enumerate(world.plan.names)}, abs=1e-6
+        )
+        assert set(outcome.left) == set(world.plan.names)
+
+    def test_lost_link_leaves_it_open_and_the_next_link_undoes_it(self, world, count):
+        def cut():
+            world.link.cut = True
+            world.feed(LinkLost())
+
+        when_written(world, count, cut)
+        outcome = finish(world)
+        assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.LINK_LOST)
+        assert outcome.open
+        assert world.journal_says() == "open"
+        world.link.cut = False
+        assert world.restart() == 1
+        assert world.holds() == world.journal_says() == "old"
+
+    def test_cut_that_nobody_reports_ends_by_itself(self, world, count):
+        when_written(world, count, lambda: setattr(world.link, "cut", True))
+        outcome = finish(world)
+        assert outcome.result is Result.INTERRUPTED
+        world.link.cut = False
+        world.restart()
+        assert world.holds() == world.journal_says() == "old"
+
+    def test_other_airframe_on_the_new_link_is_not_touched(self, world, count):
+        when_written(world, count, lambda: world.feed(LinkLost()))
+        finish(world)
+        before = dict(world.autopilot.ram)
+        assert world.restart(system_id=2) == 1
+        assert world.outcomes[-1].result is Result.OTHER_VEHICLE
+        assert world.outcomes[-1].open
+        world.autopilot.ram["INS_ACC_ID"] = 42.0
+        world.restart()
+        assert world.outcomes[-1].result is Result.OTHER_VEHICLE
+        assert world.journal_says() == "open"
+        assert {n: world.autopilot.ram[n] for n in world.plan.names} == {
+            n: before[n] for n in world.plan.names
+        }
+
+    def test_journal_that_fails_rolls_back_and_stays_open(self, world, count):
+        world.journal_broken_after = count + 2
+        outcome = finish(world)
+        assert outcome.reason is Reason.JOURNAL_FAILED
+        assert outcome.open
+        assert world.holds() == "old"
+        world.restart()
+        assert world.holds() == world.journal_says() == "old"
+
+
+def test_journal_that_fails_first_means_nothing_is_written(world):
+    world.journal_broken_after = 0
+    outcome = finish(world)
+    assert (outcome.result, outcome.reason) == (Result.ABORTED, Reason.JOURNAL_FAILED)
+    assert world.autopilot.history == []
+    assert world.restart() == 0
+
+
+def test_full_storage_rolls_back(world):
+    """RAM would hold the new values until the next boot only."""
+    world.autopilot.full = True
+    outcome = finish(world)
+    assert outcome.reason is Reason.NOT_SAVED
+    world.restart()
+    assert world.holds() == world.journal_says() == "old"
+
+
+def test_late_duplicate_of_a_write_is_caught_before_it_is_believed(world):
+    """A radio delivers a second copy of an early PARAM_SET after the roll-back."""
+    world.autopilot.denied.add("INS_ACCSCAL_Z")
+    first = world.plan.write_order(world.plan.before)[0]
+    late = SendParamSet(first, world.plan.wanted[first])
+    when_written(world, 5, lambda: world.at(world.now + 1.5, lambda: receive_late(late)))
+
+    def receive_late(action):
+        world.autopilot.receive(action, world.now)
+
+    outcome = finish(world)
+    assert outcome.result is Result.ROLLED_BACK
+    assert world.holds() == "old"
+
+
+@pytest.mark.parametrize(
+    "lost", [("INS_ACCSCAL_X",), ("INS_ACCOFFS_Y", "INS_ACCSCAL_Z"), make_plan().names]
+)
+def test_push_that_a_boot_took_back_in_part_is_undone(world, lost):
+    """Storage that said "stored" and lied."""
+    finish(world)
+    for name in lost:
+        world.autopilot.stored[name] = world.plan.before[name]
+    world.autopilot.reboot(world.now)
+    world.audit()
+    assert world.outcomes[-1].result is Result.ROLLED_BACK
+    assert world.holds() == world.journal_says() == "old"
+    assert world.journal.last_completed(1) is None
+
+
+def test_audit_leaves_a_whole_push_and_somebody_elses_values_alone(world):
+    finish(world)
+    (planned,) = [e for _, e in world.journal.entries if isinstance(e, Planned)]
+    assert audit(planned, world.autopilot.ram) is None
+    assert audit(planned, world.plan.wanted | {"INS_ACCSCAL_X": 0.9}) is None
+
+
+def test_roll_back_that_had_begun_is_carried_on_even_where_all_six_are_new(world):
+    """Killed between the decision to go back and the first write back."""
+
+    def arm_and_die():
+        world.feed(VehicleReport(armed=True))
+        world.life = 0
+
+    when_written(world, 6, lambda: world.at(world.now + 1.0, arm_and_die))
+    assert not world.run_through()
+    assert world.holds() == "new"
+    (recovery,) = world.journal.recover()
+    assert recovery.undo
+    assert recovery.all_confirmed
+    world.restart()
+    assert world.holds() == world.journal_says() == "old"
+
+
+def test_crash_after_the_last_confirmation_is_finished_and_not_undone(world):
+    when_written(world, 6, lambda: world.at(world.now + 1.0, lambda: setattr(world, "life", 0)))
+    assert not world.run_through()
+    world.restart()
+    assert world.outcomes[-1].result is Result.COMPLETED
+    assert world.holds() == world.journal_says() == "new"
+
+
+def test_roll_back_that_is_not_stored_stays_open(world):
+    def arm_and_wear_out():
+        world.autopilot.full = True
+        world.autopilot.places.clear()
+        world.feed(VehicleReport(armed=True))
+
+    when_written(world, 3, lambda: world.at(world.now + 0.03, arm_and_wear_out))
+    outcome = finish(world)
+    assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
+    assert outcome.open
+    assert {n: world.autopilot.ram[n] for n in world.plan.names} == world.plan.before
