@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import click
 from rich.console import Console
 
+from onboard.cli.demo_pace import Heard, keep
 from onboard.daemon.process.interrupts import stop_signals
 from onboard.errors import OnboardError
 
@@ -203,7 +204,7 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         show.stage("the service reads the parameters and asks for its message rates")
         await _until(lambda: service.snapshot().trust.open, "GPS to be trusted", PATIENCE_S)
         show.stage(f"first flight: {options.duration:.0f} s of random manoeuvres")
-        await _flight(station, options.duration, options.speedup)
+        await _flight(service, station, options.duration, options.speedup)
         show.stage("landed; the service writes when it has been disarmed for 5 s")
         wanted = set(range(1, len(service.snapshot().imus) + 1))
         await _until(
@@ -213,7 +214,7 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         )
         show.stage("parameters are written and read back")
         show.stage(f"second flight, {PROOF_FLIGHT_S:.0f} s: is the residual smaller now?")
-        await _flight(station, PROOF_FLIGHT_S, options.speedup)
+        await _flight(service, station, PROOF_FLIGHT_S, options.speedup)
         await _until(
             lambda: {w.imu for w in service.snapshot().push.written if w.verdict} >= wanted,
             "the verdict on the second flight",
@@ -222,13 +223,17 @@ async def _fly_twice(service: Service, sim_port: int, options: Options, show: Sh
         show.stage("done")
 
 
-async def _flight(station: Station, seconds: float, speedup: float) -> None:
+async def _flight(service: Service, station: Station, seconds: float, speedup: float) -> None:
     """Up and down again; on the ground, where nothing is to be seen, in real time."""
-    station.set_pace(speedup)
-    await station.take_off()
-    await station.until_time(station.time + seconds)
-    await station.land()
-    await station.until_disarmed()
+    pacing = asyncio.create_task(keep(station, Heard(service), speedup), name="pace")
+    try:
+        await station.take_off()
+        await station.until_time(station.time + seconds)
+        await station.land()
+        await station.until_disarmed()
+    finally:
+        pacing.cancel()
+        await asyncio.gather(pacing, return_exceptions=True)
     station.set_pace(1.0)
 
 

@@ -27,7 +27,7 @@ async def test_a_vehicle_that_stands_gives_all_that_the_first_flight_waits_for(
 ):
     """No accelerometer has a segment of flight before it flies: waiting for one would never end."""
 
-    async def flight(station, *_):
+    async def flight(_, station, *__):
         assert not station.armed
         raise TakesOffError
 

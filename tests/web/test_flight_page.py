@@ -38,7 +38,7 @@ async def serving(tmp_path):
     service = Service(from_mapping(document, source="test"))
     autopilot = Autopilot("copter", Truth(imus=(TRUTH,), seed=5))
     mission = Mission(flights=1, duration=120.0, ground=20.0)
-    server = Server(autopilot, speedup=20.0, driver=mission)
+    server = Server(autopilot, speedup=8.0, driver=mission)
     serving = asyncio.create_task(service.run())
     async with asyncio.timeout(60.0):
         await service.ready.wait()
