@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
-from onboard.recordings.dataflash_index import MAGIC, DataflashIndex, index_dataflash
+from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
 from onboard.recordings.dataflash_records import (
     CONVERTERS,
     IMU_NAMES,
@@ -20,6 +20,7 @@ from onboard.recordings.dataflash_records import (
     Batch,
     record_times,
 )
+from onboard.recordings.dataflash_walk import MAGIC
 from onboard.recordings.recording import Recording, elapsed_s
 
 BLOCK = 16384

@@ -36,7 +36,7 @@ from onboard.recordings.dataflash_context import (
     Series,
     receiver_of,
 )
-from onboard.recordings.dataflash_index import Format, Records
+from onboard.recordings.dataflash_formats import Format, Records
 
 SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
