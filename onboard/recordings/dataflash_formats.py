@@ -79,7 +79,8 @@ class Format:
             with np.errstate(invalid="ignore"):
                 whole = np.abs(values.astype(np.float64)) < LARGEST
             values = np.where(whole, values, default)
-        return [int(value) for value in values]
+        listed: list[int] = values.tolist()
+        return listed if values.dtype.kind in "iu" else [int(value) for value in listed]
 
 
 def _text(raw: bytes) -> str:

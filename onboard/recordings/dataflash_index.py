@@ -34,7 +34,7 @@ class DataflashIndex:
     records: int
     damaged_places: int
     skipped_bytes: int
-    cut_off: bool
+    cut_off_bytes: int
 
     def counts(self) -> dict[str, int]:
         """Number of wanted records by name."""
@@ -78,5 +78,5 @@ def index_dataflash(data: Bytes, wanted: frozenset[str]) -> DataflashIndex:
         records=walk.records,
         damaged_places=walk.damaged_places,
         skipped_bytes=walk.skipped_bytes,
-        cut_off=walk.cut_off,
+        cut_off_bytes=walk.cut_off_bytes,
     )

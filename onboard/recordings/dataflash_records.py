@@ -8,7 +8,7 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.recordings.bulk import samples_of
 from onboard.recordings.dataflash_context import (
     CHANNELS,
     GPS_NAMES,
@@ -43,6 +44,7 @@ MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
 HDOP_UNKNOWN = 99.0
+CLIPS = ("Clip", "Clip0", "Clip1", "Clip2")
 STATUS_BITS = 0x3FF
 """The low ten bits of the EKF's nav_filter_status are those of EKF_STATUS_REPORT."""
 STATUS_GPS_GLITCHING, REPORT_GPS_GLITCHING = 1 << 14, 1 << 15
@@ -79,6 +81,11 @@ Converted = Iterable[Sample | None]
 Converter = Callable[[Batch, Context], Converted]
 
 
+def _rows(columns: Sequence[Floats]) -> list[tuple[float, ...]]:
+    """Columns (n,) as n tuples."""
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
 def record_times(form: Format, records: Records) -> Floats | None:
     """(n,) boot time of records, s; None where the layout has no time of its own."""
     if form.has("TimeUS"):
@@ -92,29 +99,24 @@ def imu(batch: Batch, _context: Context) -> Converted:
     """IMU (with or without instance), IMU2, IMU3."""
     first = int(batch.form.name[3:] or 1)
     numbers = [i + first for i in batch.integers("I")]
-    t = batch.t.tolist()
-    gx, gy, gz = batch.floats("GyrX", "GyrY", "GyrZ")
-    ax, ay, az = batch.floats("AccX", "AccY", "AccZ")
+    gyro = [batch.form.numbers(batch.records, c) for c in ("GyrX", "GyrY", "GyrZ")]
+    force = [batch.form.numbers(batch.records, c) for c in ("AccX", "AccY", "AccZ")]
     named = next((c for c in ("T", "Temp") if batch.form.has(c)), None)
-    heat = batch.floats(named)[0] if named else [0.0] * len(t)
-    return [
-        ImuSample(
-            t[k],
-            numbers[k],
-            (ax[k], ay[k], az[k]),
-            (gx[k], gy[k], gz[k]),
-            heat[k] or None,  # exactly 0: a sensor without a thermometer
-        )
-        if (ax[k] or ay[k] or az[k] or gx[k] or gy[k] or gz[k]) and numbers[k] <= MOST_IMUS
-        else None  # not a measurement: the sensor was not there yet, or there is none such
-        for k in range(len(t))
-    ]
+    # A temperature of exactly 0 is that of a sensor without a thermometer.
+    heat = [x or None for x in batch.floats(named)[0]] if named else [None] * len(numbers)
+    samples: list[Sample | None] = []
+    samples += samples_of(ImuSample, batch.t.tolist(), numbers, _rows(force), _rows(gyro), heat)
+    # Not a measurement: the sensor was not there yet, or there is none such.
+    blank = ~np.any([x != 0.0 for x in (*force, *gyro)], axis=0) | (np.array(numbers) > MOST_IMUS)
+    for k in np.flatnonzero(blank).tolist():
+        samples[k] = None
+    return samples
 
 
 def attitude(batch: Batch, _context: Context) -> Converted:
     """ATT."""
     angles = [np.radians(batch.form.numbers(batch.records, c)) for c in ("Roll", "Pitch", "Yaw")]
-    return map(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
+    return samples_of(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
 
 
 def gps(batch: Batch, context: Context) -> Converted:
@@ -184,18 +186,13 @@ def _of_same_fix(series: Series | None, t: float) -> float | None:
 def vibration(batch: Batch, _context: Context) -> Converted:
     """VIBE: one record per IMU, before ArduPilot 4.1 one with three clip counters."""
     t = batch.t.tolist()
-    x, y, z = batch.floats("VibeX", "VibeY", "VibeZ")
-    clips = [batch.integers(c) for c in ("Clip", "Clip0", "Clip1", "Clip2") if batch.form.has(c)]
-    numbers = batch.integers("IMU") if batch.form.has("IMU") else None
-    return [
-        Vibration(
-            t[k],
-            (x[k], y[k], z[k]),
-            tuple(c[k] for c in clips),
-            None if numbers is None else numbers[k] + 1,
-        )
-        for k in range(len(t))
-    ]
+    level = list(zip(*batch.floats("VibeX", "VibeY", "VibeZ"), strict=True))
+    counters = [batch.integers(c) for c in CLIPS if batch.form.has(c)]
+    clips = list(zip(*counters, strict=True)) if counters else [()] * len(t)
+    if not batch.form.has("IMU"):
+        return samples_of(Vibration, t, level, clips)
+    numbers = [number + 1 for number in batch.integers("IMU")]
+    return samples_of(Vibration, t, level, clips, numbers)
 
 
 def throttle(batch: Batch, _context: Context) -> Converted:
@@ -205,7 +202,7 @@ def throttle(batch: Batch, _context: Context) -> Converted:
         return [None] * len(batch.t)
     full = 100.0 if batch.form.has("NavRoll") else 1.0 if column == "ThO" else 1000.0
     values = batch.form.numbers(batch.records, column) / full
-    return map(Throttle, batch.t.tolist(), values.tolist())
+    return samples_of(Throttle, batch.t.tolist(), values.tolist())
 
 
 def motors(batch: Batch, context: Context) -> Converted:
@@ -215,7 +212,8 @@ def motors(batch: Batch, context: Context) -> Converted:
         return [None] * len(batch.t)
     low, high = context.motor_range_us
     mean = np.mean([batch.form.numbers(batch.records, c) for c in channels], axis=0)
-    return map(Throttle, batch.t.tolist(), np.clip((mean - low) / (high - low), 0.0, 1.0).tolist())
+    share = np.clip((mean - low) / (high - low), 0.0, 1.0)
+    return samples_of(Throttle, batch.t.tolist(), share.tolist())
 
 
 def outputs(batch: Batch, _context: Context) -> Converted:
@@ -223,8 +221,8 @@ def outputs(batch: Batch, _context: Context) -> Converted:
     columns = [c for c in (f"C{n}" for n in range(1, CHANNELS + 1)) if batch.form.has(c)]
     if not columns:
         return [None] * len(batch.t)
-    values = zip(*batch.floats(*columns), strict=True)
-    return map(Outputs, batch.t.tolist(), values)
+    values = list(zip(*batch.floats(*columns), strict=True))
+    return samples_of(Outputs, batch.t.tolist(), values)
 
 
 def airspeed(batch: Batch, _context: Context) -> Converted:
@@ -240,9 +238,8 @@ def ekf_bias(batch: Batch, _context: Context) -> Converted:
     """XKF2: accelerometer bias of each EKF3 core, steps of 0.01 m/s^2."""
     if not batch.form.has("AX", "AY", "AZ"):
         return [None] * len(batch.t)
-    x, y, z = batch.floats("AX", "AY", "AZ")
-    core = batch.integers("C")
-    return [EkfBias(t, core[k], (x[k], y[k], z[k])) for k, t in enumerate(batch.t.tolist())]
+    bias = list(zip(*batch.floats("AX", "AY", "AZ"), strict=True))
+    return samples_of(EkfBias, batch.t.tolist(), batch.integers("C"), bias)
 
 
 def wind(batch: Batch, _context: Context) -> Converted:

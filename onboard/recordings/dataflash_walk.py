@@ -44,8 +44,8 @@ class Stride(NamedTuple):
 class Walk:
     """One walk over the bytes; the state is what the walk has learnt so far.
 
-    ``skipped_bytes`` is what belongs to no record: the lengths of all records and it add up to the
-    length of the log, but for the unused end of a flash page.
+    ``skipped_bytes`` stand between records, ``cut_off_bytes`` after the last whole one: with the
+    lengths of all records they add up to the length of the log, but for the unused end of a page.
     """
 
     def __init__(self, data: Bytes, wanted: frozenset[str]) -> None:
@@ -60,7 +60,7 @@ class Walk:
         self.records = 0
         self.damaged_places = 0
         self.skipped_bytes = 0
-        self.cut_off = False
+        self.cut_off_bytes = 0
         self._bytes = np.frombuffer(data, np.uint8)
         self._tables: tuple[Integers, Integers] | None = None
 
@@ -198,7 +198,7 @@ class Walk:
             tail = bytes(self.data[at : min(end, at + 65536)])
             if not tail.strip(PADDING):
                 return  # the unused end of a flash page
-            self.cut_off = True
+            self.cut_off_bytes += found - at
         else:
             self.damaged_places += 1
-        self.skipped_bytes += found - at
+            self.skipped_bytes += found - at
