@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields
 from itertools import repeat
 from typing import Any, TypeVar
@@ -47,3 +49,19 @@ def _fields_of(kind: type[Any]) -> tuple[tuple[Setter, ...], tuple[Any, ...]]:
         tuple(getattr(kind, field.name).__set__ for field in of_kind),
         tuple(field.default for field in of_kind),
     )
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """While many objects are made that are in no cycle.
+
+    The collector would look through all of them again and again, which takes as long as to make
+    them.  For a block of samples at a time, so that what others leave behind does not pile up.
+    """
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

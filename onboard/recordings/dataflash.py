@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
+from onboard.recordings.bulk import no_collection
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
 from onboard.recordings.dataflash_records import (
@@ -102,7 +103,8 @@ def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) ->
         last = context.first_time
         for start in range(0, len(offsets), BLOCK):
             block = offsets[start : start + BLOCK], slots[start : start + BLOCK]
-            samples, last = _convert_block(index, block, context, last)
+            with no_collection():
+                samples, last = _convert_block(index, block, context, last)
             yield samples
 
     return chain.from_iterable(blocks())

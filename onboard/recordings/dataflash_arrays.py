@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.recordings.dataflash_formats import FIELD_TYPES, Format, Records
 from onboard.recordings.dataflash_index import DataflashIndex
+from onboard.recordings.text_columns import until_nul
 
-BLOCK = 16384
+Integers: TypeAlias = NDArray[np.int64]
+
+TEXT = "nNZ"
+OCTETS = "Data"
+"""The field of 64 bytes that is no text, but a piece of a file."""
+
+BLOCK = 4096
 """Records of all names that are copied at a time: bounds what is held beside the arrays."""
 
 
@@ -23,8 +33,9 @@ def dataflash_tables(index: DataflashIndex) -> dict[str, Records]:
     for form, count in zip(index.formats, counts, strict=True):
         if count:
             layouts.setdefault(form.name, []).append(form)
+    total = index.counts()
     tables = {
-        name: np.empty(index.counts()[name], _common([physical(form) for form in forms]))
+        name: np.empty(total[name], _common([physical(form) for form in forms]))
         for name, forms in layouts.items()
     }
     filled = dict.fromkeys(tables, 0)
@@ -65,12 +76,12 @@ def _common(kinds: list[np.dtype[np.void]]) -> np.dtype[np.void]:
     return np.dtype(fields)
 
 
-def _fill(
-    part: Records, places: slice | np.ndarray[tuple[int], np.dtype[np.int64]], form: Format,
-    records: Records,
-) -> None:  # fmt: skip
+def _fill(part: Records, places: slice | Integers, form: Format, records: Records) -> None:
     """Write records of one layout to some rows."""
     for column in part.dtype.names or ():
-        divisor = FIELD_TYPES[form.letter(column)][1]
+        letter = form.letter(column)
+        divisor = FIELD_TYPES[letter][1]
         values = records[column]
+        if letter in TEXT and column != OCTETS:
+            values = until_nul(values)
         part[column][places] = values if divisor == 1.0 else values / divisor

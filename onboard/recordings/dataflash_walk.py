@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.recordings.dataflash_formats import HEADER_LENGTH, Format, parse_format
+from onboard.recordings.pace import Pace, chain
 
 Bytes: TypeAlias = bytes | mmap
 Integers: TypeAlias = NDArray[np.int64]
@@ -26,11 +27,6 @@ FMT_LENGTH = 89
 PADDING = b"\x00\xff"
 MOST_FORMATS = 4096
 """Layouts of wanted records in one file: a log has 20, and as many for each that was joined."""
-SHORTEST_STRIDE, LONGEST_STRIDE = 1 << 12, 1 << 18
-"""bytes.  After a stride that ended early, the shortest is walked record by record, so that no log
-costs much more than such a walk."""
-MOST_DECEPTIONS = 64
-"""Places in one stride that look like headers but stand inside a record."""
 
 
 class Stride(NamedTuple):
@@ -66,21 +62,18 @@ class Walk:
 
     def run(self) -> None:
         """Find the records; never raises on damage, counts it instead."""
-        at = previous = slow_until = 0
-        end, stride_length = len(self.data), SHORTEST_STRIDE
+        at = previous = 0
+        end, pace = len(self.data), Pace()
         while at + HEADER_LENGTH <= end:
-            if at >= slow_until:
-                stride = self._stride(at, min(at + stride_length, end))
+            if pace.strides(at):
+                stop = min(at + pace.length, end)
+                stride = self._stride(at, stop)
                 if len(stride.offsets):
                     self._keep(stride)
-                    previous = int(stride.offsets[-1])
-                stop = min(at + stride_length, end)
-                reached = len(stride.offsets) > 0 and stride.end >= stop - HEADER_LENGTH
-                stride_length = min(2 * stride_length, LONGEST_STRIDE)
-                if not reached:
-                    stride_length, slow_until = SHORTEST_STRIDE, stride.end + SHORTEST_STRIDE
-                at = stride.end
-                if reached:
+                    previous, at = int(stride.offsets[-1]), stride.end
+                whole = len(stride.offsets) > 0 and at >= stop - HEADER_LENGTH
+                pace.took(at, whole=whole)
+                if whole:
                     continue
             length = self._record(at, end)
             if length:
@@ -111,18 +104,9 @@ class Walk:
         whole = (lengths > 0) & (kinds != FMT_TYPE) & (following <= len(self.data) - at)
         if not len(starts) or starts[0] != 0 or not whole[0]:
             return Stride(starts[:0], kinds[:0], at)
-        chained = whole[:-1] & whole[1:] & (following[:-1] == starts[1:])
-        last_of_runs = np.append(np.flatnonzero(~chained), len(starts) - 1)
-        runs = []
-        i = 0
-        for _ in range(MOST_DECEPTIONS):
-            last = int(last_of_runs[np.searchsorted(last_of_runs, i)])
-            runs.append(np.arange(i, last + 1))
-            i = int(np.searchsorted(starts, following[last]))
-            if i == len(starts) or starts[i] != following[last] or not whole[i]:
-                break
-        taken = np.concatenate(runs)
-        return Stride(at + starts[taken], kinds[taken], at + int(following[last]))
+        starts, following, kinds = starts[whole], following[whole], kinds[whole]
+        taken = chain(starts, following)
+        return Stride(at + starts[taken], kinds[taken], at + int(following[taken[-1]]))
 
     def _by_kind(self) -> tuple[Integers, Integers]:
         """Length and slot of each type (256,), as learnt until now."""

@@ -1,10 +1,16 @@
-"""How far a walk over a recording may go in one stride of numpy."""
+"""Strides of numpy over a recording: how far one may go, and what it meets."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
-SHORTEST, LONGEST = 1 << 12, 1 << 18
+import numpy as np
+from numpy.typing import NDArray
+
+Integers: TypeAlias = NDArray[np.int64]
+
+SHORTEST, LONGEST = 1 << 12, 1 << 17
 """bytes"""
 MOST_DECEPTIONS = 64
 """Places in one stride that look like the beginning of something but stand inside another thing."""
@@ -31,3 +37,21 @@ class Pace:
             self.length = min(2 * self.length, LONGEST)
         else:
             self.length, self.slow_until = SHORTEST, end + SHORTEST
+
+
+def chain(starts: Integers, following: Integers) -> Integers:
+    """Numbers of the places that are reached from the first one, each where another ends.
+
+    Args:
+        starts: (n,) where things may begin, in order.
+        following: (n,) where each would end.
+    """
+    last_of_runs = np.append(np.flatnonzero(following[:-1] != starts[1:]), len(starts) - 1)
+    runs, i = [], 0
+    for _ in range(MOST_DECEPTIONS):
+        last = int(last_of_runs[np.searchsorted(last_of_runs, i)])
+        runs.append(np.arange(i, last + 1))
+        i = int(np.searchsorted(starts, following[last]))
+        if i == len(starts) or starts[i] != following[last]:
+            break
+    return np.concatenate(runs)

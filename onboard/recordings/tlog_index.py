@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.mavlink.framing import MAGICS, is_valid, message_id, next_valid, packet_length
-from onboard.recordings.pace import MOST_DECEPTIONS, Pace
+from onboard.recordings.pace import Pace, chain
 from onboard.recordings.packet_columns import (
     LONGEST_PACKET,
     STAMP_LENGTH,
@@ -128,7 +128,7 @@ class _Walk:
         starts, following = starts[near], following[near]
         if not len(starts) or starts[0] != at:
             return at
-        taken = _chain(starts, following)
+        taken = chain(starts, following)
         starts, following = starts[taken], following[taken]
         head = headers(data, starts)
         asked = np.flatnonzero(np.isin(head.kind, self._wanted))
@@ -139,19 +139,6 @@ class _Walk:
         self.packets += len(starts)
         self.offsets.frombytes(starts[asked].tobytes())
         return int(following[-1]) if len(starts) else at
-
-
-def _chain(starts: Integers, following: Integers) -> Integers:
-    """Numbers of the places that are reached from the first one, each by what follows another."""
-    last_of_runs = np.append(np.flatnonzero(following[:-1] != starts[1:]), len(starts) - 1)
-    runs, i = [], 0
-    for _ in range(MOST_DECEPTIONS):
-        last = int(last_of_runs[np.searchsorted(last_of_runs, i)])
-        runs.append(np.arange(i, last + 1))
-        i = int(np.searchsorted(starts, following[last]))
-        if i == len(starts) or starts[i] != following[last]:
-            break
-    return np.concatenate(runs)
 
 
 def _between(a: NDArray[np.uint64], b: NDArray[np.uint64]) -> NDArray[np.uint64]:

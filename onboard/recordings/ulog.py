@@ -24,7 +24,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
 )
 from onboard.errors import RecordingError
-from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.recording import Recording, damage_notes, elapsed_s
 from onboard.recordings.ulog_index import Records, Topic, UlogIndex, columns_of, index_ulog
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ def open_ulog(path: Path) -> Recording:
     ]
     inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
-        why = "".join(f"; {damage}" for damage in _damage(index))
+        why = "".join(f"; {damage}" for damage in damage_of(index))
         raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
 
     def read() -> Iterator[Sample]:
@@ -102,7 +102,7 @@ def open_ulog(path: Path) -> Recording:
         duration_s=elapsed_s(inertial[0].t),
         counts={f"{n}[{i}]" if i else n: len(r) for (n, i), r in records.items()},
         read=read,
-        damage=_damage(index),
+        damage=damage_of(index),
         notes=("a PX4 recording: the result is advice, its parameters are ArduPilot's",),
     )
 
@@ -135,14 +135,13 @@ def _parameters(index: UlogIndex) -> Iterator[Sample]:
         yield ParameterValue(name, value, t / 1e6)
 
 
-def _damage(index: UlogIndex) -> tuple[str, ...]:
-    damage = []
-    if index.damaged_places:
-        damage.append("damaged: some of the log was skipped")
-    if index.dropouts:
-        lost = index.dropped_ms / 1e3
-        damage.append(f"{index.dropouts} dropouts of the logger, {lost:.1f} s in all")
-    return tuple(damage)
+def damage_of(index: UlogIndex) -> tuple[str, ...]:
+    """What the log lacks, in plain words."""
+    notes = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
+    if not index.dropouts:
+        return notes
+    lost = index.dropped_ms / 1e3
+    return *notes, f"{index.dropouts} dropouts of the logger, {lost:.1f} s in all"
 
 
 def _stream(convert: Converter, instance: int, records: Records) -> _Stream | None:

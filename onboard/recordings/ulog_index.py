@@ -49,9 +49,9 @@ class Topic:
         if not self.offsets:
             return np.zeros(0, self.layout.dtype)
         size = self.layout.dtype.itemsize
-        window = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
-        records: Records = window[np.frombuffer(self.offsets, np.int64)].view(self.layout.dtype)
-        return records[:, 0]
+        # At every byte a record might begin: overlapping ones, of which some are taken.
+        everywhere: Records = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
+        return everywhere[np.frombuffer(self.offsets, np.int64)].view(self.layout.dtype)
 
 
 @dataclass(slots=True)
@@ -62,6 +62,8 @@ class UlogIndex:
     initial: dict[str, float] = field(default_factory=dict)
     changed: list[tuple[int, str, float]] = field(default_factory=list)
     damaged_places: int = 0
+    skipped_bytes: int = 0
+    cut_off_bytes: int = 0
     dropouts: int = 0
     dropped_ms: int = 0
 
@@ -94,6 +96,7 @@ class _Walk:
         data, end = self.data, len(self.data)
         at = HEADER_LENGTH
         whole = True
+        index = self.index
         while at + _HEAD.size <= end:
             size, kind = _HEAD.unpack_from(data, at)
             body, stop = at + _HEAD.size, at + _HEAD.size + size
@@ -103,12 +106,16 @@ class _Walk:
             if kind in KINDS and stop <= end:
                 handler = self._handlers.get(kind)
                 good = handler is None or handler(body, stop)
-                at = stop
+                following = stop
             else:
-                at, good = self._resume(at, size, kind, end)
-            if whole and not good:
-                self.index.damaged_places += 1
-            whole = good
+                following, good = self._resume(at, size, kind, end)
+                if good and following == end < stop:
+                    index.cut_off_bytes += end - at
+            if not good:
+                index.damaged_places += whole
+                index.skipped_bytes += following - at
+            at, whole = following, good
+        index.cut_off_bytes += max(0, end - at)
 
     def _resume(self, at: int, size: int, kind: int, end: int) -> tuple[int, bool]:
         """Where to go on after a message that is none, and whether it may be of a new kind."""
