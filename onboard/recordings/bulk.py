@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import gc
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields
 from itertools import repeat
 from typing import Any, TypeVar
 
 S = TypeVar("S")
-Setter = Callable[[Any, Any], None]
 
 
 def samples_of(kind: type[S], *columns: Sequence[object]) -> list[S]:
@@ -28,27 +27,25 @@ def samples_of(kind: type[S], *columns: Sequence[object]) -> list[S]:
     Raises:
         ValueError: the columns are not of one length, or too few, or too many.
     """
-    setters, defaults = _fields_of(kind)
+    fields_: tuple[Field[Any], ...] = fields(kind)  # type: ignore[arg-type]
     n = len(columns[0]) if columns else 0
     if any(len(column) != n for column in columns):
         raise ValueError(f"columns of {kind.__name__} are not of one length")
-    rest = defaults[len(columns) :]
-    if len(columns) > len(setters) or MISSING in rest:
+    rest = [field.default for field in fields_[len(columns) :]]
+    if len(columns) > len(fields_) or MISSING in rest:
         raise ValueError(f"{len(columns)} columns are not those of {kind.__name__}")
+    names = [field.name for field in fields_]
+    values = (*columns, *([default] * n for default in rest))
+    return filled(kind, dict(zip(names, values, strict=True)))
+
+
+def filled(kind: type[S], columns: Mapping[str, Sequence[object]]) -> list[S]:
+    """Things of one kind whose slots have the values of columns (n,), by name."""
+    n = len(next(iter(columns.values())))
     made = list(map(kind.__new__, repeat(kind, n)))
-    values = (*columns, *(repeat(default) for default in rest))
-    for setter, value in zip(setters, values, strict=True):
-        deque(map(setter, made, value), maxlen=0)
+    for name, values in columns.items():
+        deque(map(getattr(kind, name).__set__, made, values), maxlen=0)
     return made
-
-
-def _fields_of(kind: type[Any]) -> tuple[tuple[Setter, ...], tuple[Any, ...]]:
-    """What sets each field, and its default."""
-    of_kind: tuple[Field[Any], ...] = fields(kind)
-    return (
-        tuple(getattr(kind, field.name).__set__ for field in of_kind),
-        tuple(field.default for field in of_kind),
-    )
 
 
 @contextmanager

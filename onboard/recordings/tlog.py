@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
 from onboard.mavlink.framing import next_valid
+from onboard.recordings.bulk import no_collection
 from onboard.recordings.packet_columns import (
     STAMP_LENGTH,
     Headers,
@@ -33,7 +36,7 @@ from onboard.recordings.tlog_index import Bytes, TlogIndex, index_tlog
 
 Source = tuple[int, int]
 """System id, component id."""
-Floats = np.ndarray[tuple[int], np.dtype[np.float64]]
+Floats = NDArray[np.float64]
 
 LATE_S = 60.0
 """A parameter that is first reported so long after the inertial samples began was read late, as
@@ -47,6 +50,8 @@ INERTIAL = {
 }
 """Inertial messages: their time field, which is the first, and its ticks per second."""
 HEARTBEAT_LENGTH = 9
+BLOCK = 2048
+"""Packets decoded at a time: bounds the memory, whatever the length of the log."""
 WANTED = message_ids(Decoder.names)
 AUTOPILOTS = {
     mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
@@ -56,18 +61,18 @@ AUTOPILOTS = {
 
 @dataclass(frozen=True, slots=True)
 class _Vehicle:
-    """What one source of packets sent: place, length and time of what is wanted.
+    """What one source of packets sent: the places of what is wanted.
 
     ``imu_times`` (s) are by message number, in the order in which the messages came first;
-    ``parameters`` are place and length of each report, and whether it came late.
+    ``reports`` are the places of parameters, and ``late`` says whether they came late.
     """
 
     autopilot: int | None
     counts: dict[int, int]
     offsets: Integers
-    lengths: Integers
     imu_times: dict[int, Floats]
-    parameters: tuple[tuple[int, int, bool], ...]
+    reports: Integers
+    late: NDArray[np.bool_]
 
     @property
     def imu_messages(self) -> int:
@@ -152,16 +157,9 @@ def _vehicle(data: Octets, offsets: Integers, head: Headers) -> _Vehicle:
         autopilot=int(beats[flying, 5][-1]) if flying.any() else None,
         counts=dict(zip(kinds.tolist(), counts.tolist(), strict=True)),
         offsets=offsets,
-        lengths=head.length,
         imu_times=imu_times,
-        parameters=tuple(
-            zip(
-                offsets[reports].tolist(),
-                head.length[reports].tolist(),
-                late.tolist(),
-                strict=True,
-            )
-        ),
+        reports=offsets[reports],
+        late=late,
     )
 
 
@@ -190,23 +188,23 @@ def _choose(vehicles: dict[Source, _Vehicle], path: Path) -> tuple[Source, tuple
 
 
 def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]:
-    yield from _told_late(data, source, vehicle)
     # As on a live link, nothing is taken before the autopilot's first heartbeat, if there is one.
     system, component = source
     decoder = Decoder(system, component if vehicle.autopilot is None else None)
-    unpack = Unpacker()
-    for at, length in zip(vehicle.offsets.tolist(), vehicle.lengths.tolist(), strict=True):
-        yield from _decoded(unpack, data[at : at + length], decoder)
+    blocks = _decoded(data, vehicle.offsets, decoder)
+    return chain(_told_late(data, source, vehicle), chain.from_iterable(blocks))
 
 
 def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
     """Parameters that are reported late, and always with the same value."""
-    decoder = Decoder(*source)
-    unpack = Unpacker()
     values: dict[str, set[float]] = {}
     late: dict[str, bool] = {}
-    for at, length, is_late in vehicle.parameters:
-        for sample in _decoded(unpack, data[at : at + length], decoder):
+    decoder = Decoder(*source)
+    unpack = Unpacker()
+    octets = np.frombuffer(data, np.uint8)
+    messages = unpack(octets, vehicle.reports)
+    for message, is_late in zip(messages, vehicle.late.tolist(), strict=True):
+        for sample in () if message is None else decoder.decode(message):
             if isinstance(sample, ParameterValue):
                 values.setdefault(sample.name, set()).add(sample.value)
                 late.setdefault(sample.name, is_late)
@@ -215,8 +213,12 @@ def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Param
             yield ParameterValue(name, seen.pop())
 
 
-def _decoded(unpack: Unpacker, packet: bytes, decoder: Decoder) -> tuple[Sample, ...]:
-    try:
-        return decoder.decode(unpack(packet))
-    except mavlink.MAVError:
-        return ()  # a right checksum over a payload that cannot be unpacked
+def _decoded(data: Bytes, offsets: Integers, decoder: Decoder) -> Iterator[list[Sample]]:
+    """Samples of packets, block by block."""
+    unpack = Unpacker()
+    octets = np.frombuffer(data, np.uint8)
+    for start in range(0, len(offsets), BLOCK):
+        with no_collection():
+            messages = unpack(octets, offsets[start : start + BLOCK])
+            samples = [s for m in messages if m is not None for s in decoder.decode(m)]
+        yield samples
