@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from onboard.recordings.dataflash_formats import FIELD_TYPES, Format, Records
 from onboard.recordings.dataflash_index import DataflashIndex
+from onboard.recordings.pace import block_length
 from onboard.recordings.text_columns import until_nul
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -16,9 +17,6 @@ Integers: TypeAlias = NDArray[np.int64]
 TEXT = "nNZ"
 OCTETS = "Data"
 """The field of 64 bytes that is no text, but a piece of a file."""
-
-BLOCK = 4096
-"""Records of all names that are copied at a time: bounds what is held beside the arrays."""
 
 
 def dataflash_tables(index: DataflashIndex) -> dict[str, Records]:
@@ -39,9 +37,10 @@ def dataflash_tables(index: DataflashIndex) -> dict[str, Records]:
         for name, forms in layouts.items()
     }
     filled = dict.fromkeys(tables, 0)
-    for start in range(0, len(index.slots), BLOCK):
-        slots = index.slots[start : start + BLOCK]
-        offsets = index.offsets[start : start + BLOCK]
+    block = block_length(len(index.slots))
+    for start in range(0, len(index.slots), block):
+        slots = index.slots[start : start + block]
+        offsets = index.offsets[start : start + block]
         here = {slot: np.flatnonzero(slots == slot) for slot in np.unique(slots).tolist()}
         for name, forms in layouts.items():
             its = {slot: rows for slot, rows in here.items() if index.formats[slot].name == name}

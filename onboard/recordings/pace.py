@@ -12,6 +12,8 @@ Integers: TypeAlias = NDArray[np.int64]
 
 SHORTEST, LONGEST = 1 << 12, 1 << 17
 """bytes"""
+FEWEST, MOST = 256, 4096
+"""records"""
 MOST_DECEPTIONS = 64
 """Places in one stride that look like the beginning of something but stand inside another thing."""
 
@@ -55,3 +57,8 @@ def chain(starts: Integers, following: Integers) -> Integers:
         if i == len(starts) or starts[i] != following[last]:
             break
     return np.concatenate(runs)
+
+
+def block_length(count: int) -> int:
+    """Records to copy at a time, so that what is held beside the copies is little, but not slow."""
+    return min(max(count // 32, FEWEST), MOST)

@@ -52,7 +52,11 @@ def damage_notes(places: int, skipped: int, cut_off: int) -> tuple[str, ...]:
     notes = []
     if places:
         named = "place" if places == 1 else "places"
-        notes.append(f"{places} damaged {named}, {skipped} bytes skipped")
+        notes.append(f"{places} damaged {named}, {_bytes(skipped)} skipped")
     if cut_off:
-        notes.append(f"cut off: the end of the log is missing ({cut_off} bytes skipped)")
+        notes.append(f"cut off: the end of the log is missing ({_bytes(cut_off)} skipped)")
     return tuple(notes)
+
+
+def _bytes(count: int) -> str:
+    return "1 byte" if count == 1 else f"{count} bytes"

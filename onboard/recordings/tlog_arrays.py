@@ -6,12 +6,11 @@ import numpy as np
 
 from onboard.mavlink.dialect import MESSAGE_IDS, mavlink
 from onboard.recordings.dataflash_formats import Records
+from onboard.recordings.pace import block_length
 from onboard.recordings.packet_columns import Headers, headers, layout, payloads, stamps
 from onboard.recordings.text_columns import until_nul
 from onboard.recordings.tlog_index import TlogIndex
 
-BLOCK = 2048
-"""Packets that are copied at a time: bounds what is held beside the arrays."""
 SENDER = (("arrived_us", "<u8"), ("sender_system", "u1"), ("sender_component", "u1"))
 """What stands before the fields of each message: when it arrived (Unix time of the ground station,
 us) and who sent it."""
@@ -23,10 +22,11 @@ def tlog_tables(index: TlogIndex) -> dict[str, Records]:
     Fields are as the message has them, in its order on the wire; ``SENDER`` stands before them.
     """
     data = np.frombuffer(index.data, np.uint8)
-    starts = range(0, len(index.offsets), BLOCK)
+    block = block_length(len(index.offsets))
+    starts = range(0, len(index.offsets), block)
     counts: dict[int, int] = {}
     for start in starts:
-        head = headers(data, index.offsets[start : start + BLOCK])
+        head = headers(data, index.offsets[start : start + block])
         for kind, count in zip(*np.unique(head.kind, return_counts=True), strict=True):
             counts[int(kind)] = counts.get(int(kind), 0) + int(count)
     tables = {
@@ -35,7 +35,7 @@ def tlog_tables(index: TlogIndex) -> dict[str, Records]:
     }
     filled = dict.fromkeys(tables, 0)
     for start in starts:
-        offsets = index.offsets[start : start + BLOCK]
+        offsets = index.offsets[start : start + block]
         head, arrived = headers(data, offsets), stamps(data, offsets)
         for kind in np.unique(head.kind).tolist():
             rows = np.flatnonzero(head.kind == kind)
