@@ -57,7 +57,7 @@ class Headers:
 
 def candidates(data: Octets, start: int, stop: int) -> Integers:
     """Places from ``start`` on and before ``stop`` where a packet may begin."""
-    block = data[start : min(stop, len(data) - 2)]
+    block = data[start : max(start, min(stop, len(data) - 2))]
     at: Integers = start + np.flatnonzero((block == MAGIC_V1) | (block == MAGIC_V2))
     possible: Integers = at[(data[at] == MAGIC_V1) | (data[at + 2] <= 1)]
     return possible

@@ -80,6 +80,13 @@ def test_strides_over_telemetry_change_nothing(monkeypatch, seed):
         assert getattr(fast, count) == getattr(slow, count)
 
 
+def test_logs_shorter_than_a_stride(monkeypatch):
+    cuts = [data[:length] for data in (TLOG, TLOG[::-1]) for length in range(9, 700, 3)]
+    fast = [index_tlog(cut, WANTED_PACKETS).offsets.tolist() for cut in cuts]
+    in_steps(monkeypatch)
+    assert fast == [index_tlog(cut, WANTED_PACKETS).offsets.tolist() for cut in cuts]
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_strides_over_a_ulog_change_nothing(monkeypatch, seed):
     # Without its header it is no ULog, and is refused.
