@@ -8,7 +8,7 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +43,8 @@ SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
+LONGEST_SILENCE_S = 2.0
+"""An accuracy that was told longer ago is of no use."""
 HDOP_UNKNOWN = 99.0
 CLIPS = ("Clip", "Clip0", "Clip1", "Clip2")
 STATUS_BITS = 0x3FF
@@ -130,57 +132,59 @@ def gps(batch: Batch, context: Context) -> Converted:
     course = np.radians(form.numbers(records, "GCrs"))
     v_n, v_e = (speed * np.cos(course)).tolist(), (speed * np.sin(course)).tolist()
     lat, lng, alt = batch.floats("Lat", "Lng", "Alt")
-    down = batch.floats("VZ")[0] if form.has("VZ") else None
     milliseconds, weeks = ("GMS", "GWk") if form.has("GMS") else ("TimeMS", "Week")
     week, ms = batch.integers(weeks), batch.integers(milliseconds)
-    hdop = batch.floats("HDop")[0] if form.has("HDop") else None
-    status, satellites = batch.integers("Status"), batch.integers("NSats", -1)
-    fixes = []
-    for k, receiver in enumerate(receiver_of(form, records)):
-        written = t = float(batch.t[k])
-        message = _of_same_fix(context.message_time.get(receiver), written)
-        if message is not None:
-            t = message + context.written_late[receiver]
-        vertical = down is not None and context.vertical_speed.get(receiver, False)
-        fixes.append(
-            GpsFix(
-                t=t,
-                receiver=receiver,
-                fix_type=status[k],
-                latitude=math.radians(lat[k]),
-                longitude=math.radians(lng[k]),
-                altitude=alt[k],
-                v_n=v_n[k],
-                v_e=v_e[k],
-                v_d=down[k] if vertical and down is not None else None,
-                t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if week[k] else None,
-                satellites=satellites[k] if satellites[k] >= 0 else None,
-                hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
-                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), written),
-                t_message=message,
-            )
-        )
-    return fixes
+    hdop = batch.floats("HDop")[0] if form.has("HDop") else [math.inf] * len(lat)
+    receivers, written = receiver_of(form, records), batch.t.tolist()
+    messages = _of_fixes(context.message_time, receivers, batch.t, SAME_FIX_S)
+    accuracies = _of_fixes(context.speed_accuracy, receivers, batch.t, LONGEST_SILENCE_S)
+    if form.has("VZ"):
+        down = [
+            v if context.vertical_speed.get(receiver, False) else None
+            for v, receiver in zip(batch.floats("VZ")[0], receivers, strict=True)
+        ]
+    else:
+        down = [None] * len(lat)
+    return samples_of(
+        GpsFix,
+        [
+            t if message is None else message + context.written_late[receiver]
+            for t, message, receiver in zip(written, messages, receivers, strict=True)
+        ],
+        receivers,
+        batch.integers("Status"),
+        [math.radians(x) for x in lat],
+        [math.radians(x) for x in lng],
+        alt,
+        v_n,
+        v_e,
+        down,
+        [w * SECONDS_PER_WEEK + m / 1e3 if w else None for w, m in zip(week, ms, strict=True)],
+        [n if n >= 0 else None for n in batch.integers("NSats", -1)],
+        [x if x < HDOP_UNKNOWN else None for x in hdop],
+        [x if x is not None and x > 0.0 else None for x in accuracies],
+        [0.0] * len(lat),
+        messages,
+    )
 
 
-def _nearest(series: Series | None, t: float) -> float | None:
-    """The value of the record written with, or last before, the one of time ``t``."""
-    if series is None:
-        return None
-    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
-    if k < 0 or t - series[0][k] > 2.0 or not series[1][k] > 0.0:
-        return None
-    return float(series[1][k])
+def _of_fixes(
+    series: Mapping[int, Series], receivers: list[int], t: Floats, oldest: float
+) -> list[float | None]:
+    """Values of the records written with, or last before, fixes at ``t`` (n,).
 
-
-def _of_same_fix(series: Series | None, t: float) -> float | None:
-    """A time in the record that was written with the one of time ``t``; None if it is none."""
-    if series is None:
-        return None
-    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
-    if k < 0 or t - series[0][k] > SAME_FIX_S:
-        return None
-    return float(series[1][k])
+    None where there is none, or only one that is older than ``oldest``, s.
+    """
+    values: list[float | None] = [None] * len(t)
+    numbers = np.array(receivers)
+    for receiver, (times, of_receiver) in series.items():
+        rows = np.flatnonzero(numbers == receiver)
+        last = np.searchsorted(times, t[rows] + SAME_FIX_S, side="right") - 1
+        known = (last >= 0) & ~(t[rows] - times[last] > oldest) if len(times) else last > 0
+        its = of_receiver[last[known]].tolist()
+        for row, value in zip(rows[known].tolist(), its, strict=True):
+            values[row] = value
+    return values
 
 
 def vibration(batch: Batch, _context: Context) -> Converted:
