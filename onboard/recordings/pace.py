@@ -12,7 +12,7 @@ Integers: TypeAlias = NDArray[np.int64]
 
 SHORTEST, LONGEST = 1 << 12, 1 << 17
 """bytes"""
-FEWEST, MOST = 256, 4096
+FEWEST, MOST = 512, 8192
 """records"""
 MOST_DECEPTIONS = 64
 """Places in one stride that look like the beginning of something but stand inside another thing."""
@@ -61,4 +61,4 @@ def chain(starts: Integers, following: Integers) -> Integers:
 
 def block_length(count: int) -> int:
     """Records to copy at a time, so that what is held beside the copies is little, but not slow."""
-    return min(max(count // 32, FEWEST), MOST)
+    return min(max(count // 12, FEWEST), MOST)
