@@ -20,6 +20,7 @@ from benchmarks import (
     explaining,
     lag,
     link,
+    reading,
     robustness,
 )
 from benchmarks.real import runner as real
@@ -59,6 +60,7 @@ def main() -> None:
         ),
         "explain_time": ("Time of an explanation", lambda: explain_time.main([])),
         "real": ("Real flights, which nobody knows the truth about", lambda: real.main([])),
+        "reading": ("Reading recordings, against other readers", lambda: reading.main([])),
         "cost": ("Cost of the estimator", lambda: cost.main([])),
         "paths": ("Cost of link and service", _paths),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
+from onboard.recordings.bulk import no_collection
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
-from onboard.recordings.dataflash_index import MAGIC, DataflashIndex, index_dataflash
+from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
 from onboard.recordings.dataflash_records import (
     CONVERTERS,
     IMU_NAMES,
@@ -20,9 +22,10 @@ from onboard.recordings.dataflash_records import (
     Batch,
     record_times,
 )
-from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.dataflash_walk import MAGIC
+from onboard.recordings.recording import Recording, damage_notes, elapsed_s
 
-BLOCK = 16384
+BLOCK = 4096
 """Records converted at a time: bounds the memory, whatever the length of the log."""
 WANTED = frozenset(CONVERTERS) | {"GPA"}
 
@@ -62,7 +65,7 @@ def open_dataflash(path: Path) -> Recording:
         duration_s=elapsed_s(t),
         counts=index.counts(),
         read=read,
-        damage=_damage(index),
+        damage=damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes),
     )
 
 
@@ -92,27 +95,19 @@ def _times(index: DataflashIndex, slots: list[int]) -> Floats:
     return t
 
 
-def _damage(index: DataflashIndex) -> tuple[str, ...]:
-    notes = []
-    if index.damaged_places:
-        places = "place" if index.damaged_places == 1 else "places"
-        notes.append(
-            f"{index.damaged_places} damaged {places}, {index.skipped_bytes} bytes skipped"
-        )
-    if index.cut_off:
-        notes.append("cut off: the end of the log is missing")
-    return tuple(notes)
-
-
 def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Sample]:
-    last = context.first_time
     keep = np.isin(index.slots, list(usable))
     offsets, slots = index.offsets[keep], index.slots[keep]
-    for start in range(0, len(offsets), BLOCK):
-        block = offsets[start : start + BLOCK], slots[start : start + BLOCK]
-        rows, last = _convert_block(index, block, context, last)
-        for row in rows:
-            yield from row
+
+    def blocks() -> Iterator[Iterator[Sample]]:
+        last = context.first_time
+        for start in range(0, len(offsets), BLOCK):
+            block = offsets[start : start + BLOCK], slots[start : start + BLOCK]
+            with no_collection():
+                samples, last = _convert_block(index, block, context, last)
+            yield samples
+
+    return chain.from_iterable(blocks())
 
 
 def _convert_block(
@@ -120,8 +115,8 @@ def _convert_block(
     block: tuple[NDArray[np.int64], NDArray[np.uint16]],
     context: Context,
     last: float,
-) -> tuple[list[list[Sample]], float]:
-    """Samples of a block, one list per record, and the time of its last record."""
+) -> tuple[Iterator[Sample], float]:
+    """Samples of a block in the order of their records, and the time of its last record."""
     offsets, slots = block
     groups = [(slot, np.flatnonzero(slots == slot)) for slot in np.unique(slots).tolist()]
     records = {slot: index.gather(slot, offsets[rows]) for slot, rows in groups}
@@ -134,14 +129,14 @@ def _convert_block(
     # A record without a time of its own takes that of the one before it.
     known = np.where(np.isfinite(t), np.arange(len(t)), 0)
     t = t[np.maximum.accumulate(known)]
-    placed: list[list[Sample]] = [[] for _ in range(len(offsets))]
+    samples: list[Sample | None] = []
+    places = []
     for slot, rows in groups:
         form = index.formats[slot]
         batch = Batch(form, records[slot], t[rows + 1])
         for convert in CONVERTERS[form.name]:
             with np.errstate(all="ignore"):  # damaged bytes make any number
-                samples = convert(batch, context)
-            for row, sample in zip(rows.tolist(), samples, strict=True):
-                if sample is not None:
-                    placed[row].append(sample)
-    return placed, float(t[-1])
+                samples.extend(convert(batch, context))
+            places.append(rows)
+    order = np.argsort(np.concatenate(places), kind="stable").tolist()
+    return filter(None, map(samples.__getitem__, order)), float(t[-1])

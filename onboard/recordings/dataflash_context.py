@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.recordings.dataflash_index import DataflashIndex, Format, Records
+from onboard.recordings.dataflash_formats import Format, Records
+from onboard.recordings.dataflash_index import DataflashIndex
 
 Floats = NDArray[np.float64]
 Series = tuple[Floats, Floats]

@@ -8,7 +8,7 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.recordings.bulk import samples_of
 from onboard.recordings.dataflash_context import (
     CHANNELS,
     GPS_NAMES,
@@ -36,13 +37,16 @@ from onboard.recordings.dataflash_context import (
     Series,
     receiver_of,
 )
-from onboard.recordings.dataflash_index import Format, Records
+from onboard.recordings.dataflash_formats import Format, Records
 
 SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
+LONGEST_SILENCE_S = 2.0
+"""An accuracy that was told longer ago is of no use."""
 HDOP_UNKNOWN = 99.0
+CLIPS = ("Clip", "Clip0", "Clip1", "Clip2")
 STATUS_BITS = 0x3FF
 """The low ten bits of the EKF's nav_filter_status are those of EKF_STATUS_REPORT."""
 STATUS_GPS_GLITCHING, REPORT_GPS_GLITCHING = 1 << 14, 1 << 15
@@ -79,6 +83,11 @@ Converted = Iterable[Sample | None]
 Converter = Callable[[Batch, Context], Converted]
 
 
+def _rows(columns: Sequence[Floats]) -> list[tuple[float, ...]]:
+    """Columns (n,) as n tuples."""
+    return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
 def record_times(form: Format, records: Records) -> Floats | None:
     """(n,) boot time of records, s; None where the layout has no time of its own."""
     if form.has("TimeUS"):
@@ -92,29 +101,24 @@ def imu(batch: Batch, _context: Context) -> Converted:
     """IMU (with or without instance), IMU2, IMU3."""
     first = int(batch.form.name[3:] or 1)
     numbers = [i + first for i in batch.integers("I")]
-    t = batch.t.tolist()
-    gx, gy, gz = batch.floats("GyrX", "GyrY", "GyrZ")
-    ax, ay, az = batch.floats("AccX", "AccY", "AccZ")
+    gyro = [batch.form.numbers(batch.records, c) for c in ("GyrX", "GyrY", "GyrZ")]
+    force = [batch.form.numbers(batch.records, c) for c in ("AccX", "AccY", "AccZ")]
     named = next((c for c in ("T", "Temp") if batch.form.has(c)), None)
-    heat = batch.floats(named)[0] if named else [0.0] * len(t)
-    return [
-        ImuSample(
-            t[k],
-            numbers[k],
-            (ax[k], ay[k], az[k]),
-            (gx[k], gy[k], gz[k]),
-            heat[k] or None,  # exactly 0: a sensor without a thermometer
-        )
-        if (ax[k] or ay[k] or az[k] or gx[k] or gy[k] or gz[k]) and numbers[k] <= MOST_IMUS
-        else None  # not a measurement: the sensor was not there yet, or there is none such
-        for k in range(len(t))
-    ]
+    # A temperature of exactly 0 is that of a sensor without a thermometer.
+    heat = [x or None for x in batch.floats(named)[0]] if named else [None] * len(numbers)
+    samples: list[Sample | None] = []
+    samples += samples_of(ImuSample, batch.t.tolist(), numbers, _rows(force), _rows(gyro), heat)
+    # Not a measurement: the sensor was not there yet, or there is none such.
+    blank = ~np.any([x != 0.0 for x in (*force, *gyro)], axis=0) | (np.array(numbers) > MOST_IMUS)
+    for k in np.flatnonzero(blank).tolist():
+        samples[k] = None
+    return samples
 
 
 def attitude(batch: Batch, _context: Context) -> Converted:
     """ATT."""
     angles = [np.radians(batch.form.numbers(batch.records, c)) for c in ("Roll", "Pitch", "Yaw")]
-    return map(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
+    return samples_of(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
 
 
 def gps(batch: Batch, context: Context) -> Converted:
@@ -128,74 +132,71 @@ def gps(batch: Batch, context: Context) -> Converted:
     course = np.radians(form.numbers(records, "GCrs"))
     v_n, v_e = (speed * np.cos(course)).tolist(), (speed * np.sin(course)).tolist()
     lat, lng, alt = batch.floats("Lat", "Lng", "Alt")
-    down = batch.floats("VZ")[0] if form.has("VZ") else None
     milliseconds, weeks = ("GMS", "GWk") if form.has("GMS") else ("TimeMS", "Week")
     week, ms = batch.integers(weeks), batch.integers(milliseconds)
-    hdop = batch.floats("HDop")[0] if form.has("HDop") else None
-    status, satellites = batch.integers("Status"), batch.integers("NSats", -1)
-    fixes = []
-    for k, receiver in enumerate(receiver_of(form, records)):
-        written = t = float(batch.t[k])
-        message = _of_same_fix(context.message_time.get(receiver), written)
-        if message is not None:
-            t = message + context.written_late[receiver]
-        vertical = down is not None and context.vertical_speed.get(receiver, False)
-        fixes.append(
-            GpsFix(
-                t=t,
-                receiver=receiver,
-                fix_type=status[k],
-                latitude=math.radians(lat[k]),
-                longitude=math.radians(lng[k]),
-                altitude=alt[k],
-                v_n=v_n[k],
-                v_e=v_e[k],
-                v_d=down[k] if vertical and down is not None else None,
-                t_receiver=week[k] * SECONDS_PER_WEEK + ms[k] / 1e3 if week[k] else None,
-                satellites=satellites[k] if satellites[k] >= 0 else None,
-                hdop=hdop[k] if hdop is not None and hdop[k] < HDOP_UNKNOWN else None,
-                speed_accuracy=_nearest(context.speed_accuracy.get(receiver), written),
-                t_message=message,
-            )
-        )
-    return fixes
+    hdop = batch.floats("HDop")[0] if form.has("HDop") else [math.inf] * len(lat)
+    receivers, written = receiver_of(form, records), batch.t.tolist()
+    messages = _of_fixes(context.message_time, receivers, batch.t, SAME_FIX_S)
+    accuracies = _of_fixes(context.speed_accuracy, receivers, batch.t, LONGEST_SILENCE_S)
+    if form.has("VZ"):
+        down = [
+            v if context.vertical_speed.get(receiver, False) else None
+            for v, receiver in zip(batch.floats("VZ")[0], receivers, strict=True)
+        ]
+    else:
+        down = [None] * len(lat)
+    return samples_of(
+        GpsFix,
+        [
+            t if message is None else message + context.written_late[receiver]
+            for t, message, receiver in zip(written, messages, receivers, strict=True)
+        ],
+        receivers,
+        batch.integers("Status"),
+        [math.radians(x) for x in lat],
+        [math.radians(x) for x in lng],
+        alt,
+        v_n,
+        v_e,
+        down,
+        [w * SECONDS_PER_WEEK + m / 1e3 if w else None for w, m in zip(week, ms, strict=True)],
+        [n if n >= 0 else None for n in batch.integers("NSats", -1)],
+        [x if x < HDOP_UNKNOWN else None for x in hdop],
+        [x if x is not None and x > 0.0 else None for x in accuracies],
+        [0.0] * len(lat),
+        messages,
+    )
 
 
-def _nearest(series: Series | None, t: float) -> float | None:
-    """The value of the record written with, or last before, the one of time ``t``."""
-    if series is None:
-        return None
-    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
-    if k < 0 or t - series[0][k] > 2.0 or not series[1][k] > 0.0:
-        return None
-    return float(series[1][k])
+def _of_fixes(
+    series: Mapping[int, Series], receivers: list[int], t: Floats, oldest: float
+) -> list[float | None]:
+    """Values of the records written with, or last before, fixes at ``t`` (n,).
 
-
-def _of_same_fix(series: Series | None, t: float) -> float | None:
-    """A time in the record that was written with the one of time ``t``; None if it is none."""
-    if series is None:
-        return None
-    k = int(np.searchsorted(series[0], t + SAME_FIX_S, side="right")) - 1
-    if k < 0 or t - series[0][k] > SAME_FIX_S:
-        return None
-    return float(series[1][k])
+    None where there is none, or only one that is older than ``oldest``, s.
+    """
+    values: list[float | None] = [None] * len(t)
+    numbers = np.array(receivers)
+    for receiver, (times, of_receiver) in series.items():
+        rows = np.flatnonzero(numbers == receiver)
+        last = np.searchsorted(times, t[rows] + SAME_FIX_S, side="right") - 1
+        known = (last >= 0) & ~(t[rows] - times[last] > oldest) if len(times) else last > 0
+        its = of_receiver[last[known]].tolist()
+        for row, value in zip(rows[known].tolist(), its, strict=True):
+            values[row] = value
+    return values
 
 
 def vibration(batch: Batch, _context: Context) -> Converted:
     """VIBE: one record per IMU, before ArduPilot 4.1 one with three clip counters."""
     t = batch.t.tolist()
-    x, y, z = batch.floats("VibeX", "VibeY", "VibeZ")
-    clips = [batch.integers(c) for c in ("Clip", "Clip0", "Clip1", "Clip2") if batch.form.has(c)]
-    numbers = batch.integers("IMU") if batch.form.has("IMU") else None
-    return [
-        Vibration(
-            t[k],
-            (x[k], y[k], z[k]),
-            tuple(c[k] for c in clips),
-            None if numbers is None else numbers[k] + 1,
-        )
-        for k in range(len(t))
-    ]
+    level = list(zip(*batch.floats("VibeX", "VibeY", "VibeZ"), strict=True))
+    counters = [batch.integers(c) for c in CLIPS if batch.form.has(c)]
+    clips = list(zip(*counters, strict=True)) if counters else [()] * len(t)
+    if not batch.form.has("IMU"):
+        return samples_of(Vibration, t, level, clips)
+    numbers = [number + 1 for number in batch.integers("IMU")]
+    return samples_of(Vibration, t, level, clips, numbers)
 
 
 def throttle(batch: Batch, _context: Context) -> Converted:
@@ -205,7 +206,7 @@ def throttle(batch: Batch, _context: Context) -> Converted:
         return [None] * len(batch.t)
     full = 100.0 if batch.form.has("NavRoll") else 1.0 if column == "ThO" else 1000.0
     values = batch.form.numbers(batch.records, column) / full
-    return map(Throttle, batch.t.tolist(), values.tolist())
+    return samples_of(Throttle, batch.t.tolist(), values.tolist())
 
 
 def motors(batch: Batch, context: Context) -> Converted:
@@ -215,7 +216,8 @@ def motors(batch: Batch, context: Context) -> Converted:
         return [None] * len(batch.t)
     low, high = context.motor_range_us
     mean = np.mean([batch.form.numbers(batch.records, c) for c in channels], axis=0)
-    return map(Throttle, batch.t.tolist(), np.clip((mean - low) / (high - low), 0.0, 1.0).tolist())
+    share = np.clip((mean - low) / (high - low), 0.0, 1.0)
+    return samples_of(Throttle, batch.t.tolist(), share.tolist())
 
 
 def outputs(batch: Batch, _context: Context) -> Converted:
@@ -223,8 +225,8 @@ def outputs(batch: Batch, _context: Context) -> Converted:
     columns = [c for c in (f"C{n}" for n in range(1, CHANNELS + 1)) if batch.form.has(c)]
     if not columns:
         return [None] * len(batch.t)
-    values = zip(*batch.floats(*columns), strict=True)
-    return map(Outputs, batch.t.tolist(), values)
+    values = list(zip(*batch.floats(*columns), strict=True))
+    return samples_of(Outputs, batch.t.tolist(), values)
 
 
 def airspeed(batch: Batch, _context: Context) -> Converted:
@@ -240,9 +242,8 @@ def ekf_bias(batch: Batch, _context: Context) -> Converted:
     """XKF2: accelerometer bias of each EKF3 core, steps of 0.01 m/s^2."""
     if not batch.form.has("AX", "AY", "AZ"):
         return [None] * len(batch.t)
-    x, y, z = batch.floats("AX", "AY", "AZ")
-    core = batch.integers("C")
-    return [EkfBias(t, core[k], (x[k], y[k], z[k])) for k, t in enumerate(batch.t.tolist())]
+    bias = list(zip(*batch.floats("AX", "AY", "AZ"), strict=True))
+    return samples_of(EkfBias, batch.t.tolist(), batch.integers("C"), bias)
 
 
 def wind(batch: Batch, _context: Context) -> Converted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from onboard.errors import RecordingError
@@ -13,6 +14,13 @@ from onboard.recordings.ulog import is_ulog, open_ulog
 HEAD_LENGTH = 65536
 
 
+OPENERS: dict[str, Callable[[Path], Recording]] = {
+    "ulog": open_ulog,
+    "dataflash": open_dataflash,
+    "tlog": open_tlog,
+}
+
+
 def open_recording(path: str | Path) -> Recording:
     """Open a .tlog, DataFlash .BIN or .ulg file.
 
@@ -22,6 +30,15 @@ def open_recording(path: str | Path) -> Recording:
         RecordingError: no such file, not a file, not a log, or nothing in it that can be used.
     """
     path = Path(path)
+    return OPENERS[kind_of(path)](path)
+
+
+def kind_of(path: Path) -> str:
+    """``ulog``, ``dataflash`` or ``tlog``, by the content.
+
+    Raises:
+        RecordingError: no such file, not a file, or none of these.
+    """
     if path.exists() and not path.is_file():
         what = "a directory" if path.is_dir() else "not a regular file"
         raise RecordingError(f"{path}: is {what}; a recording is a file that can be read twice")
@@ -35,9 +52,9 @@ def open_recording(path: str | Path) -> Recording:
     if not head:
         raise RecordingError(f"{path}: is empty")
     if is_ulog(head):
-        return open_ulog(path)
+        return "ulog"
     if is_dataflash(head):
-        return open_dataflash(path)
+        return "dataflash"
     if is_tlog(head):
-        return open_tlog(path)
+        return "tlog"
     raise RecordingError(f"{path}: not a .tlog, DataFlash .BIN or .ulg recording")

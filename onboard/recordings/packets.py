@@ -1,24 +1,27 @@
-"""MAVLink packets whose checksum is known to be right, unpacked without checking it again."""
+"""MAVLink packets whose checksums are known to be right, unpacked without checking them again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
 
 from onboard.mavlink.dialect import Message, mavlink
-from onboard.mavlink.framing import header
+from onboard.recordings.bulk import filled
+from onboard.recordings.packet_columns import Headers, Integers, Octets, headers, layout, payloads
 
 
 class Packet:
     """What a decoder asks of a message: its kind, its sender, its fields by name."""
 
-    def __init__(self, kind: int, system: int, component: int, fields: dict[str, float]) -> None:
-        """Take the sender and the fields."""
-        self.__dict__.update(fields)
-        self._kind, self._system, self._component = kind, system, component
+    __slots__ = ("_component", "_system")
+    KIND: ClassVar[int]
+    _component: int
+    _system: int
 
     def get_msgId(self) -> int:
         """Number of the message, by the dialect's own name for it."""
-        return self._kind
+        return self.KIND
 
     def get_srcSystem(self) -> int:
         """Sender."""
@@ -30,29 +33,49 @@ class Packet:
 
 
 class Unpacker:
-    """Unpacks packets; those with arrays or strings by way of the dialect."""
+    """Unpacks packets of a file; those with arrays or strings by way of the dialect."""
 
     def __init__(self) -> None:
-        """Learn which messages are plain numbers."""
-        self._whole: Callable[[bytearray], Message] = mavlink.MAVLink(None).decode
-        self._plain = {
-            kind: (message.unpacker, tuple(message.ordered_fieldnames))
-            for kind, message in mavlink.mavlink_map.items()
-            if not any(message.array_lengths)
-        }
+        self._one = mavlink.MAVLink(None)
+        self._kinds: dict[int, tuple[type[Packet], np.dtype[np.void]]] = {}
 
-    def __call__(self, packet: bytes) -> Message:
-        """The message.
+    def __call__(self, data: Octets, at: Integers) -> list[Message | None]:
+        """The messages of packets at places (n,); None where a payload cannot be unpacked."""
+        head = headers(data, at)
+        messages: list[Message | None] = [None] * len(at)
+        for kind in np.unique(head.kind).tolist():
+            rows = np.flatnonzero(head.kind == kind)
+            its = head.of(rows)
+            if any(mavlink.mavlink_map[kind].array_lengths):
+                ends = (at[rows] + its.length).tolist()
+                found = [
+                    self._whole(bytearray(data[a:b].tobytes()))
+                    for a, b in zip(at[rows].tolist(), ends, strict=True)
+                ]
+            else:
+                found = self._plain(kind, data, its)
+            for row, message in zip(rows.tolist(), found, strict=True):
+                messages[row] = message
+        return messages
 
-        Raises:
-            MAVError: a payload that cannot be unpacked.
-        """
-        kind, system, component, _, _, start = header(packet, 0)
-        plain = self._plain.get(kind)
-        if plain is None:
-            return self._whole(bytearray(packet))
-        unpacker, names = plain
+    def _whole(self, packet: bytearray) -> Message | None:
+        """One packet as the dialect unpacks it."""
+        try:
+            return self._one.decode(packet)
+        except mavlink.MAVError:
+            return None
+
+    def _plain(self, kind: int, data: Octets, head: Headers) -> list[Any]:
+        """Packets of one kind that has nothing but numbers."""
+        if kind not in self._kinds:
+            message = mavlink.mavlink_map[kind]
+            names = tuple(message.ordered_fieldnames)
+            made = type(message.msgname, (Packet,), {"__slots__": names, "KIND": kind})
+            self._kinds[kind] = made, layout(message)
+        made, form = self._kinds[kind]
         # The sender leaves out zeros at the end, and may know more fields than we do.
-        payload = packet[start : start + packet[1]][: unpacker.size].ljust(unpacker.size, b"\0")
-        fields = dict(zip(names, unpacker.unpack(payload), strict=True))
-        return Packet(kind, system, component, fields)
+        records = payloads(data, head, form.itemsize).view(form)[:, 0]
+        columns = {name: records[name].tolist() for name in form.names or ()}
+        columns["_system"] = head.system.tolist()
+        columns["_component"] = head.component.tolist()
+        return filled(made, columns)

@@ -45,3 +45,18 @@ def elapsed_s(t: NDArray[np.float64]) -> float:
     """Time that a clock ``t`` (n,) counted, s: restarts and impossible steps add nothing."""
     steps = np.diff(t)
     return float(steps[(steps > 0.0) & (steps < LONGEST_GAP_S)].sum())
+
+
+def damage_notes(places: int, skipped: int, cut_off: int) -> tuple[str, ...]:
+    """What was skipped in plain words: bytes at damaged places, and at an end that is cut off."""
+    notes = []
+    if places:
+        named = "place" if places == 1 else "places"
+        notes.append(f"{places} damaged {named}, {_bytes(skipped)} skipped")
+    if cut_off:
+        notes.append(f"cut off: the end of the log is missing ({_bytes(cut_off)} skipped)")
+    return tuple(notes)
+
+
+def _bytes(count: int) -> str:
+    return "1 byte" if count == 1 else f"{count} bytes"

@@ -7,48 +7,51 @@ length and by what follows them.  Damage costs the packets that it hit and no ot
 
 from __future__ import annotations
 
-import struct
-from array import array
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import chain
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
-from onboard.mavlink.framing import (
-    MAGICS,
-    header,
-    is_valid,
-    message_id,
-    next_valid,
-    packet_length,
+from onboard.mavlink.framing import next_valid
+from onboard.recordings.bulk import no_collection
+from onboard.recordings.packet_columns import (
+    STAMP_LENGTH,
+    Headers,
+    Integers,
+    Octets,
+    headers,
+    payloads,
 )
 from onboard.recordings.packets import Unpacker
-from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.recording import Recording, damage_notes, elapsed_s
+from onboard.recordings.tlog_index import Bytes, TlogIndex, index_tlog
 
-Bytes = bytes | mmap
 Source = tuple[int, int]
 """System id, component id."""
+Floats = NDArray[np.float64]
 
-STAMP_LENGTH = 8
-LONGEST_SILENCE_US = 86_400_000_000
 LATE_S = 60.0
 """A parameter that is first reported so long after the inertial samples began was read late, as
 by a ground station that connected in flight; one that never changed was in force all along."""
 INERTIAL = {
-    mavlink.MAVLINK_MSG_ID_RAW_IMU: ("<Q", 1e6),
-    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: ("<Q", 1e6),
-    mavlink.MAVLINK_MSG_ID_SCALED_IMU: ("<I", 1e3),
-    mavlink.MAVLINK_MSG_ID_SCALED_IMU2: ("<I", 1e3),
-    mavlink.MAVLINK_MSG_ID_SCALED_IMU3: ("<I", 1e3),
+    mavlink.MAVLINK_MSG_ID_RAW_IMU: ("<u8", 1e6),
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: ("<u8", 1e6),
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU: ("<u4", 1e3),
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU2: ("<u4", 1e3),
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU3: ("<u4", 1e3),
 }
 """Inertial messages: their time field, which is the first, and its ticks per second."""
+HEARTBEAT_LENGTH = 9
+BLOCK = 2048
+"""Packets decoded at a time: bounds the memory, whatever the length of the log."""
 WANTED = message_ids(Decoder.names)
 AUTOPILOTS = {
     mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
@@ -56,17 +59,20 @@ AUTOPILOTS = {
 }
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Vehicle:
-    """What one source of packets sent: place, length and time of what is wanted."""
+    """What one source of packets sent: the places of what is wanted.
 
-    autopilot: int | None = None
-    counts: Counter[int] = field(default_factory=Counter)
-    offsets: array[int] = field(default_factory=lambda: array("q"))
-    lengths: array[int] = field(default_factory=lambda: array("H"))
-    imu_times: dict[int, array[float]] = field(default_factory=dict)
-    parameters: list[tuple[int, int, bool]] = field(default_factory=list)
-    """Place and length of each report, and whether it came late."""
+    ``imu_times`` (s) are by message number, in the order in which the messages came first;
+    ``reports`` are the places of parameters, and ``late`` says whether they came late.
+    """
+
+    autopilot: int | None
+    counts: dict[int, int]
+    offsets: Integers
+    imu_times: dict[int, Floats]
+    reports: Integers
+    late: NDArray[np.bool_]
 
     @property
     def imu_messages(self) -> int:
@@ -74,19 +80,8 @@ class _Vehicle:
 
     @property
     def duration_s(self) -> float:
-        longest = max(self.imu_times.values(), key=len, default=array("d"))
-        return elapsed_s(np.array(longest, dtype=np.float64))
-
-
-@dataclass(slots=True)
-class TlogIndex:
-    """Packets of a file by source, and what was damaged."""
-
-    vehicles: dict[Source, _Vehicle] = field(default_factory=dict)
-    packets: int = 0
-    damaged_places: int = 0
-    skipped_bytes: int = 0
-    cut_off: bool = False
+        longest = max(self.imu_times.values(), key=len, default=np.zeros(0))
+        return elapsed_s(longest)
 
 
 def is_tlog(head: bytes) -> bool:
@@ -102,9 +97,10 @@ def open_tlog(path: Path) -> Recording:
     """
     with path.open("rb") as file:
         data = mmap(file.fileno(), 0, access=ACCESS_READ)
-    index = index_tlog(data)
-    source, notes = _choose(index, path)
-    vehicle = index.vehicles[source]
+    index = index_tlog(data, WANTED)
+    vehicles = _vehicles(index)
+    source, notes = _choose(vehicles, path)
+    vehicle = vehicles[source]
 
     def read() -> Iterator[Sample]:
         return _samples(data, source, vehicle)
@@ -116,80 +112,60 @@ def open_tlog(path: Path) -> Recording:
         duration_s=vehicle.duration_s,
         counts={mavlink.mavlink_map[kind].msgname: n for kind, n in sorted(vehicle.counts.items())},
         read=read,
-        damage=_damage(index),
+        damage=damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes),
         notes=notes,
     )
 
 
-def index_tlog(data: Bytes) -> TlogIndex:
-    """Find the packets; never raises on damage, counts it instead."""
-    index = TlogIndex()
-    end = len(data)
-    at = STAMP_LENGTH  # of the packet; its time of arrival stands before it
-    while at < end:
-        length = packet_length(data, at)
-        kind = message_id(data, at) if length else -1
-        wanted = kind in WANTED
-        if (
-            length
-            and at + length <= end
-            and (
-                is_valid(data, at, kind)
-                or (not wanted and _chained(data, at, at + length + STAMP_LENGTH, end))
-            )
-        ):
-            index.packets += 1
-            if wanted:
-                _note(index, data, at, length, kind)
-            at += length + STAMP_LENGTH
-            continue
-        found = next_valid(data, at + 1)
-        if found < end or at - STAMP_LENGTH < end:
-            if found >= end:
-                index.cut_off = True
-            else:
-                index.damaged_places += 1
-            index.skipped_bytes += min(found, end) - at
-        at = found
-    return index
+def _vehicles(index: TlogIndex) -> dict[Source, _Vehicle]:
+    """The wanted packets by their senders, in the order in which these were heard first."""
+    data = np.frombuffer(index.data, np.uint8)
+    head = headers(data, index.offsets)
+    senders = head.system << 8 | head.component
+    found, first = np.unique(senders, return_index=True)
+    vehicles = {}
+    for sender in found[np.argsort(first)].tolist():
+        rows = np.flatnonzero(senders == sender)
+        vehicle = _vehicle(data, index.offsets[rows], head.of(rows))
+        vehicles[sender >> 8, sender & 0xFF] = vehicle
+    return vehicles
 
 
-def _chained(data: Bytes, at: int, following: int, end: int) -> bool:
-    """Whether a packet that we cannot check is followed by another that arrived about then."""
-    if following >= end or data[following] not in MAGICS:
-        return following == end + STAMP_LENGTH
-    here, there = (
-        int.from_bytes(data[place - STAMP_LENGTH : place], "big") for place in (at, following)
+def _vehicle(data: Octets, offsets: Integers, head: Headers) -> _Vehicle:
+    def rows_of(kind: int) -> Integers:
+        return np.flatnonzero(head.kind == kind)
+
+    def bodies(rows: Integers, width: int) -> Octets:
+        return payloads(data, head.of(rows), width)
+
+    kinds, first, counts = np.unique(head.kind, return_index=True, return_counts=True)
+    imu_rows, imu_times = {}, {}
+    for kind in kinds[np.argsort(first)].tolist():
+        if kind in INERTIAL:
+            form, ticks = INERTIAL[kind]
+            imu_rows[kind] = rows_of(kind)
+            ticked = bodies(imu_rows[kind], np.dtype(form).itemsize).view(form)[:, 0]
+            imu_times[kind] = ticked.astype(np.float64) / ticks
+    reports = rows_of(mavlink.MAVLINK_MSG_ID_PARAM_VALUE)
+    late = np.zeros(len(reports), bool)
+    for kind, t in imu_times.items():
+        last = np.searchsorted(imu_rows[kind], reports) - 1
+        late |= (last >= 0) & (t[last] - t[0] > LATE_S)
+    beats = bodies(rows_of(mavlink.MAVLINK_MSG_ID_HEARTBEAT), HEARTBEAT_LENGTH)
+    flying = (beats[:, 4] != mavlink.MAV_TYPE_GCS) & (beats[:, 5] != mavlink.MAV_AUTOPILOT_INVALID)
+    return _Vehicle(
+        autopilot=int(beats[flying, 5][-1]) if flying.any() else None,
+        counts=dict(zip(kinds.tolist(), counts.tolist(), strict=True)),
+        offsets=offsets,
+        imu_times=imu_times,
+        reports=offsets[reports],
+        late=late,
     )
-    return abs(there - here) < LONGEST_SILENCE_US
 
 
-def _note(index: TlogIndex, data: Bytes, at: int, length: int, kind: int) -> None:
-    head = header(data, at)
-    source, payload = (head.system, head.component), head.payload
-    vehicle = index.vehicles.get(source)
-    if vehicle is None:
-        vehicle = index.vehicles[source] = _Vehicle()
-    vehicle.counts[kind] += 1
-    vehicle.offsets.append(at)
-    vehicle.lengths.append(length)
-    if kind in INERTIAL:
-        form, ticks = INERTIAL[kind]
-        size = struct.calcsize(form)
-        stamp = data[payload : payload + min(size, data[at + 1])].ljust(size, b"\0")
-        vehicle.imu_times.setdefault(kind, array("d")).append(struct.unpack(form, stamp)[0] / ticks)
-    elif kind == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
-        late = any(t[-1] - t[0] > LATE_S for t in vehicle.imu_times.values())
-        vehicle.parameters.append((at, length, late))
-    elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-        body = data[payload : payload + data[at + 1]].ljust(9, b"\0")
-        if body[4] != mavlink.MAV_TYPE_GCS and body[5] != mavlink.MAV_AUTOPILOT_INVALID:
-            vehicle.autopilot = body[5]
-
-
-def _choose(index: TlogIndex, path: Path) -> tuple[Source, tuple[str, ...]]:
+def _choose(vehicles: dict[Source, _Vehicle], path: Path) -> tuple[Source, tuple[str, ...]]:
     """The autopilot with most inertial data, and what to say about the others."""
-    flying = {s: v for s, v in index.vehicles.items() if v.imu_messages}
+    flying = {s: v for s, v in vehicles.items() if v.imu_messages}
     if not flying:
         raise RecordingError(
             f"{path}: no inertial messages (RAW_IMU, HIGHRES_IMU, SCALED_IMU2) in it"
@@ -211,36 +187,24 @@ def _choose(index: TlogIndex, path: Path) -> tuple[Source, tuple[str, ...]]:
     return ranked[0], tuple(notes)
 
 
-def _damage(index: TlogIndex) -> tuple[str, ...]:
-    notes = []
-    if index.damaged_places:
-        places = "place" if index.damaged_places == 1 else "places"
-        notes.append(
-            f"{index.damaged_places} damaged {places}, {index.skipped_bytes} bytes skipped"
-        )
-    if index.cut_off:
-        notes.append("cut off: the end of the log is missing")
-    return tuple(notes)
-
-
 def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]:
-    yield from _told_late(data, source, vehicle)
     # As on a live link, nothing is taken before the autopilot's first heartbeat, if there is one.
     system, component = source
     decoder = Decoder(system, component if vehicle.autopilot is None else None)
-    unpack = Unpacker()
-    for at, length in zip(vehicle.offsets, vehicle.lengths, strict=True):
-        yield from _decoded(unpack, data[at : at + length], decoder)
+    blocks = _decoded(data, vehicle.offsets, decoder)
+    return chain(_told_late(data, source, vehicle), chain.from_iterable(blocks))
 
 
 def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
     """Parameters that are reported late, and always with the same value."""
-    decoder = Decoder(*source)
-    unpack = Unpacker()
     values: dict[str, set[float]] = {}
     late: dict[str, bool] = {}
-    for at, length, is_late in vehicle.parameters:
-        for sample in _decoded(unpack, data[at : at + length], decoder):
+    decoder = Decoder(*source)
+    unpack = Unpacker()
+    octets = np.frombuffer(data, np.uint8)
+    messages = unpack(octets, vehicle.reports)
+    for message, is_late in zip(messages, vehicle.late.tolist(), strict=True):
+        for sample in () if message is None else decoder.decode(message):
             if isinstance(sample, ParameterValue):
                 values.setdefault(sample.name, set()).add(sample.value)
                 late.setdefault(sample.name, is_late)
@@ -249,8 +213,12 @@ def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Param
             yield ParameterValue(name, seen.pop())
 
 
-def _decoded(unpack: Unpacker, packet: bytes, decoder: Decoder) -> tuple[Sample, ...]:
-    try:
-        return decoder.decode(unpack(packet))
-    except mavlink.MAVError:
-        return ()  # a right checksum over a payload that cannot be unpacked
+def _decoded(data: Bytes, offsets: Integers, decoder: Decoder) -> Iterator[list[Sample]]:
+    """Samples of packets, block by block."""
+    unpack = Unpacker()
+    octets = np.frombuffer(data, np.uint8)
+    for start in range(0, len(offsets), BLOCK):
+        with no_collection():
+            messages = unpack(octets, offsets[start : start + BLOCK])
+            samples = [s for m in messages if m is not None for s in decoder.decode(m)]
+        yield samples

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -24,15 +24,16 @@ from onboard.core.inputs.samples import (
     VehicleState,
 )
 from onboard.errors import RecordingError
-from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.bulk import no_collection, samples_of
+from onboard.recordings.recording import Recording, damage_notes, elapsed_s
 from onboard.recordings.ulog_index import Records, Topic, UlogIndex, columns_of, index_ulog
 
 Floats = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
-Converter = Callable[[Floats, Columns, int], list[Sample]]
+Converter = Callable[[Floats, Columns, int], Sequence[Sample]]
 
 MAGIC = b"ULog"
-BLOCK = 16384
+BLOCK = 4096
 """Records converted at a time: bounds the memory, whatever the length of the log."""
 ARMED = 2
 KINDS = {1: "copter", 2: "plane", 3: "rover"}
@@ -56,7 +57,7 @@ class _Stream:
     records: Records
     t: Floats
 
-    def samples(self, rows: NDArray[np.intp] | slice) -> list[Sample]:
+    def samples(self, rows: NDArray[np.intp] | slice) -> Sequence[Sample]:
         """Samples of some of the records.
 
         Raises:
@@ -88,7 +89,7 @@ def open_ulog(path: Path) -> Recording:
     ]
     inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
-        why = "".join(f"; {damage}" for damage in _damage(index))
+        why = "".join(f"; {damage}" for damage in damage_of(index))
         raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
 
     def read() -> Iterator[Sample]:
@@ -102,7 +103,7 @@ def open_ulog(path: Path) -> Recording:
         duration_s=elapsed_s(inertial[0].t),
         counts={f"{n}[{i}]" if i else n: len(r) for (n, i), r in records.items()},
         read=read,
-        damage=_damage(index),
+        damage=damage_of(index),
         notes=("a PX4 recording: the result is advice, its parameters are ArduPilot's",),
     )
 
@@ -135,14 +136,13 @@ def _parameters(index: UlogIndex) -> Iterator[Sample]:
         yield ParameterValue(name, value, t / 1e6)
 
 
-def _damage(index: UlogIndex) -> tuple[str, ...]:
-    damage = []
-    if index.damaged_places:
-        damage.append("damaged: some of the log was skipped")
-    if index.dropouts:
-        lost = index.dropped_ms / 1e3
-        damage.append(f"{index.dropouts} dropouts of the logger, {lost:.1f} s in all")
-    return tuple(damage)
+def damage_of(index: UlogIndex) -> tuple[str, ...]:
+    """What the log lacks, in plain words."""
+    notes = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
+    if not index.dropouts:
+        return notes
+    lost = index.dropped_ms / 1e3
+    return *notes, f"{index.dropouts} dropouts of the logger, {lost:.1f} s in all"
 
 
 def _stream(convert: Converter, instance: int, records: Records) -> _Stream | None:
@@ -162,13 +162,13 @@ def _in_order(streams: list[_Stream]) -> Iterator[Sample]:
     order = np.argsort(np.concatenate([s.t for s in streams]), kind="stable")
     for start in range(0, len(order), BLOCK):
         block = order[start : start + BLOCK]
-        placed: list[Sample | None] = [None] * len(block)
-        for k in np.unique(whose[block]).tolist():
-            places = np.flatnonzero(whose[block] == k)
-            samples = streams[k].samples(block[places] - first[k])
-            for place, sample in zip(places.tolist(), samples, strict=True):
-                placed[place] = sample
-        yield from (sample for sample in placed if sample is not None)
+        samples: list[Sample] = []
+        places = []
+        with no_collection():
+            for k in np.unique(whose[block]).tolist():
+                places.append(np.flatnonzero(whose[block] == k))
+                samples += streams[k].samples(block[places[-1]] - first[k])
+        yield from map(samples.__getitem__, np.argsort(np.concatenate(places)).tolist())
 
 
 def _three(columns: Columns, name: str) -> list[tuple[float, float, float]]:
@@ -188,27 +188,27 @@ def _floats(columns: Columns, name: str) -> list[float]:
     return values
 
 
-def sensor_combined(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def sensor_combined(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Primary accelerometer and gyroscope, corrected, body frame."""
     f_b, w_b = _three(columns, "accelerometer_m_s2"), _three(columns, "gyro_rad")
-    return [ImuSample(at, 1, f, w) for at, f, w in zip(t.tolist(), f_b, w_b, strict=True)]
+    return samples_of(ImuSample, t.tolist(), [1] * len(t), f_b, w_b)
 
 
-def vehicle_acceleration(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def vehicle_acceleration(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """The same accelerometer, filtered, where sensor_combined was not logged."""
-    return [ImuSample(at, 1, f) for at, f in zip(t.tolist(), _three(columns, "xyz"), strict=True)]
+    return samples_of(ImuSample, t.tolist(), [1] * len(t), _three(columns, "xyz"))
 
 
-def vehicle_attitude(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def vehicle_attitude(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Quaternion (w, x, y, z) from body to NED, to roll, pitch, yaw."""
     w, x, y, z = (columns[f"q[{i}]"].astype(np.float64) for i in range(4))
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return list(map(AttitudeSample, t.tolist(), roll.tolist(), pitch.tolist(), yaw.tolist()))
+    return samples_of(AttitudeSample, t.tolist(), roll.tolist(), pitch.tolist(), yaw.tolist())
 
 
-def gps(t: Floats, columns: Columns, instance: int) -> list[Sample]:
+def gps(t: Floats, columns: Columns, instance: int) -> Sequence[Sample]:
     """sensor_gps or vehicle_gps_position; integer degrees 1e-7 and millimetres in old logs."""
     new = "latitude_deg" in columns
     names = ("latitude_deg", "longitude_deg", "altitude_msl_m") if new else ("lat", "lon", "alt")
@@ -249,7 +249,7 @@ def gps(t: Floats, columns: Columns, instance: int) -> list[Sample]:
     return samples
 
 
-def gps_integrity(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def gps_integrity(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Jamming and spoofing states of a GPS topic that has them."""
     jammed = columns["jamming_state"] >= JAMMED
     spoofed = columns["spoofing_state"] >= JAMMED
@@ -259,7 +259,7 @@ def gps_integrity(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
     ]
 
 
-def vehicle_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def vehicle_status(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Armed, and the kind of vehicle."""
     armed = columns["arming_state"] == ARMED
     kinds = _integers(columns.get("vehicle_type", np.zeros(len(t))))
@@ -269,45 +269,43 @@ def vehicle_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
     ]
 
 
-def vehicle_land_detected(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def vehicle_land_detected(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Landed."""
     landed = columns["landed"]
     return [VehicleState(at, landed=bool(x)) for at, x in zip(t.tolist(), landed, strict=True)]
 
 
-def airspeed(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def airspeed(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """True airspeed."""
     values = _floats(columns, "true_airspeed_m_s")
     return [AirData(at, airspeed=v) for at, v in zip(t.tolist(), values, strict=True)]
 
 
-def battery_status(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def battery_status(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Voltage and current."""
-    values = zip(
-        t.tolist(), _floats(columns, "voltage_v"), _floats(columns, "current_a"), strict=True
-    )
-    return [Battery(at, volts, amperes) for at, volts, amperes in values]
+    volts, amperes = _floats(columns, "voltage_v"), _floats(columns, "current_a")
+    return samples_of(Battery, t.tolist(), volts, amperes)
 
 
-def actuator_outputs(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def actuator_outputs(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Pulse widths of the main outputs, microseconds."""
     return _outputs(t, columns, "output", normalised=False)
 
 
-def actuator_motors(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def actuator_motors(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """Commands of the motors, 0 to 1; NaN for those that are not there."""
     return _outputs(t, columns, "control", normalised=True)
 
 
-def _outputs(t: Floats, columns: Columns, name: str, *, normalised: bool) -> list[Sample]:
+def _outputs(t: Floats, columns: Columns, name: str, *, normalised: bool) -> Sequence[Sample]:
     used = [f"{name}[{k}]" for k in range(MOST_OUTPUTS) if f"{name}[{k}]" in columns]
     if not used:
         raise KeyError(name)
-    rows = zip(*(_floats(columns, column) for column in used), strict=True)
-    return [Outputs(at, row, normalised) for at, row in zip(t.tolist(), rows, strict=True)]
+    rows = list(zip(*(_floats(columns, column) for column in used), strict=True))
+    return samples_of(Outputs, t.tolist(), rows, [normalised] * len(t))
 
 
-def wind(t: Floats, columns: Columns, _instance: int) -> list[Sample]:
+def wind(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
     """The autopilot's own estimate."""
     north, east = _floats(columns, "windspeed_north"), _floats(columns, "windspeed_east")
     return [

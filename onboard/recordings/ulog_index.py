@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.errors import RecordingError
+from onboard.recordings.pace import Pace, chain
 from onboard.recordings.ulog_types import Layout, Types
 
 Bytes = bytes | mmap
@@ -49,9 +50,9 @@ class Topic:
         if not self.offsets:
             return np.zeros(0, self.layout.dtype)
         size = self.layout.dtype.itemsize
-        window = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
-        records: Records = window[np.frombuffer(self.offsets, np.int64)].view(self.layout.dtype)
-        return records[:, 0]
+        # At every byte a record might begin: overlapping ones, of which some are taken.
+        everywhere: Records = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
+        return everywhere[np.frombuffer(self.offsets, np.int64)].view(self.layout.dtype)
 
 
 @dataclass(slots=True)
@@ -62,6 +63,8 @@ class UlogIndex:
     initial: dict[str, float] = field(default_factory=dict)
     changed: list[tuple[int, str, float]] = field(default_factory=list)
     damaged_places: int = 0
+    skipped_bytes: int = 0
+    cut_off_bytes: int = 0
     dropouts: int = 0
     dropped_ms: int = 0
 
@@ -77,6 +80,12 @@ class _Walk:
         self._layouts: dict[str, Layout | None] = {}
         self._topic_of: dict[int, Topic] = {}
         self._others: set[int] = set()
+        # Sizes (with the number) that records may have, by the number of the topic; 0 to none.
+        self._least = np.full(65536, 65535, np.uint16)
+        self._most = np.zeros(65536, np.uint16)
+        self._bytes = np.frombuffer(data, np.uint8)
+        self._words = np.ndarray((len(data) - 1,), "<u2", data, strides=(1,))
+        self._stamps = np.ndarray((len(data) - 7,), "<u8", data, strides=(1,))
         self._defining = True
         self._time = 0
         self._jumps: list[int] = []
@@ -94,7 +103,16 @@ class _Walk:
         data, end = self.data, len(self.data)
         at = HEADER_LENGTH
         whole = True
+        index, pace = self.index, Pace()
         while at + _HEAD.size <= end:
+            if pace.strides(at):
+                last = self._jumps[0] if self._jumps else end
+                stop = min(at + pace.length, last)
+                following = self._stride(at, stop, last)
+                pace.took(following, whole=following >= stop - _HEAD.size and following > at)
+                if following > at:
+                    at, whole = following, True
+                    continue
             size, kind = _HEAD.unpack_from(data, at)
             body, stop = at + _HEAD.size, at + _HEAD.size + size
             if self._jumps and stop > self._jumps[0]:
@@ -103,12 +121,37 @@ class _Walk:
             if kind in KINDS and stop <= end:
                 handler = self._handlers.get(kind)
                 good = handler is None or handler(body, stop)
-                at = stop
+                following = stop
             else:
-                at, good = self._resume(at, size, kind, end)
-            if whole and not good:
-                self.index.damaged_places += 1
-            whole = good
+                following, good = self._resume(at, size, kind, end)
+                if good and following == end < stop:
+                    index.cut_off_bytes += end - at
+            if not good:
+                index.damaged_places += whole
+                index.skipped_bytes += following - at
+            at, whole = following, good
+        index.cut_off_bytes += max(0, end - at)
+
+    def _stride(self, at: int, stop: int, last: int) -> int:
+        """Take records that begin before ``stop`` and end by ``last``; where it goes on."""
+        kinds = self._bytes[at + 2 : min(stop, last - 2)]
+        starts = at + np.flatnonzero(kinds == ord("D"))
+        numbers, sizes = self._words[starts + _HEAD.size], self._words[starts]
+        known = (self._least[numbers] <= sizes) & (sizes <= self._most[numbers])
+        following = starts + _HEAD.size + sizes
+        known &= following <= last
+        starts, following, numbers = starts[known], following[known], numbers[known]
+        if not len(starts) or starts[0] != at:
+            return at
+        taken = chain(starts, following)
+        offsets, numbers = starts[taken] + _HEAD.size + 2, numbers[taken]
+        for number in np.unique(numbers).tolist():
+            topic = self._topic_of.get(number)
+            if topic is not None:
+                its = offsets[numbers == number]
+                topic.offsets.frombytes(its.tobytes())
+                self._time = max(self._time, int(self._stamps[its + topic.layout.timestamp].max()))
+        return int(following[taken[-1]])
 
     def _resume(self, at: int, size: int, kind: int, end: int) -> tuple[int, bool]:
         """Where to go on after a message that is none, and whether it may be of a new kind."""
@@ -148,6 +191,7 @@ class _Walk:
         name = bytes(self.data[body + 3 : min(stop, body + 80)]).decode("ascii", "replace")
         self._topic_of.pop(number, None)
         self._others.add(number)
+        self._least[number], self._most[number] = 2, 65535
         if name not in self.wanted:
             return True
         if name not in self._layouts:
@@ -159,6 +203,8 @@ class _Walk:
         if topic.layout != layout:
             return False
         self._topic_of[number] = topic
+        self._least[number] = 2 + layout.dtype.itemsize
+        self._most[number] = min(2 + layout.longest, 65535)
         return True
 
     def _parameter(self, body: int, stop: int) -> bool:

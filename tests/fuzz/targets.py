@@ -31,6 +31,8 @@ from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
 from onboard.push.journal import Journal
+from onboard.recordings import dataflash, ulog
+from onboard.recordings.arrays import read_arrays
 from onboard.recordings.opening import open_recording
 from onboard.web.page import status_page
 from tests.daemon.blank_snapshot import blank_snapshot
@@ -105,6 +107,7 @@ def recording(data: bytes, name: str = "x") -> int:
         opened = open_recording(path)
         if not opened.duration_s >= 0.0:
             raise AssertionError(f"lasts {opened.duration_s} s")
+        read_arrays(path, (*dataflash.WANTED, *Decoder.names, *ulog.CONVERTERS))
         return sum(1 for _ in opened.samples())
 
 
