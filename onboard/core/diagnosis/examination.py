@@ -22,12 +22,17 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.refused import Refused
 from onboard.core.filter.traces import EpochTrace, PassResult
+from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import Effect
+
+VELOCITY = ("velocity", "recovery")
+"""Gates that refuse a velocity."""
 
 
 class Examination(Engine):
@@ -42,6 +47,7 @@ class Examination(Engine):
         batches: Sequence[Batch] | None = None,
         start: Engine | None = None,
         point: Linearisation | None = None,
+        refused: Refused | None = None,
     ) -> None:
         """Take the flight of ``like``, more families, and where to start.
 
@@ -52,6 +58,7 @@ class Examination(Engine):
             t0: when a clock that runs off was right, s.
             start: an examination whose linearisation and noise are taken over.
             point: another linearisation than that.
+            refused: velocities that are refused, and no others; None: what the gates judge.
         """
         origin = start or like
         point = replace(point or origin.point, skew_from=t0)
@@ -63,9 +70,11 @@ class Examination(Engine):
             like.prior,
             point,
             origin.noise,
+            uses=Uses(refused=refused),
             more=tuple(families),
             observer=self,
         )
+        self._like = like
         self.batches = list(like.batches if batches is None else batches)
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
@@ -120,6 +129,14 @@ class Examination(Engine):
         made._seed = self._seed
         made.once()
         return made
+
+    def refused_velocities(self) -> Refused:
+        """Those that the gates have refused in the last pass, or in that of the one it is like."""
+        if not self.traces and isinstance(self._like, Examination):
+            return self._like.refused_velocities()
+        named = [(x.t, n) for x in self.traces for n in x.refused if n in VELOCITY]
+        stamps = self.point.stamp(np.array([t for t, _ in named]))
+        return Refused(zip(stamps.tolist(), (n for _, n in named), strict=True))
 
     @property
     def absent(self) -> Array:

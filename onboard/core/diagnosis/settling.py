@@ -74,6 +74,7 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
         t0=full.point.skew_from,
         start=full,
         point=moved(full.point, model, fit.theta),
+        refused=full.refused_velocities(),
     )
     theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
     mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
@@ -85,7 +86,13 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
 
 def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:
     """Another model than the final one, from where that one has come to."""
-    return Examination(full, families, t0=full.point.skew_from, start=final)
+    return Examination(
+        full,
+        families,
+        t0=full.point.skew_from,
+        start=final,
+        refused=full.refused_velocities(),
+    )
 
 
 def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:

@@ -95,7 +95,16 @@ class InnovationGates:
         self._off_since: dict[str, float] = {}
 
     def judge(
-        self, t: float, kinds: str, E: Array, y: Array, h: Array, theta: Array, C: Array
+        self,
+        t: float,
+        kinds: str,
+        E: Array,
+        y: Array,
+        h: Array,
+        theta: Array,
+        C: Array,
+        *,
+        velocity: str | None = None,
     ) -> GateRefusal | None:
         """Find the first measurement whose innovation is impossible, given all uncertainty.
 
@@ -107,6 +116,7 @@ class InnovationGates:
             h: (r, m) their regressors.
             theta: (m,) estimate.
             C: (m, m) covariance of it.
+            velocity: which gate refuses it, where that is known, empty for none; None: judge it.
 
         Returns:
             None if all may be used.
@@ -120,6 +130,10 @@ class InnovationGates:
                 continue
             here = slice(at, at + n)
             at += n
+            if kind == "v" and velocity is not None:
+                if velocity:
+                    return GateRefusal(velocity)
+                continue
             nis = sum(squares[here])
             if nis > limit:
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.

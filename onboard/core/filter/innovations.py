@@ -8,6 +8,7 @@ velocity, height (of which only the component down counts) and attitude: (7, m +
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -90,6 +91,7 @@ class Epoch:
         along_velocity: (m,) regressors of the position as multiples of the velocity, s per unit.
         trusted: whether the receiver is to be believed.
         noise: (7,) variances beside those of the levels.
+        stamp: the receiver's, on the boot clock, s: whatever latency is taken out of ``t``.
     """
 
     t: float
@@ -102,6 +104,7 @@ class Epoch:
     along_velocity: Array
     trusted: bool
     noise: Array = field(default_factory=lambda: np.zeros(MEASURED))
+    stamp: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -153,6 +153,7 @@ def _epochs(
             c.along_velocity[e],
             bool(trusted[e]),
             noise[e],
+            float(fixes.t[e]),
         )
         for e in range(len(fixes))
     ]

@@ -42,6 +42,7 @@ from onboard.core.filter.limits import (
 )
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
+from onboard.core.filter.refused import Refused
 from onboard.core.filter.state import ATT, BIAS, CH, PSI, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
@@ -63,6 +64,8 @@ class Uses:
         recorded_attitude: take it for exact instead.
         earth: rotation of the earth and of the local frame.
         gates: refuse what is impossible.
+        refused: velocities that are refused whatever they are, and no others; None: those that are
+            impossible.  Models can only be compared on the same measurements.
     """
 
     height: bool = True
@@ -70,6 +73,7 @@ class Uses:
     recorded_attitude: bool = False
     earth: bool = True
     gates: bool = True
+    refused: Refused | None = None
 
 
 class WhiteningFilter:
@@ -210,7 +214,10 @@ class WhiteningFilter:
             refusal = None
             if self._gates is not None:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
-                refusal = self._gates.judge(epoch.t, kinds, made.E, y, h, theta, covariance)
+                known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
+                refusal = self._gates.judge(
+                    epoch.t, kinds, made.E, y, h, theta, covariance, velocity=known
+                )
             if refusal is None:
                 if self._gates is not None:
                     made = self._in_tail(made, z, kinds, white, theta, covariance)

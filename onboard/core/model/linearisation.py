@@ -47,6 +47,11 @@ class Linearisation:
         out: Array = stamp - self.delay - self.skew * (stamp - self.skew_from)
         return out
 
+    def stamp(self, true_time: Array) -> Array:
+        """Inverse of :meth:`true_time`, s."""
+        out: Array = (true_time + self.delay - self.skew * self.skew_from) / (1.0 - self.skew)
+        return out
+
     @property
     def moving(self) -> tuple[float, float, float, float]:
         """What has been taken in of the unknowns :data:`MOVING`."""
