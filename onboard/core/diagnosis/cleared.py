@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
@@ -53,7 +54,12 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
         fault, batches = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
-        full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+        refused = refused_beside_a_jump(full, fault, origin.t0)
+        if refused is not None:
+            fault, batches = None, full.batches
+        full = Examination(
+            engine, testable, t0=origin.t0, batches=batches, refused=refused
+        ).with_noise()
     return Cleared(full, testable, absent, rail, fault, clipped)
 
 

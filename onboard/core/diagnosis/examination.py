@@ -118,6 +118,11 @@ class Examination(Engine):
             held, blind = None, False
         return self
 
+    def beside(self, more: Sequence[Family], refused: Refused | None = None) -> Examination:
+        """The same flight and columns with more of them, from where this one has come to."""
+        families = (*self._more, *more)
+        return Examination(self, families, t0=self.point.skew_from, start=self, refused=refused)
+
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is believed as little as may be.
 
@@ -129,6 +134,11 @@ class Examination(Engine):
         made._seed = self._seed
         made.once()
         return made
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the whole flight in the last pass, the unknowns integrated out with their prior."""
+        return self._pass.log_likelihoods()[0]
 
     def refused_velocities(self) -> Refused:
         """Those that the gates have refused in the last pass, or in that of the one it is like."""

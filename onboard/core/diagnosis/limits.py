@@ -78,6 +78,9 @@ FEWEST_FIXES: Final = 5
 """Fixes from which dead reckoning can be compared [tuned]."""
 SAME: Final = 0.5
 """Share of its size by which an error may change and be the same error [tuned]."""
+JUMP_SHARE: Final = 0.5
+"""Share of a fault's velocities that may still be refused beside a jump which is there instead:
+beside one that is there nearly none is, and a fault is refused beside any jump, too [bound]."""
 LONGEST_FAULT_S: Final = 120.0
 """s; what lasts longer is how the receiver is [tuned]."""
 SAME_FIX_S: Final = 0.1

@@ -13,12 +13,17 @@ class Refused:
 
     def __init__(self, named: Iterable[tuple[float, str]]) -> None:
         """Take stamps, s, and the names of the gates; a stamp is known within a millisecond."""
+        self._named = tuple(named)
         self._names = {
             near: name
-            for stamp, name in named
+            for stamp, name in self._named
             for at in [round(stamp * PER_SECOND)]
             for near in (at - 1, at, at + 1)
         }
+
+    def items(self) -> tuple[tuple[float, str], ...]:
+        """Stamps and names."""
+        return self._named
 
     def by(self, stamp: float) -> str:
         """The gate that has refused it; empty if it was taken."""

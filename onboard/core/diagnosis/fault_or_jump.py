@@ -1,0 +1,50 @@
+"""Velocities that contradict dead reckoning: the receiver's fault, or the accelerometer's jump.
+
+After a jump of its offset, dead reckoning runs away from a receiver that is right, and a gate
+refuses one velocity after the other.  So both are tried on the same measurements: each refused one
+may be anything at all, which has its price in likelihood; a jump has three unknowns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.diagnosis.examination import VELOCITY, Examination
+from onboard.core.diagnosis.jumps import jump_near
+from onboard.core.diagnosis.limits import CLEARLY, FORGOTTEN_S, JUMP_SHARE
+from onboard.core.filter.refused import Refused
+from onboard.core.physics.finding import Finding
+
+
+def refused_beside_a_jump(full: Examination, fault: Finding, t0: float) -> Refused | None:
+    """What is still refused if the accelerometer has jumped where a fault seems to begin.
+
+    Args:
+        full: the flight with every column, its sums made.
+        fault: velocities that seem to be false.
+        t0: s on the boot clock, from which its intervals count.
+
+    Returns:
+        None if it is rather a fault: beside a jump most of it is refused as before, or all in all
+        the flight is not clearly likelier.
+    """
+    start = fault.intervals[0][0] + t0
+    if start < full.blocks[0].start + FORGOTTEN_S:
+        return None
+    inside = [(stamp, VELOCITY[0]) for stamp in _stamps(full, fault, t0)]
+    faulty = Refused([*inside, *full.refused_velocities().items()])
+    as_fault = full.beside((), faulty).with_rows()
+    as_jump = full.beside((jump_near(full, (), start),)).with_rows()
+    still, were = (sum(made.refused[name] for name in VELOCITY) for made in (as_jump, as_fault))
+    likelier = as_jump.log_likelihood - as_fault.log_likelihood > CLEARLY / 2.0
+    return as_jump.refused_velocities() if likelier and still < JUMP_SHARE * were else None
+
+
+def _stamps(full: Examination, fault: Finding, t0: float) -> list[float]:
+    """Those of velocities in the fault's intervals."""
+    stamps: list[float] = []
+    for batch in full.batches:
+        t = full.point.true_time(batch.fixes.t) - t0
+        inside = np.any([(t >= a) & (t <= b) for a, b in fault.intervals], axis=0)
+        stamps += batch.fixes.t[inside & batch.trusted].tolist()
+    return stamps
