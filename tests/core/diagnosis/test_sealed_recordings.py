@@ -122,6 +122,34 @@ def test_a_copters_jump_does_not_pass_for_noise_and_is_said_to_be_on_its_axis(se
 
 
 @pytest.mark.slow
+def test_a_jump_from_which_dead_reckoning_runs_away_is_no_fault_of_the_receiver():
+    step = concealed.BiasStep(time=80.0, x=0.7, y=-0.7, z=0.35)
+    arm = concealed.GpsLeverArm(x=1.0, y=-0.5, z=0.3)
+    said, first = diagnosed("plane", 131183, step, arm, duration=170.0)
+    assert {e.name for e in said.effects} == {"bias_step", "gps_lever_arm"}
+    found = next(e for e in said.effects if e.name == "bias_step")
+    assert abs(found.unknowns["time"].value + first - step.time) < 2.0
+    for axis in "xyz":
+        assert found.unknowns[axis].value == pytest.approx(getattr(step, axis), rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [6, 15])
+def test_a_far_antenna_does_not_make_latency_and_averaging_run_away(seed):
+    # A copter that hovers and swings: the arm accelerates the antenna more than the flight does.
+    arm = concealed.GpsLeverArm(x=0.8, y=-0.5, z=-0.4)
+    imus = random_imus(seed)
+    said, _ = diagnosed("copter", seed, arm, duration=150.0, imus=imus, gps=GpsTruth())
+    found = next(e for e in said.effects if e.name == "gps_lever_arm")
+    for axis in "xyz":
+        q = found.unknowns[axis]
+        assert abs(q.value - getattr(arm, axis)) < min(4.0 * q.sigma, 0.05)
+    six = said.calibration
+    off = np.subtract((*six.scale, *six.offset), (*imus[0].scale, *imus[0].offset))
+    assert np.max(np.abs(off) / (*six.scale_sigma, *six.offset_sigma)) < 4.0
+
+
+@pytest.mark.slow
 def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_confounder():
     # In a hover's force, 24 r / g of a squared window is an antenna r higher.
     averaging = replace(PROMPT, smoothing=0.3)
