@@ -89,3 +89,9 @@ class GroundStation:
 def six(autopilot):
     """The six parameters of the first accelerometer."""
     return np.array([autopilot.parameters[name] for name in parameter_names(1).six])
+
+
+def level_force(numbers):
+    """What a z axis at rest and level is taken to feel by six numbers, of the true one's raw."""
+    raw = -9.80665 / TRUE_SIX[2] + TRUE_SIX[5]
+    return numbers[2] * (raw - numbers[5])

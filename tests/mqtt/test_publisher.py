@@ -24,6 +24,9 @@ async def test_everything_retained_is_there_for_whoever_comes_late(broker, publi
     async with publishing(broker.port) as publisher:
         publisher.publish(snapshot(diagnosis=DIAGNOSIS))
         await kinds(publisher, "mqtt_connected")
+        async with Subscriber(broker.client()) as early:
+            for topic in ("availability", "state", "calibration", "diagnosis"):
+                await early.payload(f"onboard/1/{topic}")
         async with Subscriber(broker.client()) as late:
             assert await late.payload("onboard/1/availability") == b"online"
             state = Snapshot.from_json(await late.payload("onboard/1/state"))
@@ -48,7 +51,9 @@ async def test_only_what_changed_is_sent_and_every_event_once_in_order(broker, p
         assert not any(m.retain for m in station.messages if str(m.topic).endswith("event"))
 
 
-async def test_a_broker_that_forgot_everything_has_it_back(tmp_path, publishing):
+async def test_a_broker_that_forgot_everything_has_it_back(tmp_path, publishing, monkeypatch):
+    # However slow the machine is, these connections are short ones.
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.STABLE_S", 600.0)
     async with Broker(tmp_path) as broker, publishing(broker.port) as publisher:
         publisher.publish(snapshot(diagnosis=DIAGNOSIS))
         await kinds(publisher, "mqtt_connected")
