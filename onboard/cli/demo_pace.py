@@ -10,12 +10,15 @@ if TYPE_CHECKING:
     from onboard.daemon.process.service import Service
 
 LOOK_S = 0.5
+"""s between two looks at what was lost: some hundred messages at real time, enough for a share of a
+hundredth [cost]."""
 LOST_SHARE = 0.01
-"""Of the messages; a flight with more gaps than this is not the one that was to be shown."""
+"""Of the messages: with more gaps a flight is not the one that was to be shown [use]."""
 SLOWER, FASTER = 0.5, 1.1
-"""Losses cost half the pace at once, and it comes back slowly: as for any sender that feels for
-what a line takes."""
+"""Losses cost half the pace at once, and it comes back slowly, as for any sender that feels for
+what a line takes; nothing is decided by it but how long the show lasts [cost]."""
 SLOWEST = 1.0
+"""Times real time, which is how a real vehicle flies [physics]."""
 
 
 class Paced(Protocol):

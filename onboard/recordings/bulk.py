@@ -6,14 +6,18 @@ import gc
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, fields
 from itertools import repeat
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 S = TypeVar("S")
+D = TypeVar("D", bound="DataclassInstance")
 
 
-def samples_of(kind: type[S], *columns: Sequence[object]) -> list[S]:
+def samples_of(kind: type[D], *columns: Sequence[object]) -> list[D]:
     """Samples of one kind; the same as calling ``kind`` for each row, in a third of the time.
 
     The constructor of a frozen dataclass sets one field after the other by interpreted calls.  Here
@@ -27,7 +31,7 @@ def samples_of(kind: type[S], *columns: Sequence[object]) -> list[S]:
     Raises:
         ValueError: the columns are not of one length, or too few, or too many.
     """
-    fields_: tuple[Field[Any], ...] = fields(kind)  # type: ignore[arg-type]
+    fields_ = fields(kind)
     n = len(columns[0]) if columns else 0
     if any(len(column) != n for column in columns):
         raise ValueError(f"columns of {kind.__name__} are not of one length")

@@ -26,7 +26,7 @@ from onboard.recordings.dataflash_walk import MAGIC
 from onboard.recordings.recording import Recording, damage_notes, elapsed_s
 
 BLOCK = 4096
-"""Records converted at a time: bounds the memory, whatever the length of the log."""
+"""Records converted at a time: bounds the memory, whatever the length of the log [cost]."""
 WANTED = frozenset(CONVERTERS) | {"GPA"}
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Records = NDArray[np.void]
 
 HEADER_LENGTH = 3
+"""bytes: two of magic, one of type [data sheet: LogStructure of ArduPilot]."""
 FIELD_TYPES: dict[str, tuple[str, float]] = {
     "a": ("(32,)<i2", 1.0),
     "b": ("i1", 1.0),
@@ -37,7 +38,7 @@ FIELD_TYPES: dict[str, tuple[str, float]] = {
 """Format letter to numpy type and the divisor that makes the field a physical number."""
 SIZES = {letter: np.dtype(form).itemsize for letter, (form, _) in FIELD_TYPES.items()}
 LARGEST = 2.0**53
-"""Whole numbers below it are exact as floating-point ones."""
+"""Whole numbers below it are exact as floating-point ones [physics: 53 bits of a double]."""
 NOT_NUMBERS = "anNZ"
 
 

@@ -44,7 +44,8 @@ MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
 LONGEST_SILENCE_S = 2.0
-"""An accuracy that was told longer ago is of no use."""
+"""s; an accuracy that was told longer ago is of no use: the slowest receivers measure once a
+second, and one of their records may be missing [data sheet]."""
 HDOP_UNKNOWN = 99.0
 CLIPS = ("Clip", "Clip0", "Clip1", "Clip2")
 STATUS_BITS = 0x3FF

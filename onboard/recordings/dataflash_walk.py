@@ -24,9 +24,12 @@ Integers: TypeAlias = NDArray[np.int64]
 MAGIC = b"\xa3\x95"
 FMT_TYPE = 0x80
 FMT_LENGTH = 89
+"""Type and bytes, header included, of the record that describes the others [data sheet:
+LogStructure of ArduPilot]."""
 PADDING = b"\x00\xff"
 MOST_FORMATS = 4096
-"""Layouts of wanted records in one file: a log has 20, and as many for each that was joined."""
+"""Layouts of wanted records in one file: a log has 20, and as many for each that was joined.  More
+is no log, and each costs memory [bound]."""
 
 
 class Stride(NamedTuple):

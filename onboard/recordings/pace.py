@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 Integers: TypeAlias = NDArray[np.int64]
 
 SHORTEST, LONGEST = 1 << 12, 1 << 17
-"""bytes"""
+"""bytes of a stride: shorter ones are no faster than steps, longer ones take memory [cost]."""
 FEWEST, MOST = 512, 8192
-"""records"""
+"""records that are copied at a time: fewer are slow, more take memory beside the copies [cost]."""
 MOST_DECEPTIONS = 64
-"""Places in one stride that look like the beginning of something but stand inside another thing."""
+"""Places in one stride that look like the beginning of something but stand inside another thing:
+past it steps are faster.  The answer is the same either way [cost]."""
 
 
 @dataclass(slots=True)

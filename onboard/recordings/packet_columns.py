@@ -21,11 +21,13 @@ Octets: TypeAlias = NDArray[np.uint8]
 Integers: TypeAlias = NDArray[np.int64]
 
 STAMP_LENGTH = 8
+"""bytes before each packet: microseconds since 1970 [data sheet: the .tlog format]."""
 HEADER_V1, HEADER_V2 = 6, 10
 CHECKSUM, SIGNATURE = 2, 13
 LONGEST_PACKET = 280
+"""bytes: a header, 255 of payload, checksum and signature [data sheet: MAVLink 2]."""
 WIDTHS = (32, 64, 128, LONGEST_PACKET)
-"""Packets are summed in groups of about one length."""
+"""Packets are summed in groups of about one length [cost]."""
 POLYNOMIAL = 0x8408
 """Of CRC-16/MCRF4XX, the least bit first."""
 LETTERS = {"c": "S1", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4",

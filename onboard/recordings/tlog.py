@@ -51,7 +51,7 @@ INERTIAL = {
 """Inertial messages: their time field, which is the first, and its ticks per second."""
 HEARTBEAT_LENGTH = 9
 BLOCK = 2048
-"""Packets decoded at a time: bounds the memory, whatever the length of the log."""
+"""Packets decoded at a time: bounds the memory, whatever the length of the log [cost]."""
 WANTED = message_ids(Decoder.names)
 AUTOPILOTS = {
     mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",

@@ -34,7 +34,7 @@ Converter = Callable[[Floats, Columns, int], Sequence[Sample]]
 
 MAGIC = b"ULog"
 BLOCK = 4096
-"""Records converted at a time: bounds the memory, whatever the length of the log."""
+"""Records converted at a time: bounds the memory, whatever the length of the log [cost]."""
 ARMED = 2
 KINDS = {1: "copter", 2: "plane", 3: "rover"}
 """vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""

@@ -91,7 +91,7 @@ def six(autopilot):
     return np.array([autopilot.parameters[name] for name in parameter_names(1).six])
 
 
-def level_force(numbers):
-    """What a z axis at rest and level is taken to feel by six numbers, of the true one's raw."""
-    raw = -9.80665 / TRUE_SIX[2] + TRUE_SIX[5]
-    return numbers[2] * (raw - numbers[5])
+def level_error(numbers, true=TRUE_SIX):
+    """Error of the force, m/s^2, that six numbers make of a z axis at rest and level."""
+    raw = -9.80665 / true[2] + true[5]
+    return numbers[2] * (raw - numbers[5]) + 9.80665

@@ -6,7 +6,7 @@ import pytest
 from onboard.answers.replay import read
 from onboard.core.estimate.calibrator import Calibrator
 from tests.daemon.daemons import held_back, until
-from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, level_force, six
+from tests.daemon.flights import SPEEDUP, TRUE_SIX, GroundStation, flying, level_error, six
 
 pytestmark = pytest.mark.virtual_time
 
@@ -54,7 +54,7 @@ async def test_it_flies_calibrates_lands_pushes_and_reads_back(in_a_hurry, daemo
         assert np.all(np.abs(error[:3]) < 0.01)
         assert np.all(np.abs(error[3:5]) < 0.05)
         # z scale and offset of a short flight are known better together than each by itself.
-        assert abs(level_force(estimate) - level_force(TRUE_SIX)) < 0.05
+        assert abs(level_error(estimate)) < 0.05
         # What the autopilot has now is what was proposed, and better than what it had.
         planned = service.parts.journal.last_completed(1).plan
         assert six(autopilot) == pytest.approx(list(planned.wanted.values()), abs=1e-7)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 from zlib import crc32
 
 import msgspec
@@ -27,6 +28,7 @@ from onboard.daemon.pushing.parameters import ParameterWatch
 from onboard.daemon.setup import configuration, secret_files, settings
 from onboard.daemon.view.history import History
 from onboard.daemon.view.journal_lines import journal_view
+from onboard.daemon.view.notices import Notices
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
@@ -227,8 +229,8 @@ async def _asked(data: bytes) -> bytes:
 
 def mqtt(data: bytes) -> object:
     """A command."""
-    notices = SimpleNamespace(post=lambda *_args, **_keywords: None)
-    commands = Commands(Recorded(), notices, Counter())  # type: ignore[arg-type]
+    notices = cast("Notices", SimpleNamespace(post=lambda *_args, **_keywords: None))
+    commands = Commands(Recorded(), notices, Counter())
     return asyncio.run(commands.take(data, retained=False))
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pymavlink import mavutil
-from pymavlink.DFReader import DFReader_binary
 from pyulog.core import ULog
 
 from onboard.errors import RecordingError
@@ -23,6 +22,7 @@ from onboard.recordings.packet_columns import layout
 from onboard.recordings.ulog import CONVERTERS
 from onboard.recordings.ulog_index import columns_of
 from tests.recordings.dataflash_writer import DataflashWriter, modern_log, old_log
+from tests.recordings.oracles import pymavlink_records
 from tests.recordings.telemetry_writer import TelemetryWriter, px4_log, telemetry
 
 
@@ -39,13 +39,7 @@ def listed(values: np.ndarray) -> list:
 
 def compared_with_pymavlink(path: Path, names: tuple[str, ...]) -> int:
     """Every field of a DataFlash log; how many values were compared."""
-    oracle: dict[str, list] = {}
-    reader = DFReader_binary(str(path))
-    try:
-        while (message := reader.recv_msg()) is not None:
-            oracle.setdefault(message.get_type(), []).append(message)
-    finally:
-        reader.close()
+    oracle = pymavlink_records(path)
     tables = read_arrays(path, names).tables
     assert tables.keys() == oracle.keys() & set(names)
     compared = 0

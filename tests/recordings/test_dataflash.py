@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pymavlink.DFReader import DFReader_binary
 
 from onboard.core.inputs.samples import (
     AttitudeSample,
@@ -22,6 +21,7 @@ from onboard.recordings.dataflash import WANTED
 from onboard.recordings.dataflash_index import index_dataflash
 from onboard.recordings.opening import open_recording
 from tests.recordings.dataflash_writer import DataflashWriter, modern_log, old_log
+from tests.recordings.oracles import pymavlink_records
 
 
 def saved(tmp_path: Path, data: object) -> Path:
@@ -37,13 +37,7 @@ def of_type(path: Path, kind: type) -> list:
 def check_against_oracle(path: Path) -> int:
     """Every field of every record that we read is what pymavlink's recv_msg gives."""
     index = index_dataflash(path.read_bytes(), WANTED)
-    oracle: dict[str, list] = {}
-    reader = DFReader_binary(str(path))
-    try:
-        while (message := reader.recv_msg()) is not None:
-            oracle.setdefault(message.get_type(), []).append(message)
-    finally:
-        reader.close()
+    oracle = pymavlink_records(path)
     compared = 0
     assert index.counts() == {name: len(m) for name, m in oracle.items() if name in WANTED}
     for slot, form in enumerate(index.formats):

@@ -15,6 +15,7 @@ from sitl.builtin.mission import Mission
 from sitl.builtin.server import Server
 from sitl.builtin.truth import ImuTruth, Truth
 from tests.daemon.daemons import until
+from tests.daemon.flights import level_error
 
 TRUTH = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.2, -0.15, 0.3))
 
@@ -57,12 +58,6 @@ def six(autopilot):
     return np.array([autopilot.parameters[name] for name in parameter_names(1).six])
 
 
-def level_force(numbers):
-    """What a z axis at rest and level is taken to feel by six numbers, of the true one's raw."""
-    raw = -9.80665 / TRUTH.scale[2] + TRUTH.offset[2]
-    return numbers[2] * (raw - numbers[5])
-
-
 @pytest.mark.slow
 async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
     browser, tmp_path, monkeypatch
@@ -97,7 +92,7 @@ async def test_what_is_approved_on_the_page_is_written_to_the_autopilot(
         assert np.all(error_after[:3] < 0.01)
         assert np.all(error_after[3:5] < 0.05)
         # z scale and offset of a short flight are known better together than each by itself.
-        assert abs(level_force(six(autopilot)) - level_force((*TRUTH.scale, *TRUTH.offset))) < 0.05
+        assert abs(level_error(six(autopilot), (*TRUTH.scale, *TRUTH.offset))) < 0.05
         assert np.all(error_after < error_before)
         await see(lambda: "INS_ACCSCAL_X: 1 -> " in browser.text("#journal-lines"))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 PER_SECOND = 1000
-"""Fixes are further apart than three of these [physics: no receiver measures so often]."""
+"""Resolution of a stamp, which goes through a latency and back.  Two fixes are further apart than
+the three milliseconds that one of them takes up [physics: no receiver measures so often]."""
 
 
 class Refused:
