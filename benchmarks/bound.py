@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
@@ -80,13 +80,13 @@ def _start(q: NoiseLevels) -> Array:
 def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
     """Noise added in a step, and what is kept of states 10 to 16."""
     keep = np.ones(7)
-    keep[:3] = np.exp(-step / ATTITUDE_TIME_S)
+    keep[:2], keep[2] = np.exp(-step / ATTITUDE_TIME_S), np.exp(-step / HEADING_TIME_S)
     keep[4:] = np.exp(-step / COLOUR_TIME_S)
     var = np.zeros(SIZE)
     var[V], var[PSI] = q.force_walk**2 * step, q.tilt_walk**2 * step
     var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
     slow = np.array([q.attitude, q.attitude, q.heading])
-    var[ATT] = slow**2 * (1.0 - keep[0] ** 2)
+    var[ATT] = slow**2 * (1.0 - keep[:3] ** 2)
     var[COLOUR] = q.velocity_colour**2 * (1.0 - keep[4] ** 2)
     return np.diag(var), keep
 

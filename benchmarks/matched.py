@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.recorded import Array, Flight
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 from sitl.builtin import rotation
@@ -120,9 +120,9 @@ def _mean(x: Array, window_s: float) -> Array:
     )
 
 
-def _gauss_markov(rng: np.random.Generator, n: int, step: float, time: float) -> Array:
-    """(n, 3) stationary, unit variance."""
-    keep = float(np.exp(-step / time))
+def _gauss_markov(rng: np.random.Generator, n: int, step: float, time: float | Array) -> Array:
+    """(n, 3) stationary, unit variance; ``time`` for all or (3,)."""
+    keep = np.exp(-step / time)
     fresh = rng.standard_normal((n, 3))
     fresh[1:] *= np.sqrt(1.0 - keep**2)
     out = np.empty((n, 3))
@@ -183,7 +183,8 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
     t, epochs = path.t[path.imu], path.t[path.epochs]
     nearest = np.clip(np.round((t - START_S) * GPS_HZ), 0, len(epochs) - 1).astype(int)
     white = q.attitude * rng.standard_normal((len(epochs), 3))[nearest]
-    slow = _gauss_markov(rng, len(t), 1.0 / IMU_HZ, ATTITUDE_TIME_S)
+    times = np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S])
+    slow = _gauss_markov(rng, len(t), 1.0 / IMU_HZ, times)
     slow *= (q.attitude, q.attitude, q.heading)
     body = np.array([*TILT_OFFSET * rng.standard_normal(2), 0.0])
     heading = np.array([0.0, 0.0, HEADING_OFFSET * rng.standard_normal()])

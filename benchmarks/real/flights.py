@@ -46,6 +46,7 @@ class Fit:
         in_force: (6,) scale and offset with which it was recorded.
         estimate: (6,) scale and offset.
         covariance: (6, 6) of it.
+        gyro_sigma: (6,) what of their sigmas comes from the gyroscope's axes.
         linear: (6,) the same as scale and beta, with the prior in it.
         linear_covariance: (6, 6) of that.
         prior: (6,) centre of the prior, scale and beta.
@@ -71,6 +72,7 @@ class Fit:
     in_force: Array
     estimate: Array
     covariance: Array
+    gyro_sigma: Array
     linear: Array
     linear_covariance: Array
     prior: Array
@@ -147,6 +149,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         in_force=six.as_vector(),
         estimate=np.array(c.scale + c.offset),
         covariance=np.array(c.covariance),
+        gyro_sigma=np.array(c.gyro_sigma),
         linear=solution.theta[:6].copy(),
         linear_covariance=solution.covariance[:6, :6].copy(),
         prior=engine.model.prior[:6].copy(),
@@ -224,6 +227,7 @@ def _failed(flight: RealFlight, imu: int, why: str) -> Fit:
         six,
         six,
         square,
+        six,
         six,
         square,
         six,

@@ -30,7 +30,7 @@ SHORT = {
     "attitude": "att",
     "heading": "head",
 }
-GATES = ("velocity", "recovery", "height", "attitude")
+GATES = ("velocity", "recovery", "height", "tilt", "heading")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +84,9 @@ def level_table(made: Sequence[Fit]) -> str:
 
 
 def gate_table(made: Sequence[Fit]) -> str:
-    """Inflation, averaging span, and what the gates refused, in per cent."""
+    """Inflation, averaging span, and what the gates refused or renewed, in per cent."""
     lines = [
-        f"{'flight, IMU':16}{'infl.':>6}{'span':>5}{'asked':>6}{'believed':>10}"
+        f"{'flight, IMU':16}{'infl.':>6}{'span':>5}{'asked':>6}{'believed':>9}"
         + "".join(f"{g[:5]:>6}" for g in GATES)
         + " verdict"
     ]
@@ -96,7 +96,7 @@ def gate_table(made: Sequence[Fit]) -> str:
         cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
         believed = f"{f.believed}/{f.epochs}"
         lines.append(
-            f"{_label(f)}{f.inflation:6.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>10}"
+            f"{_label(f)}{f.inflation:6.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>9}"
             f"{cells} {f.verdict.removesuffix('_explained')}"
         )
     return "\n".join(lines)
@@ -104,7 +104,7 @@ def gate_table(made: Sequence[Fit]) -> str:
 
 def _percent(f: Fit, gate: str) -> float:
     """Share of the epochs that could be refused."""
-    asked = f.epochs if gate == "attitude" else f.believed
+    asked = f.epochs if gate in {"tilt", "heading"} else f.believed
     return 100.0 * f.refused.get(gate, 0) / max(asked, 1)
 
 

@@ -137,7 +137,9 @@ def _own(one: Fit, other: Fit) -> tuple[Array, float]:
 
 def _single(fit: Fit) -> Single | None:
     in_force = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
-    return without_prior(fit.imu, in_force, fit.prior_sigma, fit.estimate, fit.covariance)
+    return without_prior(
+        fit.imu, in_force, fit.prior_sigma, fit.estimate, fit.covariance, fit.gyro_sigma
+    )
 
 
 def agreements(made: Sequence[Fit]) -> list[Agreement]:

@@ -106,7 +106,8 @@ def scatter_of(some: Sequence[Fit], i: int) -> Scatter:
     """Number ``i`` over the flights of one accelerometer that observed it."""
     seen = [f for f in some if observed(f, i)]
     x = np.array([f.estimate[i] for f in seen])
-    sigma = np.array([np.sqrt(f.covariance[i, i]) for f in seen])
+    # All flights of one accelerometer have flown with the same gyroscope.
+    sigma = np.array([np.sqrt(f.covariance[i, i] - f.gyro_sigma[i] ** 2) for f in seen])
     vehicle, imu, nan = some[0].vehicle, some[0].imu, float("nan")
     if not seen:
         return Scatter(vehicle, imu, SIX_NAMES[i], 0, nan, nan, nan, nan)

@@ -17,7 +17,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.estimate.calibration_record import six_covariance, six_information
+from onboard.core.estimate.calibration_record import gyro_sigma, six_covariance, six_information
 from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
 from onboard.core.estimate.dead_reckoning import free_errors, intervals
 from onboard.core.estimate.engine import Engine
@@ -234,6 +234,7 @@ class Chronicle:
             for p, piece in zip(blocks, self._places([p.start for p in blocks]), strict=True)
         ]
         last = len(blocks) - 1
+        gyro = gyro_sigma(self.calibrator.parameters.R_bs)
         rows = []
         for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
             solution = engine.solution() if i == last else None
@@ -243,7 +244,7 @@ class Chronicle:
                 (
                     np.array([times[i]]),
                     parameters_of(solution.theta),
-                    np.sqrt(np.diag(six_covariance(solution))),
+                    np.hypot(np.sqrt(np.diag(six_covariance(solution))), gyro),
                     self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
                 )

@@ -219,7 +219,7 @@ def sensors_of(diagnosis: Diagnosis) -> Sensors:
 
 def _force_sigma(c: Calibration) -> Array:
     """(3,) of the calibrated force at the mean load, m/s^2."""
-    P = np.array(c.covariance)
+    P = c.with_its_gyroscope
     out = np.empty(3)
     for i in range(3):
         by = np.array([c.load_mean[i] - c.offset[i], -c.scale[i]])

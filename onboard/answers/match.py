@@ -289,8 +289,9 @@ def settings_of(
             out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
     for name, number in calibration_settings(recording.diagnosis, {}).items():
         c = recording.diagnosis.calibration
-        sigmas = c.scale_sigma if "SCAL" in name else c.offset_sigma
-        out.append(Setting(name, number, sigmas["XYZ".index(name[-1])], "accelerometer"))
+        which = "XYZ".index(name[-1]) + (0 if "SCAL" in name else 3)
+        sigma = float(np.sqrt(c.with_its_gyroscope[which, which]))
+        out.append(Setting(name, number, sigma, "accelerometer"))
     return tuple(out)
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+import numpy as np
+
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding
@@ -142,9 +144,11 @@ def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> di
         return {}
     del parameters
     out: dict[str, float] = {}
+    # The simulator's gyroscope has the axes of its accelerometer.
+    sigma = np.sqrt(np.diag(c.with_its_gyroscope))
     for i, axis in enumerate("XYZ"):
-        if abs(c.scale[i] - c.in_force_scale[i]) > SCALE_FLOOR + SURE * c.scale_sigma[i]:
+        if abs(c.scale[i] - c.in_force_scale[i]) > SCALE_FLOOR + SURE * sigma[i]:
             out[f"SIM_ACC1_SCAL_{axis}"] = c.scale[i]
-        if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * c.offset_sigma[i]:
+        if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * sigma[3 + i]:
             out[f"SIM_ACC1_BIAS_{axis}"] = c.offset[i]
     return out

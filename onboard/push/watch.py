@@ -143,7 +143,7 @@ def preference(old: Array, new: Array, flown: Calibration) -> float | None:
         new: (6,) others; positive speaks for them.
         flown: what the flight says by itself.
     """
-    P = np.array(flown.covariance, dtype=np.float64)
+    P = flown.with_its_gyroscope
     x = np.array(flown.scale + flown.offset)
     if P.shape != (6, 6) or not np.all(np.isfinite(P)) or not np.all(np.isfinite(x)):
         return None

@@ -249,7 +249,8 @@ def _gyro(
     noise = white.standard_normal((n, 3)) * (imu.gyro_noise * np.sqrt(RATE / 2.0))
     walk = np.cumsum(wander.standard_normal((n, 3)), axis=0) * (imu.gyro_walk * np.sqrt(DT))
     drift = np.outer(np.sin(2.0 * np.pi * t / 600.0), imu.gyro_bias)
-    out: Array = w_b * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
+    felt = w_b + np.cross(w_b, imu.gyro_turn)
+    out: Array = felt * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
     return out
 
 

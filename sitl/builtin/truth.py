@@ -23,7 +23,8 @@ class ImuTruth:
     m/s^2/sqrt(Hz) and rad/s/sqrt(Hz); ``bias_walk`` is in m/s^2/sqrt(s).  ``vibration`` is the
     amplitude of the motor tone per axis at hover or cruise throttle (m/s^2),
     ``vibration_hz`` its frequency there; tones beyond 500 Hz fold into the 1 kHz samples by
-    themselves.  ``gyro_scale`` is the relative error of the gyroscope.
+    themselves.  ``gyro_scale`` is the relative error of the gyroscope, ``gyro_turn`` the
+    small rotation, rad, by which its axes are turned against those of the accelerometer.
     """
 
     scale: Vector3 = (1.0, 1.0, 1.0)
@@ -37,6 +38,7 @@ class ImuTruth:
     gyro_bias: Vector3 = (0.002, -0.001, 0.0015)
     gyro_walk: float = 1.5e-5
     gyro_scale: Vector3 = (0.004, -0.004, 0.003)
+    gyro_turn: Vector3 = (0.0, 0.0, 0.0)
     position: Vector3 = (0.0, 0.0, 0.0)
     temperature_start: float = 25.0
     temperature_end: float = 45.0

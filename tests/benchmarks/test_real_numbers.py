@@ -38,6 +38,7 @@ def fit(estimate: np.ndarray, covariance: np.ndarray, *, flight: str = "a", imu:
         PRIOR,
         estimate,
         covariance,
+        np.zeros(6),
         linear,
         back @ covariance @ back.T,
         PRIOR,

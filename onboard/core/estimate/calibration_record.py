@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import (
     APART_S,
     CONTRADICTION,
+    GYRO_CROSS_SIGMA,
     LONG_DRIFT_S,
     LONG_DRIFTS,
     OFFSET_FLOOR,
@@ -41,6 +43,7 @@ from onboard.core.maths.accelerometer import (
     parameters_of,
 )
 from onboard.core.maths.arrays import Array, vector3
+from onboard.core.maths.earth import STANDARD_GRAVITY
 
 
 def calibration_of(
@@ -66,7 +69,8 @@ def calibration_of(
         KeyError: no flight was processed.
     """
     solution, in_force = _solved(engine, imu), parameters.six(imu)
-    value, covariance = parameters_of(solution.theta), six_covariance(solution)
+    gyro = gyro_sigma(parameters.R_bs)
+    value, covariance = parameters_of(solution.theta), six_covariance(solution) + np.diag(gyro**2)
     sigma = np.sqrt(np.diag(covariance))
     seen = assess(six_information(solution), engine.settings.needs, kind)
     residuals = _residuals(engine, solution, in_force.as_linear())
@@ -95,6 +99,7 @@ def calibration_of(
         velocity_rms_after=residuals.velocity[1],
         coverage=seen.coverage,
         prior_sigma=_six(engine.settings.needs.prior),
+        gyro_sigma=_six(gyro),
         load_mean=load_mean,
         load_square=load_square,
         predictive_gain=residuals.predictive_gain,
@@ -148,7 +153,12 @@ def _solved(engine: Engine, imu: int) -> Solution:
 
 def _refused(before: Mapping[str, int], gates: Mapping[str, int]) -> dict[str, int]:
     """Counts of what was refused on the way and by the gates, by name."""
-    names = {"velocity": "innovation", "height": "height_innovation"}
+    names = {
+        "velocity": "innovation",
+        "height": "height_innovation",
+        "tilt": "tilt_set_anew",
+        "heading": "heading_set_anew",
+    }
     refused = Counter(before)
     for name, count in gates.items():
         refused[names.get(name, name)] += count
@@ -156,12 +166,33 @@ def _refused(before: Mapping[str, int], gates: Mapping[str, int]) -> dict[str, i
 
 
 def six_covariance(solution: Solution) -> Array:
-    """Covariance (6, 6) of scale (1) and offset (m/s^2), with a floor for what no model knows."""
+    """Covariance (6, 6) of scale (1) and offset (m/s^2), with a floor for what no model knows.
+
+    It is of those that fit the gyroscope, whose axes are taken for right: see :func:`gyro_sigma`.
+    """
     J = parameters_jacobian(solution.theta)
     C = J @ solution.covariance[:6, :6] @ J.T
     floor = np.array([SCALE_FLOOR**2] * 3 + [OFFSET_FLOOR**2] * 3)
     out: Array = C + np.diag(floor)
     return out
+
+
+def gyro_sigma(R_bs: Array) -> Array:
+    """Sigmas (6,) of scale (1) and offset (m/s^2) by the gyroscope's axes, sensor axes.
+
+    An offset forwards or sideways is told from a tilt by turning: a tilt stays where it is, the
+    offset turns with the vehicle.  What has turned is known from the gyroscope.  One that reads
+    ``e`` of a turn about the vertical as a turn about a level axis takes the vertical for tilted by
+    ``e`` in the body, and the accelerometer seems to have an offset of ``g e``: upright, inverted
+    and in any bank in which the force stays along the body's vertical axis.  Both make the same
+    velocity of the same flight, so that no flight tells them apart and navigation is right with
+    their sum; a bench, which turns the accelerometer by its faces, finds the offset alone.
+
+    Args:
+        R_bs: (3, 3) board orientation, turns of 90 degrees.
+    """
+    level = np.abs(R_bs[2]) < math.sqrt(0.5)
+    return np.concatenate([np.zeros(3), np.where(level, STANDARD_GRAVITY * GYRO_CROSS_SIGMA, 0.0)])
 
 
 def six_information(solution: Solution) -> Array:

@@ -91,7 +91,7 @@ def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined
     """
     x = np.array((*calibration.scale, *calibration.offset))
     k = np.asarray(in_force, dtype=np.float64)
-    P = _checked(x, np.array(calibration.covariance, dtype=np.float64))
+    P = _checked(x, calibration.with_its_gyroscope)
     prior = np.array(calibration.prior_sigma)
     known = np.sqrt(np.diag(P)) <= PRIOR_SHARE * prior
     contradicted = (x - k) ** 2 > CHI_SQUARE_999[1] * np.diag(P)

@@ -38,6 +38,7 @@ class Single:
         covariance: (6, 6) of it.
         information: (6, 6) of the flight alone.
         vector: (6,) information times the change that the flight asks for.
+        gyro_sigma: (6,) of scale (1) and offset (m/s^2): what its gyroscope has put into them.
     """
 
     imu: int
@@ -47,17 +48,24 @@ class Single:
     covariance: Array
     information: Array
     vector: Array
+    gyro_sigma: Array
 
 
 def single(c: Calibration) -> Single | None:
     """A calibration without its prior; None if it has no covariance."""
     six, P = np.array(c.scale + c.offset), np.array(c.covariance, dtype=np.float64)
     in_force = SixParameters(c.in_force_scale, c.in_force_offset)
-    return without_prior(c.imu, in_force, np.array(c.prior_sigma), six, P)
+    gyro = np.array(c.gyro_sigma)
+    return without_prior(c.imu, in_force, np.array(c.prior_sigma), six, P, gyro)
 
 
 def without_prior(
-    imu: int, in_force: SixParameters, prior_sigma: Array, six: Array, P: Array
+    imu: int,
+    in_force: SixParameters,
+    prior_sigma: Array,
+    six: Array,
+    P: Array,
+    gyro_sigma: Array | None = None,
 ) -> Single | None:
     """What a flight alone says of one accelerometer; None if that has no covariance.
 
@@ -67,6 +75,7 @@ def without_prior(
         prior_sigma: (6,) of scale (1) and of beta (m/s^2).
         six: (6,) estimate, scale (1) and offset (m/s^2).
         P: (6, 6) covariance of it.
+        gyro_sigma: (6,) what of its sigmas comes from the gyroscope; None: nothing.
     """
     if not (np.all(np.isfinite(six)) and np.all(np.isfinite(P))):
         return None
@@ -85,7 +94,9 @@ def without_prior(
     asked = V.T @ inverse @ ((estimate - before) / unit)
     asked[share <= 0.0] = 0.0
     information = (V * share) @ V.T / np.outer(unit, unit)
-    return Single(imu, before, unit, estimate, covariance, information, (V @ asked) / unit)
+    vector = (V @ asked) / unit
+    gyro = np.zeros(6) if gyro_sigma is None else gyro_sigma
+    return Single(imu, before, unit, estimate, covariance, information, vector, gyro)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +171,11 @@ def disagreement(relative: Relative, a: Single, b: Single) -> float:
       noise one knows what the other knows and more (Hausman 1978);
     * the accelerometers' own noise, as the pair shows it, once in the solutions and once in the
       pair: the same noise, so this is rather too much;
-    * the floors of both, for what no model knows.
+    * the floors of both, for what no model knows;
+    * what their gyroscopes' axes have put into both; where one gyroscope carried both, too much.
 
-    Gyroscopes are not shared where each accelerometer is solved with its own: what one of them does
-    wrong is in one solution only, and shows here.  Priors are taken for independent.
+    What one gyroscope does wrong beside is in one solution only where each accelerometer is solved
+    with its own, and shows here.  Priors are taken for independent.
     """
     off = relative.difference(a.estimate, b.estimate) - relative.own
     apart = 2.0 * relative.own_covariance
@@ -171,7 +183,7 @@ def disagreement(relative: Relative, a: Single, b: Single) -> float:
     for s, J in ((a, relative.weights[:, :6]), (b, relative.weights[:, 6:])):
         pull = J @ s.covariance @ np.diag(s.prior_sigma**-2.0) @ s.covariance @ J.T
         shared.append(J @ s.covariance @ J.T - pull)
-        apart += pull + (J * FLOOR**2) @ J.T
+        apart += pull + (J * (FLOOR**2 + s.gyro_sigma**2)) @ J.T
     size, V = np.linalg.eigh(shared[0] - shared[1])
     apart += (V * np.abs(size)) @ V.T
     return float(off @ np.linalg.solve(apart, off))

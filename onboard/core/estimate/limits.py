@@ -93,6 +93,9 @@ SCALE_FLOOR: Final = 5e-4
 OFFSET_FLOOR: Final = 1e-3
 """Sigmas of a scale (1) and an offset (m/s^2) that no flight goes below: what the model does not
 know (filters, interpolation, clocks) [cost]."""
+GYRO_CROSS_SIGMA: Final = 3.3e-3
+"""Sensitivity of a gyroscope across its axes, against those of its accelerometer: 1 % at the most
+in one housing, taken for three sigma [data sheet]."""
 TIMING_FLOOR_S: Final = 5e-4
 """The same of a delay, s: half of the milliseconds that streams are stamped with [physics]."""
 CONTRADICTION: Final = 6.0

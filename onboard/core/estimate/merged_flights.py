@@ -137,7 +137,7 @@ def flight_six(c: Calibration, center: SixParameters | None = None) -> FlightSix
         c: its calibration.
         center: of its prior; None: the parameters in force.
     """
-    six, P = np.array(c.scale + c.offset), np.array(c.covariance, dtype=np.float64)
+    six, P = np.array(c.scale + c.offset), c.with_its_gyroscope
     before = center or SixParameters(c.in_force_scale, c.in_force_offset)
     sigma = np.array(c.prior_sigma)
     found = [without_prior(c.imu, before, sigma, six, x) for x in (P - np.diag(FLOOR**2), P)]

@@ -52,7 +52,9 @@ def merged_calibration(
         needs: what was known before and what is needed.
         kind: of the vehicle, for the advice.
     """
-    made = _with_six(flights[-1], found.estimate, found.covariance, np.diag(FLOOR**2))
+    # All flights have flown with the same gyroscope: its share does not become less.
+    floor = np.diag(FLOOR**2 + np.square(flights[-1].gyro_sigma))
+    made = _with_six(flights[-1], found.estimate, found.covariance, floor)
     back = np.linalg.inv(parameters_jacobian(found.estimate))
     seen = assess(back.T @ found.information @ back, needs, kind)
     seconds = [c.trusted_s for c in flights]
@@ -112,7 +114,8 @@ def of_raw(c: Calibration, applied: SixParameters) -> Calibration:
     x = linear_of(np.array(c.scale + c.offset))
     back = T @ np.linalg.inv(parameters_jacobian(x))
     mean, square = np.array(c.load_mean), np.array(c.load_square)
-    made = _with_six(c, T @ x, back @ np.array(c.covariance) @ back.T, np.zeros((6, 6)))
+    gyro = np.diag(np.square(c.gyro_sigma))
+    made = _with_six(c, T @ x, back @ c.with_its_gyroscope @ back.T, gyro)
     return replace(
         made,
         in_force_scale=applied.scale,

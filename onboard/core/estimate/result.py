@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Self
 
+import numpy as np
+
 from onboard.core.maths.accelerometer import SixParameters
-from onboard.core.maths.arrays import Vector3
+from onboard.core.maths.arrays import Array, Vector3
 
 Six = tuple[float, float, float, float, float, float]
 SixFlags = tuple[bool, bool, bool, bool, bool, bool]
@@ -76,6 +78,9 @@ class Calibration:
     whitened residuals on segments that the fit did not see: with the parameters in force and
     with the estimate; ``predictive_gain`` is the logarithm of how much likelier those segments are
     with the estimate.  ``prior_sigma`` (scale, offset) is what was known before the flight;
+    ``gyro_sigma`` (likewise) is what of their sigmas comes from the gyroscope's axes: all flights
+    with it share that error.  Only a bench sees it, navigation does not
+    (:attr:`with_its_gyroscope`).
     ``load_mean`` and ``load_square`` are the means of the raw samples and of their squares, sensor
     axes: the loads that were flown, of which the six should give the force.
     """
@@ -103,6 +108,7 @@ class Calibration:
     velocity_rms_after: float
     coverage: Coverage
     prior_sigma: Six = (0.03, 0.03, 0.03, 0.5, 0.5, 0.5)
+    gyro_sigma: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     load_mean: Vector3 = (0.0, 0.0, -9.80665)
     load_square: Vector3 = (1.0, 1.0, 97.0)
     predictive_gain: float = float("nan")
@@ -110,6 +116,16 @@ class Calibration:
     dead_reckoning: DeadReckoning | None = None
     temperature: Estimate | None = None
     extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def with_its_gyroscope(self) -> Array:
+        """(6, 6) covariance of the six with which the accelerometer fits its gyroscope's axes.
+
+        They are those with which the velocity that the autopilot integrates is right.
+        """
+        out: Array = np.array(self.covariance, dtype=np.float64)
+        out -= np.diag(np.square(self.gyro_sigma))
+        return out
 
     @classmethod
     def unanswered(

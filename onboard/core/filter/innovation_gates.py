@@ -4,7 +4,10 @@ A gate compares the normalised innovation squared (NIS) of a measurement, ``r^T 
 chi-square distribution that it has if the filter's model is right.
 
 A velocity outside its gate is refused until it has been inside, and steady, for a while.  A height
-or attitude that stays outside is no fault but a new reference, and the caller is told so.
+that stays outside is no fault but a new reference, and the caller is told so.  The recorded
+attitude comes from a filter that carries it with the gyroscope: it is never wrong for one epoch,
+but it is set anew at times (an alignment in flight, another compass, another core).  So what is
+outside begins anew at once, tilt and heading each for itself, and is not refused.
 """
 
 from __future__ import annotations
@@ -14,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.filter.limits import (
-    GATE_ATTITUDE,
+    GATE_HEADING,
     GATE_HEIGHT,
+    GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
     RECOVERY_DRIFT,
@@ -30,7 +34,8 @@ from onboard.core.maths.arrays import Array
 GATES = (
     ("v", "velocity", GATE_VELOCITY),
     ("h", "height", GATE_HEIGHT),
-    ("a", "attitude", GATE_ATTITUDE),
+    ("t", "tilt", GATE_TILT),
+    ("y", "heading", GATE_HEADING),
 )
 
 
@@ -43,7 +48,8 @@ def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float
     """By what factor the variance of velocity and height is larger than it is taken for.
 
     Args:
-        kinds: one letter for each of the r innovations: ``v``, ``h``, ``a``, in this order.
+        kinds: one letter for each of the r innovations, as in
+            :mod:`~onboard.core.filter.readings`.
         innovations: (r,) whitened, at the estimate.
         h: (r, m) their regressors.
         C: (m, m) covariance of the estimate.
@@ -71,9 +77,10 @@ class GateRefusal:
     """A measurement that a gate refused.
 
     Attributes:
-        name: ``velocity``, ``height``, ``attitude``, or ``recovery`` for a velocity inside the gate
-            that was outside a moment ago.
-        renewed: whether it has been outside for so long that it is a new reference.
+        name: ``velocity``, ``height``, ``tilt``, ``heading``, or ``recovery`` for a velocity inside
+            the gate that was outside a moment ago.
+        renewed: whether it is a new reference: a height that has been outside for so long, a tilt
+            or a heading.
     """
 
     name: str
@@ -92,7 +99,7 @@ class InnovationGates:
         """A new start: nothing has been off."""
         self._velocity_off = False
         self._good: list[tuple[float, Array]] = []
-        self._off_since: dict[str, float] = {}
+        self._height_off_since: float | None = None
 
     def judge(
         self,
@@ -110,7 +117,8 @@ class InnovationGates:
 
         Args:
             t: time of the epoch, s.
-            kinds: one letter for each of the r innovations: ``v``, ``h``, ``a``, in this order.
+            kinds: one letter for each of the r innovations, as in
+                :mod:`~onboard.core.filter.readings`.
             E: (r, m + 1) innovations and their regressors, not whitened.
             y: (r,) whitened innovations at ``theta = 0``.
             h: (r, m) their regressors.
@@ -139,13 +147,19 @@ class InnovationGates:
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
                 nis = _nis(innovations[here], h[here], C)
             if nis > limit:
-                if kind != "v":
-                    return GateRefusal(name, self._outlasts(name, t))
+                if kind in "ty":
+                    return GateRefusal(name, renewed=True)
+                if kind == "h":
+                    return GateRefusal(name, self._outlasts(t))
                 self._velocity_off, self._good = True, []
                 return GateRefusal(name)
-            if kind != "v":
-                self._off_since.pop(name, None)
-            elif self._velocity_off and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
+            if kind == "h":
+                self._height_off_since = None
+            elif (
+                kind == "v"
+                and self._velocity_off
+                and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta)
+            ):
                 return GateRefusal("recovery")
         return None
 
@@ -166,10 +180,11 @@ class InnovationGates:
         self._velocity_off, self._good = False, []
         return False
 
-    def _outlasts(self, name: str, t: float) -> bool:
-        """True when a height or attitude has been off for longer than a fault lasts."""
-        since = self._off_since.setdefault(name, t)
-        if t - since < PATIENCE_S[name]:
+    def _outlasts(self, t: float) -> bool:
+        """True when a height has been off for longer than a fault lasts."""
+        if self._height_off_since is None:
+            self._height_off_since = t
+        if t - self._height_off_since < PATIENCE_S:
             return False
-        del self._off_since[name]
+        self._height_off_since = None
         return True

@@ -1,7 +1,8 @@
 """Which numbers of an epoch the filter reads, by kinds.
 
-``v`` is a component of velocity, ``h`` height, ``a`` a component of the recorded attitude.  Each is
-the sum of two states plus white noise (:mod:`onboard.core.filter.state`).
+``v`` is a component of velocity, ``h`` height, ``t`` tilt of the recorded attitude (about north,
+about east), ``y`` its heading.  Each is the sum of two states plus white noise
+(:mod:`onboard.core.filter.state`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from onboard.core.filter.innovations import Epoch
 from onboard.core.filter.state import ERRORS, H
 
 Index = NDArray[np.intp]
-_OF_KIND = {"v": (0, 1, 2), "h": (H,), "a": (4, 5, 6)}
+_OF_KIND = {"v": (0, 1, 2), "h": (H,), "t": (4, 5), "y": (6,)}
 
 
 class Reading(NamedTuple):
@@ -37,7 +38,7 @@ class Reading(NamedTuple):
 
 @cache
 def reading(kinds: str) -> Reading:
-    """For measured numbers of these kinds, in the order ``v...``, ``h``, ``aaa``."""
+    """For measured numbers of these kinds, in the order ``v...``, ``h``, ``tty``."""
     number = [i for kind, all_ in _OF_KIND.items() for i in all_[: kinds.count(kind)]]
     index = np.array(number, dtype=np.intp)
     start, end = number[0], number[-1] + 1
@@ -56,5 +57,5 @@ def kinds_of(epoch: Epoch, *, velocity: bool, height: bool, attitude: bool) -> s
     if height and math.isfinite(epoch.height):
         kinds += "h"
     if attitude and epoch.R_attitude is not None:
-        kinds += "aaa"
+        kinds += "tty"
     return kinds

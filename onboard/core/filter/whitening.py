@@ -36,6 +36,8 @@ from onboard.core.filter.limits import (
     ANYTHING,
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
+    HEADING_TIME_S,
+    RENEWED,
     RENEWED_ATTITUDE_VAR,
     RENEWED_HEIGHT_VAR,
     SYMMETRY_UPDATES,
@@ -51,7 +53,8 @@ from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
 from onboard.core.maths.small_turns import angle_of, turn_by
 
 _NOT_TURNED = np.zeros(3)
-_LETTER = {"velocity": "v", "recovery": "v", "height": "h", "attitude": "a"}
+_LETTER = {"velocity": "v", "recovery": "v", "height": "h"}
+_SLOW_ERROR = {"tilt": slice(ATT.start, ATT.stop - 1), "heading": slice(ATT.stop - 1, ATT.stop)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,8 +180,9 @@ class WhiteningFilter:
             north, east, more = carried.tolist()
             down += more
         fall = np.array([north * T, east * T, down * T, -0.5 * T * T * down, 0.0, 0.0, 0.0])
-        att, cv = math.exp(-T / ATTITUDE_TIME_S), math.exp(-T / COLOUR_TIME_S)
-        decay = np.array([cv, cv, cv, 1.0, att, att, att])
+        times = (COLOUR_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S)
+        cv, tilt, heading = (math.exp(-T / time) for time in times)
+        decay = np.array([cv, cv, cv, 1.0, tilt, tilt, heading])
         process = Process(fall, decay, *self._variances.over(T, decay))
         self._kernel.predict(self._carried, R, step, process)
         R = R @ step.turn
@@ -223,11 +227,18 @@ class WhiteningFilter:
                     made = self._in_tail(made, z, kinds, white, theta, covariance)
                 self._take(made, kinds, theta)
                 return whitened(made, kinds, epoch.t, theta, refused, off, unlikely)
-            refused.append(refusal.name)
+            if refusal.name not in refused:
+                refused.append(refusal.name)
+            if refusal.name in _SLOW_ERROR:
+                diagonal(self._carried, self._m1)[:, _SLOW_ERROR[refusal.name]] += (
+                    RENEWED_ATTITUDE_VAR
+                )
+                unlikely += RENEWED
+                continue
             letter = _LETTER[refusal.name]
             unlikely += self._surprise(z, letter * kinds.count(letter), white, theta)
             if refusal.renewed:
-                self._renew(refusal.name)
+                diagonal(self._carried, self._m1)[:, CH] += RENEWED_HEIGHT_VAR
             if letter == "v":
                 n = kinds.count("v")
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
@@ -304,10 +315,3 @@ class WhiteningFilter:
         psi = self._mean(PSI, theta)
         self.R_nb = turn_by(psi) @ self.R_nb
         self._carried[:, PSI, 0] -= psi
-
-    def _renew(self, reference: str) -> None:
-        """What a reference (``height`` or ``attitude``) differs by is unknown from here on."""
-        if reference == "height":
-            diagonal(self._carried, self._m1)[:, CH] += RENEWED_HEIGHT_VAR
-        else:
-            diagonal(self._carried, self._m1)[:, ATT] += RENEWED_ATTITUDE_VAR

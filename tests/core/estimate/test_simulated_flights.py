@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from onboard.core.estimate.calibration_record import gyro_sigma
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Restarted
+from onboard.core.estimate.limits import GYRO_CROSS_SIGMA
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
 from onboard.core.inputs.tracks import untruncated
+from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
 from sitl import recording
@@ -23,8 +26,8 @@ RATES = {"VFR_HUD": 0, "VIBRATION": 0, "BATTERY_STATUS": 0, "GLOBAL_POSITION_INT
 MOVED = {"scale": (0.98, 1.01, 1.03), "offset": (-0.1, 0.2, 0.4)}
 
 
-def flown(vehicle, duration, *, rates=RATES, **more):
-    spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(TRUE,), rates=rates, **more)
+def flown(vehicle, duration, *, imu=TRUE, rates=RATES, **more):
+    spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(imu,), rates=rates, **more)
     parser, decoder = mav.MAVLink(None), Decoder(system=1, component=1)
     messages = (m for _, frame in recording.fly(spec) for m in parser.parse_buffer(frame))
     samples = [s for m in messages for s in decoder.decode(m)]
@@ -59,7 +62,8 @@ def parameters_of(samples):
 
 def assert_true(got, scale_limit=0.01, offset_limit=0.05):
     error = np.abs(np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset))
-    sigma = np.array(got.scale_sigma + got.offset_sigma)
+    # The simulated gyroscope has the accelerometer's axes.
+    sigma = np.sqrt(np.diag(got.with_its_gyroscope))
     assert np.all(error < 4.0 * sigma), (error, sigma)
     # A number that the flight does not show says so; its sigma, above, has to cover its error.
     seen = np.array(got.observable)
@@ -118,6 +122,47 @@ def test_the_truth_comes_out(long):
     assert abs(told.value - delay) < max(0.005, 4.0 * told.sigma)
     assert got.whitened_rms_after < got.whitened_rms_before
     assert got.held_out_after < got.held_out_before
+
+
+@pytest.mark.slow
+def test_a_gyroscope_that_is_turned_is_taken_for_an_offset_and_covered(of_copter):
+    e = np.array([0.004, -0.003, 0.0])
+    imu = dataclasses.replace(TRUE, gyro_turn=tuple(e))
+    got = calibrated(flown("copter", 130.0, imu=imu)[0])
+    shift = np.array(got.offset) - np.array(of_copter.offset)
+    # The gyroscope's axes, turned by e, see gravity turned by -e: e x (0, 0, -g).
+    by = np.cross(e, [0.0, 0.0, -STANDARD_GRAVITY])
+    np.testing.assert_allclose(shift[:2], by[:2], atol=0.1 * np.abs(by).max())
+    sigma = np.sqrt(np.diag(got.with_its_gyroscope))[3:]
+    assert np.all(np.abs(shift[:2]) > 5.0 * sigma[:2])
+    assert np.all(np.abs(shift) < 2.0 * np.array(got.offset_sigma))
+
+
+def test_which_offsets_a_gyroscope_enters_depends_on_how_the_board_is_mounted():
+    level = STANDARD_GRAVITY * GYRO_CROSS_SIGMA
+    np.testing.assert_array_equal(gyro_sigma(np.eye(3)), [0, 0, 0, level, level, 0])
+    on_its_side = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    np.testing.assert_array_equal(gyro_sigma(on_its_side), [0, 0, 0, level, 0, level])
+
+
+@pytest.mark.slow
+def test_a_heading_that_an_alignment_in_flight_puts_right_does_no_harm(copter, of_copter):
+    """An EKF that took off with its compass 40 degrees off, aligned some seconds later."""
+    off = np.deg2rad(40.0)
+    first = next(s.t for s in copter if isinstance(s, GpsFix) and np.hypot(s.v_n, s.v_e) > 1.0)
+    turned = [
+        dataclasses.replace(s, yaw=s.yaw + off * min(1.0, np.exp(-(s.t - first - 8.0) / 4.0)))
+        if isinstance(s, AttitudeSample)
+        else s
+        for s in copter
+    ]
+    got = calibrated(turned)
+    assert_true(got)
+    sigma = np.sqrt(np.diag(of_copter.with_its_gyroscope))
+    change = np.array(got.scale + got.offset) - np.array(of_copter.scale + of_copter.offset)
+    assert np.all(np.abs(change) < 2.0 * sigma)
+    assert got.rejected.get("heading_set_anew", 0) > 0
+    assert got.rejected.get("innovation", 0) == of_copter.rejected.get("innovation", 0)
 
 
 ANTENNA = (0.6, -0.2, -0.4)

@@ -8,8 +8,9 @@ import pytest
 from onboard.core.filter import innovation_gates
 from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates, tails
 from onboard.core.filter.limits import (
-    GATE_ATTITUDE,
+    GATE_HEADING,
     GATE_HEIGHT,
+    GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
     RECOVERY_FIXES,
@@ -31,16 +32,16 @@ def judged(gates, t, kinds, y, h=None, C=None):
 
 
 @pytest.mark.parametrize(
-    ("kinds", "name"), [("vvv", "velocity"), ("h", "height"), ("aaa", "attitude")]
+    ("kinds", "name"), [("vvv", "velocity"), ("h", "height"), ("tt", "tilt"), ("y", "heading")]
 )
 def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name):
     """Innovations drawn from the filter's model, the estimate's own uncertainty included."""
     n = len(kinds)
-    limit = {1: 3.841, 3: 7.815}[n]  # 0.95 quantiles: often enough to be counted
+    limit = {1: 3.841, 2: 5.991, 3: 7.815}[n]  # 0.95 quantiles: often enough to be counted
     monkeypatch.setattr(
         innovation_gates,
         "GATES",
-        (("v", "velocity", limit), ("h", "height", limit), ("a", "attitude", limit)),
+        tuple((kind, name, limit) for kind, name, _ in innovation_gates.GATES),
     )
     rng = np.random.default_rng(2)
     gates = InnovationGates(LEVELS)
@@ -52,7 +53,7 @@ def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name)
         h = rng.normal(size=(n, 2))
         y = rng.normal(size=n) + h @ (root @ rng.normal(size=2))
         verdict = judged(gates, 0.0, kinds, y, h, C)
-        assert verdict in (None, GateRefusal(name))
+        assert verdict in (None, GateRefusal(name, renewed=name in ("tilt", "heading")))
         refused += verdict is not None
     assert refused / draws == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / draws))
 
@@ -63,7 +64,8 @@ def test_the_limits_have_the_probabilities_that_are_claimed():
     for free, limit in TAIL.items():
         assert survival(limit, free) == pytest.approx(0.01, rel=0.01)
     assert survival(GATE_HEIGHT, 1) == pytest.approx(4.3e-8, rel=0.05)
-    assert survival(GATE_ATTITUDE, 3) == pytest.approx(5.9e-13, rel=0.05)
+    assert survival(GATE_TILT, 2) == pytest.approx(3e-7, rel=0.05)
+    assert survival(GATE_HEADING, 1) == pytest.approx(4.3e-8, rel=0.05)
 
 
 def test_an_uncertain_estimate_widens_the_gate():
@@ -75,17 +77,17 @@ def test_an_uncertain_estimate_widens_the_gate():
 def test_what_is_in_the_tail_is_brought_to_its_edge():
     h, C = np.zeros((7, 2)), np.zeros((2, 2))
     y = np.array([0.0, 6.0, 0.0, 5.0, 9.0, 9.0, 9.0])
-    wider = tails("vvvhaaa", y, h, C)
+    wider = tails("vvvhtty", y, h, C)
     # So much more variance makes the normalised square that of the edge; attitude has no tail.
     assert wider == {"v": pytest.approx(36.0 / TAIL[3]), "h": pytest.approx(25.0 / TAIL[1])}
-    assert tails("vvvhaaa", 0.5 * y, h, C) == {}
+    assert tails("vvvhtty", 0.5 * y, h, C) == {}
     assert tails("h", y[3:4], np.eye(1, 2), 10.0 * np.eye(2)) == {}
 
 
 def test_the_first_impossible_kind_is_named():
     gates = InnovationGates(LEVELS)
     y = np.array([0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 9.0])
-    assert judged(gates, 0.0, "vvvhaaa", y) == GateRefusal("height")
+    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("height")
 
 
 def test_velocity_is_believed_again_after_it_was_steady_for_long_enough():
@@ -107,15 +109,23 @@ def test_velocity_that_jumps_inside_a_wide_gate_is_not_believed():
         assert judged(gates, 0.2 * k, "vvv", jumping, h, wide) == GateRefusal("recovery")
 
 
-@pytest.mark.parametrize(("kinds", "name"), [("h", "height"), ("aaa", "attitude")])
-def test_what_stays_off_is_a_new_reference(kinds, name):
+def test_a_height_that_stays_off_is_a_new_reference():
     gates = InnovationGates(LEVELS)
-    y = np.full(len(kinds), 9.0)
-    verdicts = [judged(gates, 0.5 * k, kinds, y) for k in range(20)]
+    y = np.full(1, 9.0)
+    verdicts = [judged(gates, 0.5 * k, "h", y) for k in range(20)]
     first = next(k for k, v in enumerate(verdicts) if v.renewed)
-    assert 0.5 * first == PATIENCE_S[name]
+    assert 0.5 * first == PATIENCE_S
     # What is right in between counts from anew.
     gates.forget()
-    judged(gates, 0.0, kinds, y)
-    assert judged(gates, 1.0, kinds, np.zeros(len(kinds))) is None
-    assert not judged(gates, PATIENCE_S[name] + 0.5, kinds, y).renewed
+    judged(gates, 0.0, "h", y)
+    assert judged(gates, 1.0, "h", np.zeros(1)) is None
+    assert not judged(gates, PATIENCE_S + 0.5, "h", y).renewed
+
+
+def test_tilt_and_heading_begin_anew_each_for_itself():
+    gates = InnovationGates(LEVELS)
+    y = np.zeros(7)
+    y[6] = 9.0
+    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("heading", renewed=True)
+    y[4], y[6] = 9.0, 0.0
+    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("tilt", renewed=True)

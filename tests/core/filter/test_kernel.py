@@ -27,7 +27,7 @@ from tests.core.estimate.test_simulated_flights import fed, flown
 
 compiled = pytest.importorskip("onboard.core.filter.compiled", reason="numba is not installed")
 KERNELS = pytest.mark.parametrize("who", [NUMPY, compiled.COMPILED], ids=["numpy", "compiled"])
-KINDS = [v + h + a for v in ("", "vv", "vvv") for h in ("", "h") for a in ("", "aaa")][1:]
+KINDS = [v + h + a for v in ("", "vv", "vvv") for h in ("", "h") for a in ("", "tty")][1:]
 
 
 def carried(rng, members, m, *, noise):

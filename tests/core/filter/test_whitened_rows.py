@@ -5,7 +5,7 @@ import pytest
 
 from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.kernel import prefer_compiled
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
@@ -211,7 +211,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             to_end = to_end + (T - (i + 0.5) * DT) * (middle @ f_read) * DT
             P = P @ rotation_from_vector(w_read * DT)
             bias = bias + levels.bias_walk * np.sqrt(DT) * normal(size=3)
-        keep = np.exp(-T / ATTITUDE_TIME_S)
+        keep = np.exp(-T / np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S]))
         error = keep * error + np.sqrt(1 - keep**2) * slow * normal(size=3)
         keep = np.exp(-T / COLOUR_TIME_S)
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
