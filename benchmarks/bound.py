@@ -73,7 +73,7 @@ def _start(q: NoiseLevels) -> Array:
         sigma[where] = value
     sigma[PSI] = (0.06, 0.06, 0.2)
     sigma[ATT] = (q.attitude, q.attitude, q.heading)
-    sigma[COLOUR] = (q.velocity_colour, q.velocity_colour, q.colour_down)
+    sigma[COLOUR] = q.velocity_colour
     return np.diag(sigma**2)
 
 
@@ -87,8 +87,7 @@ def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
     var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
     slow = np.array([q.attitude, q.attitude, q.heading])
     var[ATT] = slow**2 * (1.0 - keep[:3] ** 2)
-    colour = np.array([q.velocity_colour, q.velocity_colour, q.colour_down])
-    var[COLOUR] = colour**2 * (1.0 - keep[4] ** 2)
+    var[COLOUR] = q.velocity_colour**2 * (1.0 - keep[4] ** 2)
     return np.diag(var), keep
 
 
@@ -118,7 +117,7 @@ def _updated(
     M[3:, PSI] = M[3:, ATT] = np.eye(3)
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
-    noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude_white**2] * 3)
+    noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude**2] * 3)
     HP = M @ P
     gain = np.linalg.solve(HP @ M.T + np.diag(noise), HP).T
     out: Array = P - gain @ HP

@@ -35,8 +35,6 @@ METRES_PER_RADIAN = 6.371e6
 LEVELS = NoiseLevels(
     velocity=0.06,
     velocity_colour=0.04,
-    velocity_down=0.06,
-    colour_down=0.04,
     height=0.3,
     height_walk=0.08,
     force_walk=0.03,
@@ -44,7 +42,6 @@ LEVELS = NoiseLevels(
     bias_walk=4e-5,
     attitude=0.015,
     heading=0.03,
-    attitude_white=1e-3,
 )
 """A common receiver and common MEMS; none of the values the search for levels begins with."""
 
@@ -185,7 +182,7 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
     """White noise is that of the epochs: samples between two share that of the nearest."""
     t, epochs = path.t[path.imu], path.t[path.epochs]
     nearest = np.clip(np.round((t - START_S) * GPS_HZ), 0, len(epochs) - 1).astype(int)
-    white = q.attitude_white * rng.standard_normal((len(epochs), 3))[nearest]
+    white = q.attitude * rng.standard_normal((len(epochs), 3))[nearest]
     times = np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S])
     slow = _gauss_markov(rng, len(t), 1.0 / IMU_HZ, times)
     slow *= (q.attitude, q.attitude, q.heading)
@@ -203,10 +200,8 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
 def _fixes(path: Path, rng: np.random.Generator, q: NoiseLevels, delay: float) -> Timed:
     at = path.epochs
     t, n, step = path.t[at], len(at), 1.0 / GPS_HZ
-    white = (q.velocity, q.velocity, q.velocity_down)
-    colour = (q.velocity_colour, q.velocity_colour, q.colour_down)
-    v = path.v_gps[at] + white * rng.standard_normal((n, 3))
-    v += colour * _gauss_markov(rng, n, step, COLOUR_TIME_S)
+    v = path.v_gps[at] + q.velocity * rng.standard_normal((n, 3))
+    v += q.velocity_colour * _gauss_markov(rng, n, step, COLOUR_TIME_S)
     later = HEIGHT_DELAY * rng.standard_normal()
     height = np.interp(t - later, path.t, path.h_gps)
     height += q.height * rng.standard_normal(n)

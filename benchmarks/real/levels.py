@@ -22,8 +22,6 @@ SANE_INFLATION = 2.0
 SHORT = {
     "velocity": "vel",
     "velocity_colour": "col",
-    "velocity_down": "veld",
-    "colour_down": "cold",
     "height": "hgt",
     "height_walk": "hwk",
     "force_walk": "fwk",
@@ -31,7 +29,6 @@ SHORT = {
     "bias_walk": "bias",
     "attitude": "att",
     "heading": "head",
-    "attitude_white": "attw",
 }
 GATES = ("velocity", "recovery", "height", "tilt", "heading")
 

@@ -12,7 +12,6 @@ from onboard.core.filter.noise import (
     NoiseLevels,
     distance,
     line_search,
-    log_prior,
     stencil,
     stepped,
 )
@@ -50,15 +49,12 @@ class NoiseSearch:
         target, self._target = self._target, None
         if self._members is None:
             return levels
-        likely = [
-            x + log_prior(member) for x, member in zip(log_likelihoods, self._members, strict=True)
-        ]
         if target is not None:
-            best = self._members[int(np.argmax(likely))]
+            best = self._members[int(np.argmax(log_likelihoods))]
             self._far = self._went_far(levels, best)
             return best
         self._far = False
-        found = stepped(levels, likely, self._moving)
+        found = stepped(levels, log_likelihoods, self._moving)
         self._moving = [
             name
             for name in self._moving

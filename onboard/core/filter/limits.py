@@ -83,9 +83,9 @@ LAZY_EPOCHS: Final = 5
 
 # Correlation times of Gauss-Markov errors (noise).
 
-COLOUR_TIME_S: Final = 12.0
-"""Of the GPS velocity: what multipath and satellites do to it lasts for many seconds [tuned: of 3,
-6 and 12 s the one with which real flights predict each other best]."""
+COLOUR_TIME_S: Final = 3.0
+"""Of the GPS velocity: receivers filter over a second or two, multipath lasts some seconds
+[tuned]."""
 ATTITUDE_TIME_S: Final = 30.0
 """Of the recorded tilt: an EKF learns the accelerometer's bias, and forgets the tilt that it
 took it for, in some tens of seconds [physics]."""
@@ -103,33 +103,26 @@ STAMP_JITTER_S: Final = 8e-4
 LIMITS: Final[dict[str, tuple[float, float]]] = {
     "velocity": (0.02, 2.0),
     "velocity_colour": (0.005, 1.0),
-    "velocity_down": (0.02, 4.0),
-    "colour_down": (0.005, 2.0),
-    "height": (0.02, 10.0),
+    "vertical": (0.5, 6.0),
+    "height": (0.05, 10.0),
     "height_walk": (0.01, 2.0),
     "force_walk": (0.01, 3.0),
     "tilt_walk": (1e-4, 0.03),
-    "bias_walk": (3e-6, 3e-4),
+    "bias_walk": (1e-5, 3e-4),
     "attitude": (0.02, 0.3),
-    "heading": (0.001, 0.6),
-    "attitude_white": (1e-5, 0.03),
+    "heading": (0.015, 0.6),
+    "attitude_white": (1e-4, 0.03),
 }
 """Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
-No velocity, force or rate on a small vehicle is better than the lower ends [data sheet]; a
-noiseless simulation must not make the filter believe that timing, interpolation and filters are
-modelled to the last digit.  What is better than the other lower ends is as good as perfect beside
-the rest [physics].
+No sensor on a small vehicle is better than the lower ends [data sheet]; a noiseless simulation must
+not make the filter believe that timing, interpolation and filters are modelled to the last digit.
 
 The slow error of the recorded attitude is no such formality.  Its lower end is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
 [physics].  The likelihood would have less, for it sees how smooth this error is, not how large:
 with 10 mrad, flights that hover err by 2.3 sigma in x and y offset, each towards what the EKF was
 levelled with."""
-SPREAD: Final = 3.0
-"""Factor that a noise level is off by from its typical value, one sigma [data sheet: receivers and
-gyroscopes of the same price].  Where a flight does not show a level, it stays where it is usual
-instead of wandering to a limit; where it does, its likelihood moves it by hundreds."""
 STENCIL_FACTOR: Final = 2.0
 """Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
 LINE_SHARES: Final = (0.25, 0.5, 1.0)

@@ -1,22 +1,21 @@
 """Noise levels of the whitening filter and their estimation from the data.
 
-The levels are the likeliest ones, with a wide prior about what is usual.  One pass over the data
-runs a filter bank on a *stencil* of levels: the centre, and every level up and down by a factor.  A
-parabola through each triple of log-probabilities gives a step.  The next pass is a *line search*:
-it tries shares of that step, because some levels trade with each other, and takes the likeliest.
-Only ratios of the order of one matter for the estimate, and the honesty of its sigmas is checked
-again by the residuals (:mod:`onboard.core.estimate.solution`).
+The levels are found by maximum likelihood.  One pass over the data runs a filter bank on a
+*stencil* of levels: the centre, and every level up and down by a factor.  A parabola through each
+triple of log-likelihoods gives a step.  The next pass is a *line search*: it tries shares of that
+step, because some levels trade with each other, and takes the likeliest.  Only ratios of the order
+of one matter for the estimate, and the honesty of its sigmas is checked again by the residuals
+(:mod:`onboard.core.estimate.solution`).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from onboard.core.filter.limits import LIMITS, LINE_SHARES, SPREAD, STENCIL_FACTOR
+from onboard.core.filter.limits import LIMITS, LINE_SHARES, STENCIL_FACTOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +26,7 @@ class NoiseLevels:
         velocity: white noise of a horizontal GPS velocity component, m/s.
         velocity_colour: Gauss-Markov error of it (correlation time
             :data:`~onboard.core.filter.limits.COLOUR_TIME_S`), m/s.
-        velocity_down: white noise of the velocity down: satellites are above.
-        colour_down: Gauss-Markov error of it, m/s.
+        vertical: how many times as large both are for the velocity down: satellites are above.
         height: white noise of GPS height, m.
         height_walk: wander of GPS height, m/sqrt(s).
         force_walk: velocity random walk from accelerometer noise and all that is like it,
@@ -45,8 +43,7 @@ class NoiseLevels:
 
     velocity: float = 0.05
     velocity_colour: float = 0.05
-    velocity_down: float = 0.07
-    colour_down: float = 0.07
+    vertical: float = 1.0
     height: float = 0.2
     height_walk: float = 0.05
     force_walk: float = 0.04
@@ -62,12 +59,10 @@ class NoiseLevels:
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
 
-USUAL = NoiseLevels()
 ESTIMATED = (
     "velocity",
     "velocity_colour",
-    "velocity_down",
-    "colour_down",
+    "vertical",
     "height",
     "height_walk",
     "force_walk",
@@ -77,14 +72,6 @@ ESTIMATED = (
     "heading",
     "attitude_white",
 )
-
-
-def log_prior(levels: NoiseLevels) -> float:
-    """Logarithm of how usual levels are, but for a constant: each log-normal about its default."""
-    return -0.5 * sum(
-        (math.log(getattr(levels, name) / getattr(USUAL, name)) / math.log(SPREAD)) ** 2
-        for name in ESTIMATED
-    )
 
 
 def _triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
@@ -112,11 +99,11 @@ def stencil(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[Nois
 
 
 def stepped(
-    centre: NoiseLevels, log_probability: Sequence[float], names: Sequence[str] = ESTIMATED
+    centre: NoiseLevels, log_likelihood: Sequence[float], names: Sequence[str] = ESTIMATED
 ) -> NoiseLevels:
-    """Next centre from the log-probabilities of :func:`stencil`: a parabola in each log-level.
+    """Next centre from the log-likelihoods of :func:`stencil`: a parabola in each log-level.
 
-    A step is at most :data:`STENCIL_FACTOR` squared; where they are flat or convex, it
+    A step is at most :data:`STENCIL_FACTOR` squared; where the likelihood is flat or convex, it
     goes towards the best of the three values.
     """
     longest = 2.0 * float(np.log(STENCIL_FACTOR))
@@ -124,7 +111,7 @@ def stepped(
     for i, name in enumerate(names):
         here = getattr(centre, name)
         x = np.log(np.array(_triple(here, LIMITS[name])) / here)
-        rise = np.array(log_probability[1 + 2 * i : 3 + 2 * i]) - log_probability[0]
+        rise = np.array(log_likelihood[1 + 2 * i : 3 + 2 * i]) - log_likelihood[0]
         # The parabola through the origin and both points: rise = slope x + curve x^2 / 2.
         slope, curve = np.linalg.solve(np.column_stack([x, x * x / 2.0]), rise)
         if curve < -1e-6:

@@ -38,8 +38,9 @@ class Variances:
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
-            self.settled[i, V] = np.square((q.velocity_colour, q.velocity_colour, q.colour_down))
-            self.reading[i, V] = np.square((q.velocity, q.velocity, q.velocity_down))
+            velocity = np.array([1.0, 1.0, q.vertical**2])
+            self.settled[i, V] = q.velocity_colour**2 * velocity
+            self.reading[i, V] = q.velocity**2 * velocity
             self.reading[i, H] = q.height**2
             self.reading[i, PSI] = q.attitude_white**2
             if attitude:

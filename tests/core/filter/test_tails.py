@@ -1,11 +1,9 @@
 """A receiver whose noise has tails: they neither pull the estimate nor spoil the levels."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from onboard.core.filter.noise import ESTIMATED, NoiseLevels
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Fixes, Segment
@@ -20,8 +18,7 @@ USES = Uses(height=False, attitude=False, recorded_attitude=True, earth=False)
 
 
 def levels(velocity):
-    none = NoiseLevels(**dict.fromkeys(ESTIMATED, 1e-12))
-    return replace(none, velocity=velocity, velocity_down=velocity, height=1.0, force_walk=0.02)
+    return NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), 0.02, *(1e-12,) * 5)
 
 
 def flown(noise, bank=None, beta_sigma=0.5):

@@ -1,14 +1,12 @@
 """The whitening filter: the paper's criterion as its special case, and rows that are white."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.kernel import prefer_compiled
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
-from onboard.core.filter.noise import ESTIMATED, NoiseLevels
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
@@ -37,14 +35,10 @@ BETA = np.array([0.2, -0.1, 0.3])
 GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 
 
-def only(**levels):
-    """No noise but this."""
-    return replace(NoiseLevels(**dict.fromkeys(ESTIMATED, 1e-12)), **levels)
-
-
 def quiet(velocity):
     """Noise of GPS velocity alone."""
-    return only(velocity=velocity, velocity_down=velocity, height=1.0)
+    none = 1e-12
+    return NoiseLevels(velocity, none, 1.0, 1.0, *(none,) * 7)
 
 
 def manoeuvres(t):
@@ -135,16 +129,7 @@ def test_what_a_fit_leaves_is_chi_square():
     made = Pass(
         Model([Six(scale_sigma=1e5, beta_sigma=1e5)]),
         Linearisation(delay=0.0),
-        (
-            NoiseLevels(
-                velocity=noise,
-                velocity_colour=1e-6,
-                velocity_down=noise,
-                colour_down=1e-6,
-                force_walk=1e-6,
-                tilt_walk=1e-9,
-            ),
-        ),
+        (NoiseLevels(velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9),),
         uses=PAPER,
     )
     fixes = Fixes(t[at], v[at] + noise * rng.normal(size=(n, 3)), np.zeros(n), np.zeros(n))
@@ -160,8 +145,6 @@ def test_what_a_fit_leaves_is_chi_square():
 LEVELS = NoiseLevels(
     velocity=0.05,
     velocity_colour=0.04,
-    velocity_down=0.08,
-    colour_down=0.06,
     height=0.3,
     height_walk=0.1,
     force_walk=0.05,
@@ -184,9 +167,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     v, h = np.array([5.0, 2.0, 0.0]), 100.0
     bias = 0.01 * normal(size=3)
     slow = np.array([levels.attitude, levels.attitude, levels.heading])
-    white = np.array([levels.velocity, levels.velocity, levels.velocity_down])
-    coloured = np.array([levels.velocity_colour, levels.velocity_colour, levels.colour_down])
-    error, colour, wander = slow * normal(size=3), coloured * normal(size=3), 0.0
+    error, colour, wander = slow * normal(size=3), levels.velocity_colour * normal(size=3), 0.0
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
     theta = np.ones(1)
@@ -194,7 +175,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     def epoch(t):
         read = rotation_from_vector(error + levels.attitude_white * normal(size=3)) @ R
         ned = np.zeros((7, 2))
-        ned[:3, 0] = v + colour + white * normal(size=3)
+        ned[:3, 0] = v + colour + levels.velocity * normal(size=3)
         ned[3, 0] = h + wander + levels.height * normal()
         return Epoch(
             t,
@@ -233,7 +214,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         keep = np.exp(-T / np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S]))
         error = keep * error + np.sqrt(1 - keep**2) * slow * normal(size=3)
         keep = np.exp(-T / COLOUR_TIME_S)
-        colour = keep * colour + np.sqrt(1 - keep**2) * coloured * normal(size=3)
+        colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
         wander += levels.height_walk * np.sqrt(T) * normal()
         integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], np.zeros((3, 1)))
         step = steps(np.array([T]), *(x[None] for x in integrals))[0]
@@ -280,7 +261,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        only(velocity=velocity, velocity_down=velocity, height=1.0, force_walk=walk)
+        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 5)
         for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
     )
     made = Pass(
