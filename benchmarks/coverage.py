@@ -32,11 +32,8 @@ def one(job: tuple[Literal["copter", "plane"], int, float]) -> Row:
     vehicle, seed, duration = job
     rng = np.random.default_rng([seed, 7])
     gps = GpsTruth(delay=float(rng.uniform(0.06, 0.3)))
-    turns = GYRO_CROSS_SIGMA * rng.standard_normal((2, 3))
-    truth = tuple(
-        replace(imu, gyro_turn=vector3(turn))
-        for imu, turn in zip(random_imus(seed), turns, strict=False)
-    )
+    turn = vector3(GYRO_CROSS_SIGMA * rng.standard_normal(3))
+    truth = tuple(replace(imu, gyro_turn=turn) for imu in random_imus(seed))
     spec = FlightSpec(vehicle=vehicle, seed=seed, duration=duration, imus=truth, gps=gps)
     calibrator, decoder = Calibrator(), Decoder()
     for _, message in fly_messages(spec):

@@ -54,7 +54,7 @@ def scores(vehicle: Vehicle, count: int, first: int = 0) -> dict[str, Array]:
         out["estimator"].append(error_of(c, flight) / unit)
         out["told"].append(told(made, flight) / unit)
         # The bound takes the gyroscope's axes for those of the accelerometer, and here they are.
-        out["claimed"].append(np.sqrt(np.diag(c.with_its_gyroscope)) / unit)
+        out["claimed"].append(c.sigma_with_its_gyroscope / unit)
     return {name: np.array(values) for name, values in out.items()}
 
 

@@ -147,13 +147,12 @@ def moved_most(diagnosis: Diagnosis) -> tuple[str, float, float] | None:
     by = np.array(fuller.scale + fuller.offset) - np.array(plain.value)
     # The smaller claim: without what was found the blocks may contradict each other, which
     # widens that sigma; with it the columns share what the flight tells.
-    covariance = fuller.with_its_gyroscope
-    claimed = np.minimum(plain.sigma, np.sqrt(np.diag(covariance)))
+    claimed = np.minimum(plain.sigma, fuller.sigma_with_its_gyroscope)
     found = determine(fuller, plain.value)
     # An axis of which a combination is known is judged by its force at the mean of its loads.
     six = np.array(plain.value)
     at_load = np.hstack([np.diag(np.array(fuller.load_mean) - six[3:]), -np.diag(six[:3])])
-    force_sigma = np.sqrt(np.diag(at_load @ covariance @ at_load.T))
+    force_sigma = np.sqrt(np.diag(at_load @ fuller.with_its_gyroscope @ at_load.T))
     moves = np.concatenate([by, at_load @ by])
     counts = np.concatenate([found.known, found.free[:3]])
     sigmas = np.where(counts, np.abs(moves) / np.concatenate([claimed, force_sigma]), 0.0)

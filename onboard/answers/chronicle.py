@@ -17,7 +17,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.estimate.calibration_record import gyro_sigma, six_covariance, six_information
+from onboard.core.estimate.calibration_record import (
+    claimed_covariance,
+    gyro_sigma,
+    six_information,
+)
 from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
 from onboard.core.estimate.dead_reckoning import free_errors, intervals
 from onboard.core.estimate.engine import Engine
@@ -244,7 +248,7 @@ class Chronicle:
                 (
                     np.array([times[i]]),
                     parameters_of(solution.theta),
-                    np.hypot(np.sqrt(np.diag(six_covariance(solution))), gyro),
+                    np.sqrt(np.diag(claimed_covariance(solution, gyro))),
                     self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
                 )

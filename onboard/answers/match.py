@@ -287,10 +287,7 @@ def settings_of(
             value = named["gps_lever_arm"].values[axis]
             name = f"SIM_GPS1_POS_{axis.upper()}"
             out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
-    for name, number in calibration_settings(recording.diagnosis, {}).items():
-        c = recording.diagnosis.calibration
-        which = "XYZ".index(name[-1]) + (0 if "SCAL" in name else 3)
-        sigma = float(np.sqrt(c.with_its_gyroscope[which, which]))
+    for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
         out.append(Setting(name, number, sigma, "accelerometer"))
     return tuple(out)
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-import numpy as np
-
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding
@@ -134,21 +132,20 @@ def _only_simulated(effect: Finding) -> Difference:
     return Difference(effect.name, "sensor", values)
 
 
-def calibration_settings(real: Diagnosis, parameters: Mapping[str, float]) -> dict[str, float]:
-    """SIM_ACC1_*: what makes the simulator's accelerometer err as this one does.
+def calibration_settings(real: Diagnosis) -> dict[str, tuple[float, float]]:
+    """SIM_ACC1_*, each with its sigma: the simulator's accelerometer errs with them as this one.
 
     Only what is calibrated and differs surely from what the vehicle has in force.
     """
     c = real.calibration
     if c.status is not Status.CALIBRATED or not c.parameters_known:
         return {}
-    del parameters
-    out: dict[str, float] = {}
+    out: dict[str, tuple[float, float]] = {}
     # The simulator's gyroscope has the axes of its accelerometer.
-    sigma = np.sqrt(np.diag(c.with_its_gyroscope))
+    sigma = c.sigma_with_its_gyroscope
     for i, axis in enumerate("XYZ"):
         if abs(c.scale[i] - c.in_force_scale[i]) > SCALE_FLOOR + SURE * sigma[i]:
-            out[f"SIM_ACC1_SCAL_{axis}"] = c.scale[i]
+            out[f"SIM_ACC1_SCAL_{axis}"] = (c.scale[i], float(sigma[i]))
         if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * sigma[3 + i]:
-            out[f"SIM_ACC1_BIAS_{axis}"] = c.offset[i]
+            out[f"SIM_ACC1_BIAS_{axis}"] = (c.offset[i], float(sigma[3 + i]))
     return out

@@ -39,7 +39,7 @@ def test_claims_are_what_physics_allows(flown, whole):
     limit = whole * np.concatenate([scale, 1.0 / scale])
     c = fed(flight.samples).calibration(1)
     # The bound takes the gyroscope's axes for those of the accelerometer, and here they are.
-    claimed = np.sqrt(np.diag(c.with_its_gyroscope)) / limit
+    claimed = c.sigma_with_its_gyroscope / limit
     # Levels of noise are found from one flight only, and colour may be claimed for chance.
     assert np.all(claimed > 0.8), claimed
     assert np.all(claimed < 1.8), claimed

@@ -69,19 +69,17 @@ def calibration_of(
         KeyError: no flight was processed.
     """
     solution, in_force = _solved(engine, imu), parameters.six(imu)
-    gyro = gyro_sigma(parameters.R_bs)
-    value, covariance = parameters_of(solution.theta), six_covariance(solution) + np.diag(gyro**2)
-    sigma = np.sqrt(np.diag(covariance))
+    value, gyro = parameters_of(solution.theta), gyro_sigma(parameters.R_bs)
+    covariance, load = claimed_covariance(solution, gyro), flown_loads(engine.batches)
     seen = assess(six_information(solution), engine.settings.needs, kind)
     residuals = _residuals(engine, solution, in_force.as_linear())
-    load_mean, load_square = flown_loads(engine.batches)
     made = Calibration(
         imu=imu,
         status=Status.INSUFFICIENT if finished else Status.COLLECTING,
         scale=vector3(value[:3]),
         offset=vector3(value[3:]),
-        scale_sigma=vector3(sigma[:3]),
-        offset_sigma=vector3(sigma[3:]),
+        scale_sigma=vector3(np.sqrt(np.diag(covariance)[:3])),
+        offset_sigma=vector3(np.sqrt(np.diag(covariance)[3:])),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
         observable=seen.observed,
         note=seen.note,
@@ -100,8 +98,8 @@ def calibration_of(
         coverage=seen.coverage,
         prior_sigma=_six(engine.settings.needs.prior),
         gyro_sigma=_six(gyro),
-        load_mean=load_mean,
-        load_square=load_square,
+        load_mean=load[0],
+        load_square=load[1],
         predictive_gain=residuals.predictive_gain,
         certificate=_certificate(engine),
         dead_reckoning=residuals.dead_reckoning,
@@ -177,16 +175,22 @@ def six_covariance(solution: Solution) -> Array:
     return out
 
 
+def claimed_covariance(solution: Solution, gyro: Array) -> Array:
+    """The same, of what a bench would find: with ``gyro`` (6,) of :func:`gyro_sigma` in it."""
+    return six_covariance(solution) + np.diag(gyro**2)
+
+
 def gyro_sigma(R_bs: Array) -> Array:
     """Sigmas (6,) of scale (1) and offset (m/s^2) by the gyroscope's axes, sensor axes.
 
     An offset forwards or sideways is told from a tilt by turning: a tilt stays where it is, the
     offset turns with the vehicle.  What has turned is known from the gyroscope.  One that reads
     ``e`` of a turn about the vertical as a turn about a level axis takes the vertical for tilted by
-    ``e`` in the body, and the accelerometer seems to have an offset of ``g e``: upright, inverted
-    and in any bank in which the force stays along the body's vertical axis.  Both make the same
-    velocity of the same flight, so that no flight tells them apart and navigation is right with
-    their sum; a bench, which turns the accelerometer by its faces, finds the offset alone.
+    ``e`` in the body, and the accelerometer seems to have an offset of ``g e``.  At one load both
+    make the same velocity: an ordinary flight does not tell them apart, and navigation is right
+    with their sum.  Where the load varies much, a turn of one against the other is found as
+    :mod:`~onboard.core.physics.effects.mount_tilt`.  A bench, which turns the accelerometer by its
+    faces, finds the offset alone.
 
     Args:
         R_bs: (3, 3) board orientation, turns of 90 degrees.

@@ -127,6 +127,12 @@ class Calibration:
         out -= np.diag(np.square(self.gyro_sigma))
         return out
 
+    @property
+    def sigma_with_its_gyroscope(self) -> Array:
+        """(6,) sigmas of :attr:`with_its_gyroscope`."""
+        out: Array = np.sqrt(np.diag(self.with_its_gyroscope))
+        return out
+
     @classmethod
     def unanswered(
         cls,

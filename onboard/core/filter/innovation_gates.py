@@ -147,21 +147,19 @@ class InnovationGates:
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
                 nis = _nis(innovations[here], h[here], C)
             if nis > limit:
-                if kind in "ty":
-                    return GateRefusal(name, renewed=True)
-                if kind == "h":
-                    return GateRefusal(name, self._outlasts(t))
-                self._velocity_off, self._good = True, []
-                return GateRefusal(name)
+                return self._outside(kind, name, t)
             if kind == "h":
                 self._height_off_since = None
-            elif (
-                kind == "v"
-                and self._velocity_off
-                and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta)
-            ):
+            elif kind == "v" and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
                 return GateRefusal("recovery")
         return None
+
+    def _outside(self, kind: str, name: str, t: float) -> GateRefusal:
+        """What becomes of a measurement that its gate refuses."""
+        if kind == "v":
+            self._velocity_off, self._good = True, []
+            return GateRefusal(name)
+        return GateRefusal(name, renewed=kind != "h" or self._outlasts(t))
 
     def _recovers(self, t: float, innovation: Array) -> bool:
         """True while a receiver that was off has not been right, and steady, for long enough.
@@ -169,6 +167,8 @@ class InnovationGates:
         After seconds of dead reckoning the gate is wide; a receiver that is only noisy falls into
         it, but then its errors jump, while those of dead reckoning cannot.
         """
+        if not self._velocity_off:
+            return False
         if self._good:
             before, last = self._good[-1]
             most = RECOVERY_SIGMAS * self._noise + RECOVERY_DRIFT * (t - before)

@@ -230,15 +230,14 @@ class WhiteningFilter:
             if refusal.name not in refused:
                 refused.append(refusal.name)
             if refusal.name in _SLOW_ERROR:
-                diagonal(self._carried, self._m1)[:, _SLOW_ERROR[refusal.name]] += (
-                    RENEWED_ATTITUDE_VAR
-                )
+                # Wider by so much each time that it is soon inside: no angle is beyond pi.
+                self._renew(refusal.name)
                 unlikely += RENEWED
                 continue
             letter = _LETTER[refusal.name]
             unlikely += self._surprise(z, letter * kinds.count(letter), white, theta)
             if refusal.renewed:
-                diagonal(self._carried, self._m1)[:, CH] += RENEWED_HEIGHT_VAR
+                self._renew(refusal.name)
             if letter == "v":
                 n = kinds.count("v")
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
@@ -315,3 +314,11 @@ class WhiteningFilter:
         psi = self._mean(PSI, theta)
         self.R_nb = turn_by(psi) @ self.R_nb
         self._carried[:, PSI, 0] -= psi
+
+    def _renew(self, reference: str) -> None:
+        """What a reference (height, tilt or heading) differs by is unknown from here on."""
+        var = diagonal(self._carried, self._m1)
+        if reference == "height":
+            var[:, CH] += RENEWED_HEIGHT_VAR
+        else:
+            var[:, _SLOW_ERROR[reference]] += RENEWED_ATTITUDE_VAR

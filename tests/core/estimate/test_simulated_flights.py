@@ -63,7 +63,7 @@ def parameters_of(samples):
 def assert_true(got, scale_limit=0.01, offset_limit=0.05):
     error = np.abs(np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset))
     # The simulated gyroscope has the accelerometer's axes.
-    sigma = np.sqrt(np.diag(got.with_its_gyroscope))
+    sigma = got.sigma_with_its_gyroscope
     assert np.all(error < 4.0 * sigma), (error, sigma)
     # A number that the flight does not show says so; its sigma, above, has to cover its error.
     seen = np.array(got.observable)
@@ -133,7 +133,7 @@ def test_a_gyroscope_that_is_turned_is_taken_for_an_offset_and_covered(of_copter
     # The gyroscope's axes, turned by e, see gravity turned by -e: e x (0, 0, -g).
     by = np.cross(e, [0.0, 0.0, -STANDARD_GRAVITY])
     np.testing.assert_allclose(shift[:2], by[:2], atol=0.1 * np.abs(by).max())
-    sigma = np.sqrt(np.diag(got.with_its_gyroscope))[3:]
+    sigma = got.sigma_with_its_gyroscope[3:]
     assert np.all(np.abs(shift[:2]) > 5.0 * sigma[:2])
     assert np.all(np.abs(shift) < 2.0 * np.array(got.offset_sigma))
 
@@ -158,7 +158,7 @@ def test_a_heading_that_an_alignment_in_flight_puts_right_does_no_harm(copter, o
     ]
     got = calibrated(turned)
     assert_true(got)
-    sigma = np.sqrt(np.diag(of_copter.with_its_gyroscope))
+    sigma = of_copter.sigma_with_its_gyroscope
     change = np.array(got.scale + got.offset) - np.array(of_copter.scale + of_copter.offset)
     assert np.all(np.abs(change) < 2.0 * sigma)
     assert got.rejected.get("heading_set_anew", 0) > 0
