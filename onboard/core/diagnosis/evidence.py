@@ -89,9 +89,9 @@ class Judge:
         before, after = fits[0], fits[-1]
         effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
         # What was clipped is left out of the fit, and was flown all the same.
-        insufficient = not (self.engine.moving or self.calibrator.engine(self.imu).moving)
+        moving = self.engine.moving or self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after, effects, ladder)
-        verdict, note = self._verdict(effects, mismatch, insufficient=insufficient)
+        verdict, note = self._verdict(effects, mismatch, moving=moving)
         note = " ".join(x for x in (note, trim_in_words(self.calibrator.parameters)) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
@@ -148,10 +148,11 @@ class Judge:
         )
 
     def _verdict(
-        self, effects: list[Finding], mismatch: Mismatch, *, insufficient: bool
+        self, effects: list[Finding], mismatch: Mismatch, *, moving: bool
     ) -> tuple[Verdict, str]:
         note = self.calibration.note
-        if insufficient:
+        # What a hover shows it shows; that it shows nothing does not mean that nothing is there.
+        if not moving and not effects:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
         if not mismatch.supported:
             return Verdict.INSUFFICIENT, (

@@ -48,6 +48,7 @@ class Examination(Engine):
         start: Engine | None = None,
         point: Linearisation | None = None,
         refused: Refused | None = None,
+        carried: Sequence[Family] = (),
     ) -> None:
         """Take the flight of ``like``, more families, and where to start.
 
@@ -59,7 +60,11 @@ class Examination(Engine):
             start: an examination whose linearisation and noise are taken over.
             point: another linearisation than that.
             refused: velocities that are refused, and no others; None: what the gates judge.
+            carried: nuisances that every examination of a flight like this one has too.
         """
+        inherited = like.carried if isinstance(like, Examination) else ()
+        self.carried: tuple[Family, ...] = (*inherited, *carried)
+        self._own = tuple(families)
         origin = start or like
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
@@ -71,7 +76,7 @@ class Examination(Engine):
             point,
             origin.noise,
             uses=Uses(refused=refused),
-            more=tuple(families),
+            more=(*families, *self.carried),
             observer=self,
         )
         self._like = like
@@ -120,8 +125,13 @@ class Examination(Engine):
 
     def beside(self, more: Sequence[Family], refused: Refused | None = None) -> Examination:
         """The same flight and columns with more of them, from where this one has come to."""
-        families = (*self._more, *more)
+        families = (*self._own, *more)
         return Examination(self, families, t0=self.point.skew_from, start=self, refused=refused)
+
+    def shaken(self, shock: Family) -> Examination:
+        """The same flight and columns with a shock that whatever follows has to live with."""
+        t0 = self.point.skew_from
+        return Examination(self, self._own, t0=t0, start=self, carried=(shock,)).with_noise()
 
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is believed as little as may be.
@@ -129,7 +139,7 @@ class Examination(Engine):
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
         offset in flight tilts the recorded attitude too, for as long as the EKF needs to learn it.
         """
-        made = Examination(self, self._more, t0=self.point.skew_from, start=self)
+        made = Examination(self, self._own, t0=self.point.skew_from, start=self)
         made.noise = replace(self.noise, attitude=LIMITS["attitude"][1])
         made._seed = self._seed
         made.once()

@@ -1,4 +1,8 @@
-"""When the offsets jumped: to the half second, from one pass with a jump at every moment."""
+"""When the offsets jumped: to the half second, from one pass with a jump at every moment.
+
+A jump stays.  A shock that the samples do not resolve (a touch-down, a bump) gives velocity and
+attitude a kick that dead reckoning knows nothing of; with little flight after it, it looks alike.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,44 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import FORGOTTEN_S, FURTHEST, SPACINGS_S
+from onboard.core.diagnosis.limits import FORGOTTEN_S, FURTHEST, LARGEST_TURN, SPACINGS_S
+from onboard.core.diagnosis.score import surprise
 from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
-from onboard.core.model.regressors import Family, Model
-from onboard.core.physics.effect import Effect, Origin
-from onboard.core.physics.effects.bias_step import BiasStep
+from onboard.core.model.nuisances import AXIS
+from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Family, Model, Unknown
+from onboard.core.physics.effect import Effect, Origin, on_axes
+from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
+
+
+class _Shock(Family):
+    """Force and turn that the samples have missed, for a while after a moment."""
+
+    def __init__(self, moment: float, lasts: float) -> None:
+        """Take the moment, s on the boot clock, and for how long, s."""
+        self.moment, self.lasts = moment, lasts
+        self.name = f"shock_{moment:.2f}"
+        self.unknowns = (
+            *(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXIS),
+            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS),
+        )
+
+    def acceleration(self, nodes: Signals) -> Array:
+        """``-e_i`` for as long as it lasts."""
+        return np.concatenate([self._during(nodes), np.zeros((*nodes.t.shape, 3, 3))], axis=-1)
+
+    def rate(self, nodes: Signals) -> Array:
+        """The same of the rates."""
+        return np.concatenate([np.zeros((*nodes.t.shape, 3, 3)), self._during(nodes)], axis=-1)
+
+    def _during(self, nodes: Signals) -> Array:
+        since = nodes.t - self.moment
+        inside = ((since >= 0.0) & (since < self.lasts)).astype(np.float64)
+        return on_axes(np.repeat(inside[..., None], 3, axis=-1))
 
 
 def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:
@@ -25,8 +59,7 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
     One that is found at the edge of where it was looked for is looked for further there.
     """
     coarse, fine = SPACINGS_S
-    # At the start of a block, a jump shows that is anywhere in those beside it.
-    reach = 1.5 * float(np.median([b.end - b.start for b in full.blocks]))
+    reach = _reach(full)
     for _ in range(FURTHEST):
         best = _best(full, chosen, centre, coarse, reach)
         at_edge = abs(best.moment - centre) > reach - 2.0 * coarse
@@ -34,6 +67,24 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
         if not at_edge:
             break
     return _best(full, chosen, centre, fine, 1.5 * coarse)
+
+
+def shock_instead(full: Examination, chosen: Sequence[Effect], jump: BiasStep) -> Family | None:
+    """A shock near a jump that is less of a chance than the jump; None: none is."""
+    centre, width = jump.moment, _reach(full)
+    for spacing in SPACINGS_S:
+        times = np.arange(centre - width, centre + width + 1e-6, spacing)
+        shocks = [_Shock(float(t), spacing) for t in times]
+        own, *gains = _gains(full, chosen, [jump, *shocks])
+        best = shocks[int(np.argmax(gains))]
+        centre, width = best.moment, spacing
+    likelier = surprise(max(gains), len(best.unknowns)) > surprise(own, len(jump.unknowns))
+    return best if likelier else None
+
+
+def _reach(full: Examination) -> float:
+    """At the start of a block, a jump shows that is anywhere in those beside it."""
+    return 1.5 * float(np.median([b.end - b.start for b in full.blocks]))
 
 
 def _best(
@@ -47,24 +98,24 @@ def _best(
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
     times = np.maximum(times, float(full.blocks[0].start) + FORGOTTEN_S)
     times = np.unique(times)
-    scored = _scored(full, chosen, [jump.at(float(t)) for t in times])
-    return max(scored, key=lambda x: x[0])[1]
+    jumps = [jump.at(float(t)) for t in times]
+    return jumps[int(np.argmax(_gains(full, chosen, jumps)))]
 
 
-def _scored(
-    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep]
-) -> list[tuple[float, BiasStep]]:
+def _gains(
+    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | _Shock]
+) -> list[float]:
     """Gain of each jump alone beside the chosen effects, from one pass with all of them.
 
     Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
-    the offsets' own columns after it, of which ``full`` has the sums.
+    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.
     """
-    families: tuple[Family, ...] = (*chosen, *steps)
+    families: tuple[Family, ...] = (*chosen, *full.carried, *steps)
     made = Engine(
         replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
     )
     moments = [s.moment for s in steps]
-    first, last = moments[0] - FORGOTTEN_S, moments[-1] + FORGOTTEN_S
+    first, last = min(moments) - FORGOTTEN_S, max(moments) + FORGOTTEN_S
     far: list[Block] = []
     for batch, block in zip(full.batches, full.blocks, strict=True):
         if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
@@ -83,12 +134,17 @@ def _scored(
     out = []
     for s in steps:
         index = [*free, *range(slices[s.name].start, slices[s.name].stop)]
-        out.append((fitter.gain(before, fitter.fit(index, held_out=False)), s))
+        out.append(fitter.gain(before, fitter.fit(index, held_out=False)))
     return out
 
 
 def _with_jumps(
-    block: Block, full: Examination, model: Model, steps: Sequence[BiasStep], *, after: bool
+    block: Block,
+    full: Examination,
+    model: Model,
+    steps: Sequence[BiasStep | _Shock],
+    *,
+    after: bool,
 ) -> Block:
     """Sums of ``model`` over a block that lies before or after every jump."""
     source, sign = np.full(model.size, -1), np.ones(model.size)
@@ -99,7 +155,7 @@ def _with_jumps(
             theirs = full.model.slices[family.name]
             source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
     if after:
-        for step in steps:
+        for step in (s for s in steps if not isinstance(s, _Shock)):
             # What the sensor reads too much; the offsets' columns are what is added to it.
             source[model.slices[step.name]], sign[model.slices[step.name]] = OFFSETS, -1.0
     mine = np.flatnonzero(source >= 0)

@@ -42,6 +42,9 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
+LARGEST_TURN: Final = 0.2
+"""rad/s over the last spacing that a gyroscope may miss in a shock, one sigma: 6 degrees, as much
+as a hard landing turns a vehicle by [physics]."""
 
 # Passes of a diagnosis (examination).
 

@@ -14,7 +14,8 @@ from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
-from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near
+from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near, shock_instead
+from onboard.core.diagnosis.limits import FURTHEST
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
@@ -26,6 +27,7 @@ from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -79,27 +81,40 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
 def _selected(full: Examination, testable: Sequence[Effect]) -> tuple[Examination, Choice]:
     """Effects by their scores, a jump among them if there is one; and the sums that say so."""
     choice = _chosen(full, testable)
-    jumped = _with_jump(full, testable, choice)
-    if jumped is None:
-        return full, choice
-    # Which change of the offset it is must not be decided by an attitude that it has tilted.
-    kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
-    other = _chosen(jumped[0].doubting(), jumped[1], kept)
-    if _wanders(choice) or _wanders(other):
-        return jumped[0], other
+    for _ in range(FURTHEST):
+        steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
+        jump = _jump(full, steady, choice)
+        if jump is None:
+            break
+        shock = shock_instead(full, steady, jump)
+        if shock is None:
+            return _with_jump(full, testable, choice, jump)
+        full = full.shaken(shock)
+        choice = _chosen(full, testable)
     return full, choice
 
 
 def _with_jump(
-    full: Examination, testable: Sequence[Effect], choice: Choice
-) -> tuple[Examination, list[Effect]] | None:
-    """The same with a jump among the columns; None if nothing looks like one.
+    full: Examination, testable: Sequence[Effect], choice: Choice, jump: BiasStep
+) -> tuple[Examination, Choice]:
+    """Effects with a jump among those that are compared, if the offset changes at all."""
+    everything = [*testable, jump]
+    wide = Examination(full, everything, t0=full.point.skew_from, start=full).tuned()
+    # Which change of the offset it is must not be decided by an attitude that it has tilted.
+    kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
+    other = _chosen(wide.doubting(), everything, kept)
+    if _wanders(choice) or _wanders(other):
+        return wide, other
+    return full, choice
+
+
+def _jump(full: Examination, steady: Sequence[Effect], choice: Choice) -> BiasStep | None:
+    """The jump that explains most beside ``steady`` effects; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
     for noise; a jump is no column until its moment is known, and at a block's start, seconds
     away, it explains little of what it does.
     """
-    steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
     fitter = Fitter(full.all_blocks, full.model, 1.0, full.absent)
     jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
     if len(fitter.blocks) < FEWEST_BLOCKS or not jumps:
@@ -107,9 +122,7 @@ def _with_jump(
     boundary, gain = max(jumps, key=lambda x: x[1])
     if not _wanders(choice) and surprise(gain, 3, len(jumps)) < least():
         return None
-    everything = [*testable, jump_near(full, steady, boundary_of(fitter, boundary))]
-    made = Examination(full, everything, t0=full.point.skew_from, start=full)
-    return made.tuned(), everything
+    return jump_near(full, steady, boundary_of(fitter, boundary))
 
 
 def _wanders(choice: Choice) -> bool:

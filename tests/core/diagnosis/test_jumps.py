@@ -1,4 +1,6 @@
-"""A jump is placed from the flight around it and the sums of the rest."""
+"""A jump is placed from the flight around it and the sums of the rest; a shock is no jump."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -6,14 +8,34 @@ import pytest
 from benchmarks.explaining import heard
 from onboard.core.diagnosis import jumps, testability
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
 from sitl.builtin import effects as concealed
+from sitl.builtin.effects.accelerometer import ByAxis
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
 
 AT = 70.0
+LANDED = 89.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shock(ByAxis):
+    """A blow of 0.2 s that no sample shows: it kicks the vehicle and turns it.
+
+    The recorded attitude does not know of the turn, so the force has turned against it.
+    """
+
+    time: float
+    turn: tuple[float, float]
+
+    def reads_too_much(self, scene):
+        since = scene.elapsed - self.time
+        kick = np.outer((since >= 0.0) & (since < 0.2), self.sizes)
+        turn = np.array([*self.turn, 0.0])
+        return kick + np.where(since[:, None] >= 0.1, np.cross(scene.f_b, turn), 0.0)
 
 
 @pytest.fixture(scope="module", params=["copter", "plane"])
@@ -34,8 +56,7 @@ def full(request):
 
 
 def gains(full, times):
-    scored = jumps._scored(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times])
-    return np.array([g for g, _ in scored])
+    return np.array(jumps._gains(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times]))
 
 
 @pytest.mark.slow
@@ -53,3 +74,19 @@ def test_it_is_found_to_the_second(full):
     # Moments are on the boot clock, as the effect's is; samples begin a second later.
     found = jumps.jump_near(full, (), AT + 31.0)
     assert found.moment == pytest.approx(AT, abs=1.0)
+    assert jumps.shock_instead(full, (), found) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 12])
+def test_a_blow_just_before_the_end_of_a_flight_is_no_jump(seed):
+    blow = Shock(time=LANDED - 4.0, x=-2.0, y=3.0, z=-4.0, turn=(0.05, -0.04))
+    spec = FlightSpec(
+        vehicle="copter", seed=seed, duration=110.0, imus=random_imus(seed), effects=(blow,)
+    )
+    found = diagnose(heard(spec), 1)
+    assert {e.name for e in found.effects} <= {"gps_latency"}
+    c = found.calibration
+    assert np.abs(np.subtract(c.offset, spec.imus[0].offset)) == pytest.approx(
+        np.zeros(3), abs=4.0 * max(c.offset_sigma)
+    )
