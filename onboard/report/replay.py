@@ -23,7 +23,7 @@ from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
 from onboard.report.flight_rows import flight_rows
-from onboard.report.page import render
+from onboard.report.page import PAGE, render
 
 Array = NDArray[np.float64]
 
@@ -61,12 +61,13 @@ HEADLINES = {
 }
 
 
-def replay_html(result: Replay, chronicle: Drawn) -> str:
+def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
     """The page of one replay.
 
     Args:
         result: what the replay gave; numbers that are not finite are shown as not known.
         chronicle: what stood before the calibrator in that replay.
+        base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
@@ -81,6 +82,7 @@ def replay_html(result: Replay, chronicle: Drawn) -> str:
         headline = HEADLINES[worst]
     return render(
         TEMPLATE,
+        base,
         files=[r.path.name for r in result.recordings],
         autopilot=result.autopilot,
         duration=words.fixed(result.duration_s, 0),
