@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +33,7 @@ def frame_text(match: Match) -> str:
     return json.dumps(dict(match.frame), indent=2) + "\n"
 
 
-def read_frame(file: str | Path) -> Mapping[str, object]:
+def read_frame(file: str | PathLike[str]) -> Mapping[str, object]:
     """Keys of a frame or coefficient file.
 
     Raises:
@@ -41,11 +42,11 @@ def read_frame(file: str | Path) -> Mapping[str, object]:
     try:
         found = json.loads(Path(file).read_text(encoding="utf-8"))
     except OSError as error:
-        raise UsageError(f"{file}: cannot be read ({error.strerror})") from None
+        raise UsageError(f"{fspath(file)}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError) as error:
-        raise UsageError(f"{file}: no JSON ({error})") from None
+        raise UsageError(f"{fspath(file)}: no JSON ({error})") from None
     if not isinstance(found, dict):
-        raise UsageError(f"{file}: no JSON object")
+        raise UsageError(f"{fspath(file)}: no JSON object")
     return found
 
 
