@@ -6,10 +6,11 @@
 """
 
 from onboard.api.accelerometer import Accelerometer, Effect
-from onboard.api.arrays import Arrays, Attitude, Inertial, Told, Velocity
+from onboard.api.arrays import Arrays
 from onboard.api.calibration import CalibrationResult, calibrate
 from onboard.api.explanation import ExplanationResult, explain
 from onboard.api.matching import MatchResult, match
+from onboard.api.streams import Attitude, Inertial, Told, Velocity
 from onboard.core.physics.finding import Quantity
 from onboard.errors import OnboardError
 

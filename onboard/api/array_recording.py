@@ -11,7 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from onboard.api.arrays import Arrays, Attitude, Inertial, Told, Velocity, accelerometers, receivers
+from onboard.api.arrays import Arrays, accelerometers, receivers
+from onboard.api.streams import Attitude, Inertial, Told, Velocity
 from onboard.core.inputs.samples import (
     AttitudeSample,
     GpsFix,

@@ -16,6 +16,7 @@ from onboard.api.figures import draw_residuals
 from onboard.api.result import Result
 from onboard.api.sources import Source, opened
 from onboard.core.maths.arrays import Array
+from onboard.core.physics.catalogue import title_of
 from onboard.report.explain import explanation_html
 from onboard.report.parameters import explanation_text
 
@@ -81,6 +82,9 @@ class ExplanationResult(Result):
         d, a = self._explanation.diagnosis, self._explanation.advice
         head = f"{', '.join(self.files)}: accelerometer {d.imu}, {self.duration_s:.0f} s"
         said = [*verdict.missing(d), verdict.proof(d), *verdict.cures(d, a), *verdict.remarks(d)]
+        for unclear in d.ambiguous:
+            names = " / ".join(title_of(name) for name in unclear.names)
+            said.append(f"Not told apart: {names}. To tell: {unclear.tell_apart}.")
         shown = [f"{self.verdict}: {self.headline}", *(f"  {sentence}" for sentence in said)]
         return "\n".join([head, *shown])
 

@@ -31,14 +31,23 @@ LEAST_TURN: Final = 0.02
 """rad/s, root mean square: less tells nothing of a unit."""
 
 
+def check_rows(name: str, rows: int) -> None:
+    """Enough rows to be a flight.
+
+    Raises:
+        ArraysError: there are too few.
+    """
+    if rows < FEWEST_ROWS:
+        raise ArraysError(f"{name}: {rows} rows are no flight")
+
+
 def check_clock(name: str, t: Array) -> None:
     """Times of inertial samples in seconds.
 
     Raises:
         ArraysError: too few, or too far apart or too close for seconds.
     """
-    if len(t) < FEWEST_ROWS:
-        raise ArraysError(f"{name}: {len(t)} rows are no flight")
+    check_rows(name, len(t))
     step = float(np.median(np.diff(t)))
     if not SHORTEST_STEP_S < step < LONGEST_STEP_S:
         raise ArraysError(f"{name}: samples are {step:.3g} apart, which are no seconds")
@@ -56,8 +65,10 @@ def check_force(name: str, f_b: Array) -> None:
         raise ArraysError(f"{name}: holds no number")
     typical = float(np.median(length))
     if not FORCE[0] < typical < FORCE[1]:
-        said = f"its median length is {typical:.3g}, expected about 9.8 m/s^2 with gravity in it"
-        raise ArraysError(f"{name}: {said}")
+        raise ArraysError(
+            f"{name}: its median length is {typical:.3g}, expected about 9.8 m/s^2 with gravity in "
+            "it"
+        )
 
 
 def check_angles(name: str, angles: Array, most: float) -> None:
