@@ -78,7 +78,40 @@ def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
     lengthen(fleet)
     assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0
     pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
-    assert pages == ["a.BIN.html", "b.tlog.html"]
+    assert pages == ["a.BIN.html", "b.tlog.html", "index.html"]
+    index = (tmp_path / "new" / "pages" / "index.html").read_text(encoding="utf-8")
+    assert 'href="a.BIN.html"' in index
+    assert "http" not in index
+
+
+@pytest.mark.slow
+def test_neither_processes_nor_the_store_change_a_digit(fleet, tmp_path, capsys):
+    lengthen(fleet)
+    spoil(fleet)
+    store = ["--store", str(tmp_path / "store")]
+
+    def document(*more):
+        assert run(["fleet", str(fleet), "--json", str(tmp_path / "out.json"), *more]) == 2
+        return (tmp_path / "out.json").read_bytes(), capsys.readouterr().out
+
+    first, _ = document("--jobs", "1", *store)
+    again, out = document("--jobs", "2")
+    assert again == first
+    kept = sorted((tmp_path / "store").rglob("*.record"))
+    assert len(kept) == 3
+    kept[0].write_bytes(kept[0].read_bytes()[:-1])
+    times = [file.stat().st_mtime_ns for file in kept]
+    again, told = document("--jobs", "2", *store)
+    assert again == first
+    assert "torn" in " ".join(told.split())
+    assert [file.stat().st_mtime_ns == t for file, t in zip(kept, times, strict=True)] == [
+        False, True, True,
+    ]  # fmt: skip
+    moved = fleet.rename(tmp_path / "elsewhere")
+    assert run(["fleet", str(moved), "--json", "-", *store]) == 2
+    recordings = json.loads(capsys.readouterr().out)["recordings"]
+    assert all(str(moved) in r["file"] for r in recordings)
+    assert all(r["replay"]["recording"]["files"] == [r["file"]] for r in recordings if r["replay"])
 
 
 def test_a_file_may_be_named_and_comes_once(fleet, capsys):
@@ -95,6 +128,8 @@ def test_a_file_may_be_named_and_comes_once(fleet, capsys):
         (["{tmp}/empty"], "no recording"),
         ([], "DIR"),
         (["{fleet}", "--report", "{fleet}/notes.txt"], "cannot be made"),
+        (["{fleet}", "--store", "{fleet}/notes.txt"], "cannot be written"),
+        (["{fleet}", "--jobs", "0"], "--jobs"),
         (["{fleet}", "--json", "{tmp}/empty"], "cannot be written"),
     ],
 )
