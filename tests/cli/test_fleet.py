@@ -95,7 +95,7 @@ def test_neither_processes_nor_the_store_change_a_digit(fleet, tmp_path, capsys)
         return (tmp_path / "out.json").read_bytes(), capsys.readouterr().out
 
     first, _ = document("--jobs", "1", *store)
-    again, out = document("--jobs", "2")
+    again, _ = document("--jobs", "2")
     assert again == first
     kept = sorted((tmp_path / "store").rglob("*.record"))
     assert len(kept) == 3

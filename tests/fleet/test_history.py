@@ -12,6 +12,7 @@ from onboard.answers.fleet.record import Record
 from onboard.answers.fleet.severity import Severity, sentences, severity_of, shared_sentence
 from onboard.answers.fleet.shared_numbers import common_of
 from onboard.answers.fleet.vehicles import vehicles_of
+from onboard.core.estimate.joint import FLOOR
 from onboard.core.maths.chi_square import survival
 from tests.fleet.records_by_hand import TRUE, flown
 
@@ -61,6 +62,15 @@ def test_maintenance_is_named_with_the_flights_about_it_and_ends_what_is_merged(
     assert "x offset stepped by +0.4" in said
     assert "between 06.BIN" in said
     assert "and 07.BIN" in said
+
+
+def test_no_number_of_flights_makes_the_floors_less():
+    """What no model knows is the same in all flights: averaging them does not help against it."""
+    h = history(season(60))
+    for n in (*h.accelerometers[0].numbers, *h.numbers):
+        assert n.latest[1] >= n.common
+    assert number(h, "x scale").common == FLOOR[0]
+    assert number(h, "x scale").latest[1] > 0.9 * FLOOR[0]
 
 
 def test_a_flight_that_contradicts_the_others_is_named_and_not_averaged():

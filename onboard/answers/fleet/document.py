@@ -86,7 +86,8 @@ class NumberDocument(msgspec.Struct, frozen=True, kw_only=True):
 
     ``drift_per_day`` beside everything else that was found, whether it is chance or not;
     ``drifts``: it is not.  ``per_kelvin`` where the temperatures of the flights differ.
-    ``factor`` on the claimed sigmas; ``latest`` at the last flight, at the mean temperature.
+    ``factor`` on the claimed sigmas; ``latest`` at the last flight, at the mean temperature, with
+    what is wrong with all flights alike in its sigma.
     """
 
     name: str
@@ -306,7 +307,7 @@ def _number(n: Followed) -> NumberDocument:
         factor=finite(c.factor),
         chi_square=finite(c.chi_square),
         dof=c.dof,
-        latest=Number(finite(c.latest[0]), finite(c.latest[1])),
+        latest=Number(*map(finite, n.latest)),
     )
 
 

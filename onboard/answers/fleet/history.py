@@ -12,6 +12,8 @@ from onboard.answers.document_numbers import TIMING
 from onboard.answers.fleet.record import ImuRecord
 from onboard.answers.fleet.vehicles import Flight, Vehicle
 from onboard.answers.recorded import KEEPING_ALL
+from onboard.core.estimate.joint import FLOOR
+from onboard.core.estimate.limits import TIMING_FLOOR_S
 from onboard.core.estimate.merged_flights import Prior
 from onboard.core.estimate.result import SIX_NAMES, Estimate
 from onboard.core.fleet.course import Course, Series, follow, places
@@ -22,6 +24,8 @@ DAY_S = 86_400.0
 UNITS = ("1", "1", "1", "m/s^2", "m/s^2", "m/s^2")
 DELAYS = tuple(name for name in TIMING if name.endswith("_delay_s"))
 """Followed over time; the averaging window has no sigma of its own at zero."""
+COMMON = dict.fromkeys(DELAYS, TIMING_FLOOR_S)
+"""Sigma of what is wrong with all flights alike: averaging does not make it less."""
 ANTENNA = ("antenna_x_m", "antenna_y_m", "antenna_z_m")
 UNTOLD = "it does not say which parameters were in force, other flights do"
 DRIFTING = "{} drifts: flights that differ for a reason have no mean"
@@ -38,6 +42,8 @@ class Number:
         flights: that know it, in order.
         series: their values.
         course: what is said of them.
+        common: sigma of what is wrong with all flights alike: no drift and no step, and no less in
+            any mean of them (the floors, the gyroscope's axes).
     """
 
     name: str
@@ -45,6 +51,13 @@ class Number:
     flights: tuple[Flight, ...]
     series: Series
     course: Course
+    common: float
+
+    @property
+    def latest(self) -> tuple[float, float]:
+        """The number at the last flight that is not odd, and its sigma with what is common."""
+        value, sigma = self.course.latest
+        return value, math.hypot(sigma, self.common)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +107,7 @@ class _Asked:
     unit: str
     flights: tuple[Flight, ...]
     series: Series
+    common: float
 
 
 def history_of(vehicle: Vehicle) -> History:
@@ -115,7 +129,8 @@ def history_of(vehicle: Vehicle) -> History:
 
 def _followed(asked: Sequence[_Asked], looked_at: int) -> tuple[Number, ...]:
     return tuple(
-        Number(a.name, a.unit, a.flights, a.series, follow(a.series, looked_at)) for a in asked
+        Number(a.name, a.unit, a.flights, a.series, follow(a.series, looked_at), a.common)
+        for a in asked
     )
 
 
@@ -156,14 +171,14 @@ def _six(heard: Sequence[_Heard]) -> list[_Asked]:
     if not said:
         return []
     values, sigmas = np.array([s.value for s in said]), np.array([s.sigma for s in said])
-    temperatures = [h.imu.calibration.temperature for h in heard]
+    warm = [h.imu.calibration.temperature for h in heard]
+    common = np.hypot(FLOOR, heard[-1].imu.calibration.gyro_sigma)
+    flights = [h.flight for h in heard]
     return [
         asked
         for i, (name, unit) in enumerate(zip(SIX_NAMES, UNITS, strict=True))
         if (
-            asked := _asked(
-                name, unit, [h.flight for h in heard], values[:, i], sigmas[:, i], temperatures
-            )
+            asked := _asked(name, unit, flights, values[:, i], sigmas[:, i], warm, float(common[i]))
         )
     ]
 
@@ -175,6 +190,7 @@ def _asked(
     values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]],
     sigmas: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]],
     temperatures: Sequence[Estimate | None],
+    common: float,
 ) -> _Asked | None:
     """A series of the flights that know the number; None if none does."""
     known = [
@@ -193,6 +209,7 @@ def _asked(
             np.array([flights[k].began_unix_s / DAY_S for k in known]),
             np.array(warm) if len(warm) == len(known) else None,
         ),
+        common,
     )
 
 
@@ -213,7 +230,8 @@ def _delays(vehicle: Vehicle) -> list[_Asked]:
         known = [(f, e) for f, i in heard if (e := i.calibration.timing.get(name)) is not None]
         none = [None] * len(known)
         values, sigmas = [e.value for _, e in known], [e.sigma for _, e in known]
-        out.append(_asked(name, "s", [f for f, _ in known], values, sigmas, none))
+        flights = [f for f, _ in known]
+        out.append(_asked(name, "s", flights, values, sigmas, none, COMMON[name]))
     return [a for a in out if a is not None]
 
 
@@ -230,7 +248,8 @@ def _antenna(vehicle: Vehicle) -> list[_Asked]:
             known = value is not None and sigma is not None and told is not None
             values.append(told[k] + value if known and told and value is not None else math.nan)
             sigmas.append(sigma if known and sigma is not None else math.nan)
-        out.append(_asked(name, "m", [f for f, _ in heard], values, sigmas, [None] * len(heard)))
+        none = [None] * len(heard)
+        out.append(_asked(name, "m", [f for f, _ in heard], values, sigmas, none, 0.0))
     return [a for a in out if a is not None]
 
 

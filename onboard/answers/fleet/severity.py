@@ -74,9 +74,10 @@ def shared_sentence(c: Common) -> str:
     """What a type shares, in one sentence."""
     s, u = c.shared, UNITS[c.unit]
     name = NAMES[c.name] + (" beside what is told" if c.unit == "m" else "")
+    scatter = f"which scatter by {_rounded(s.between, s.sigma)}{u}"
     return (
         f"{c.of}: {name} {sized(Sized(s.mean, s.sigma, s.p_value), u)} on {s.count} vehicles, "
-        f"which scatter by {_rounded(s.between, s.sigma)}{u}"
+        f"{scatter if s.between else 'which scatter no more than their sigmas'}"
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.answers.fleet.history import ANTENNA, DELAYS, first_heard
+from onboard.answers.fleet.history import ANTENNA, COMMON, DELAYS, first_heard
 from onboard.answers.fleet.vehicles import Vehicle
 from onboard.core.fleet.limits import FEWEST_VEHICLES, SHARED_FALSE_ALARM
 from onboard.core.fleet.shared import Shared, pooled, shared
@@ -66,10 +66,11 @@ def common_of(vehicles: Sequence[Vehicle]) -> Comparison:
         if len(by_vehicle) < FEWEST_VEHICLES:
             continue
         members = []
-        for who, values in by_vehicle.items():
-            value, sigma = np.array(values).T
+        for who, its in by_vehicle.items():
+            value, sigma = np.array(its).T
             members.append(Member(who, *pooled(value, sigma)))
-        found = shared(np.array([m.value for m in members]), np.array([m.sigma for m in members]))
+        values, sigmas = (np.array([(m.value, m.sigma) for m in members])).T
+        found = shared(values, sigmas, COMMON.get(name, 0.0))
         if found is not None:
             asked.append(Common(name, unit, of, tuple(members), found))
     allowed = SHARED_FALSE_ALARM / max(len(asked), 1)

@@ -39,7 +39,7 @@ class Shared:
         sigma: of the mean; to be read with Student's t of ``count - 1`` degrees.
         between: scatter of the vehicles beyond their own sigmas.
         next_sigma: of another vehicle of the type about the mean.
-        p_value: probability of a mean so far from ``reference`` by chance.
+        p_value: probability of a mean so far from nothing by chance.
         scatter_p_value: of so much scatter if the vehicles were all alike.
         count: vehicles.
     """
@@ -60,13 +60,13 @@ def pooled(value: Array, sigma: Array) -> tuple[float, float]:
     return mean, math.sqrt(variance_factor(float(w @ (value - mean) ** 2), len(w) - 1) / w.sum())
 
 
-def shared(value: Array, sigma: Array, reference: float = 0.0) -> Shared | None:
+def shared(value: Array, sigma: Array, common: float = 0.0) -> Shared | None:
     """What vehicles share; None if they are fewer than three.
 
     Args:
         value: (k,) one for each vehicle, in one unit.
         sigma: (k,) of them, above 0.
-        reference: what it would be if there were nothing to say.
+        common: sigma of what is wrong with all of them alike, and is no less in their mean.
     """
     k = len(value)
     if k < FEWEST_VEHICLES:
@@ -77,13 +77,13 @@ def shared(value: Array, sigma: Array, reference: float = 0.0) -> Shared | None:
     v = 1.0 / (sigma**2 + square)
     mean = float((v @ value) / v.sum())
     scatter = float(v @ (value - mean) ** 2) / (k - 1)
-    of_mean = math.sqrt(max(1.0, scatter) / float(v.sum()))
+    of_mean = math.sqrt(max(1.0, scatter) / float(v.sum()) + common**2)
     return Shared(
         mean=mean,
         sigma=of_mean,
         between=math.sqrt(square),
         next_sigma=math.sqrt(square + of_mean**2),
-        p_value=two_sided(abs(mean - reference) / of_mean, k - 1),
+        p_value=two_sided(abs(mean) / of_mean, k - 1),
         scatter_p_value=survival(Q, k - 1),
         count=k,
     )
