@@ -17,6 +17,8 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import msgspec
+
 import onboard
 from onboard.batches.frames import Result, next_said, send
 from onboard.batches.job import Job, Outcome
@@ -105,7 +107,10 @@ class _Hand(threading.Thread):
 
     def _tried(self, number: int, job: Job) -> Outcome | str:
         """The outcome, or how the process ended."""
-        process = self._process = self._process or started()
+        try:
+            process = self._process = self._process or started()
+        except OSError as error:
+            return f"could not be started ({error.strerror})"
         if process.stdin is None or process.stdout is None:
             return "has no pipes"
         try:
@@ -115,7 +120,7 @@ class _Hand(threading.Thread):
                     return said.outcome
                 if self._told is not None:
                     self._told(number, said.done)
-        except BrokenPipeError:
+        except (OSError, msgspec.DecodeError):  # it has ended, or what it said is no message
             pass
         self._dismiss()
         return ending(process.returncode)

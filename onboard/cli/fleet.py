@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -133,11 +134,11 @@ def fleet(
     )
     console = Console(highlight=False, soft_wrap=True)
     table = json_file != STANDARD_OUTPUT
-    pages: dict[str, str] = {}
+    places_of, pages = pages_of([name for _, name in files]), dict[str, str]()
 
     def paged(name: str, packed: bytes) -> None:
         if report_folder is not None:
-            pages[name] = page_of(name)
+            pages[name] = places_of[name]
             write_text(gzip.decompress(packed).decode(), str(report_folder / pages[name]))
 
     if table:
@@ -168,9 +169,18 @@ def fleet(
         raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
 
 
-def page_of(name: str) -> str:
-    """The file of a recording's report, beside the index, and an address within it."""
-    return "-".join(Path(name).parts) + ".html"
+def pages_of(names: Sequence[str]) -> dict[str, str]:
+    """The file of each recording's report, beside the index, by the name of the recording."""
+    out: dict[str, str] = {}
+    taken = {INDEX}
+    for name in names:
+        plain = "-".join(part for part in Path(name).parts if part != Path(name).anchor)
+        page, n = f"{plain}.html", 2
+        while page in taken:
+            page, n = f"{plain}-{n}.html", n + 1
+        taken.add(page)
+        out[name] = page
+    return out
 
 
 def _possible(

@@ -6,6 +6,7 @@
   ``sys_uuid``.  A simulated board has none.
 * *Accelerometers.*  INS_ACC*_ID (PX4: CAL_ACC*_ID) are bus, address and kind of chip: boards of
   one model all have the same.  They tell vehicles apart and prove nothing alike.
+* A .tlog with several vehicles says nothing of either.
 * *When.*  GPS week and time of the first and last fix, or the autopilot's Unix time.  The clock of
   a ground station or a file is not asked.
 """
@@ -86,6 +87,9 @@ def provenance(path: str | Path) -> Provenance:
         RecordingError: the file cannot be read, or is no recording.
     """
     arrays = read_arrays(path, WANTED)
+    if len(_systems(arrays)) > 1:  # whose a message is that names a board, nobody asks here
+        began, ended = _times(arrays)
+        return Provenance(began_unix_s=began, ended_unix_s=ended)
     information = ulog_information(Path(path)) if arrays.kind == "ulog" else None
     parameters = _parameters(arrays) if information is None else information.parameters
     board, model = _board(arrays, information.texts if information else {})
@@ -117,7 +121,7 @@ def _parameters(arrays: Arrays) -> dict[str, float]:
     """Numbers by name, the last value of each."""
     table, name, value = arrays.tables.get("PARM"), "Name", "Value"
     if table is None:
-        table, name, value = arrays.tables.get("PARAM_VALUE"), "param_id", "param_value"
+        table, name, value = _of_autopilot(arrays, "PARAM_VALUE"), "param_id", "param_value"
     if table is None or not {name, value} <= set(table.dtype.names or ()):
         return {}
     finite = table[np.isfinite(table[value])]
@@ -128,8 +132,8 @@ def _parameters(arrays: Arrays) -> dict[str, float]:
 def _texts(arrays: Arrays) -> list[str]:
     """What the autopilot said in words."""
     out: list[str] = []
-    for table, column in (("MSG", "Message"), ("STATUSTEXT", "text")):
-        records = arrays.tables.get(table)
+    said = (arrays.tables.get("MSG"), "Message"), (_of_autopilot(arrays, "STATUSTEXT"), "text")
+    for records, column in said:
         if records is not None and column in (records.dtype.names or ()):
             out += [bytes(x).decode("ascii", "replace") for x in records[column]]
     return out
@@ -145,12 +149,11 @@ def _board(arrays: Arrays, information: Mapping[str, str]) -> tuple[str, str]:
             words = [bytes.fromhex(word)[::-1].hex() for word in found.groups()[1:]]
             if any(word.strip("0f") for word in words):
                 return "".join(words), found[1]
-    versions = arrays.tables.get("AUTOPILOT_VERSION")
+    versions = _of_autopilot(arrays, "AUTOPILOT_VERSION")
     for record in versions if versions is not None else ():
-        if record["sender_component"] == AUTOPILOT:
-            long, short = record["uid2"].tobytes().rstrip(b"\0"), int(record["uid"])
-            if long or short:
-                return (long.hex() if long else f"{short:016x}"), ""
+        long, short = record["uid2"].tobytes().rstrip(b"\0"), int(record["uid"])
+        if long or short:
+            return (long.hex() if long else f"{short:016x}"), ""
     return "", ""
 
 
@@ -166,11 +169,19 @@ def _system(arrays: Arrays, parameters: Mapping[str, float]) -> int | None:
     told = _first(parameters, SYSTEM)
     if told is not None:
         return int(told)
-    beats = arrays.tables.get("HEARTBEAT")
-    if beats is None:
-        return None
-    senders = beats["sender_system"][beats["sender_component"] == AUTOPILOT]
-    return int(np.bincount(senders).argmax()) if len(senders) else None
+    return next(iter(_systems(arrays)), None)
+
+
+def _systems(arrays: Arrays) -> tuple[int, ...]:
+    """System ids of the autopilots that a .tlog has heartbeats of."""
+    beats = _of_autopilot(arrays, "HEARTBEAT")
+    return () if beats is None else tuple(int(x) for x in np.unique(beats["sender_system"]))
+
+
+def _of_autopilot(arrays: Arrays, name: str) -> Records | None:
+    """Messages of a .tlog that the autopilot has sent."""
+    table = arrays.tables.get(name)
+    return None if table is None else table[table["sender_component"] == AUTOPILOT]
 
 
 def _first(parameters: Mapping[str, float], names: Sequence[str]) -> float | None:
@@ -182,7 +193,7 @@ def _times(arrays: Arrays) -> tuple[float | None, float | None]:
     unix = np.zeros(0)
     if (gps := arrays.tables.get("GPS")) is not None:
         unix = _of_gps(gps)
-    elif (system := arrays.tables.get("SYSTEM_TIME")) is not None:
+    elif (system := _of_autopilot(arrays, "SYSTEM_TIME")) is not None:
         unix = system["time_unix_usec"] / 1e6
     else:
         for name in ("vehicle_gps_position", "sensor_gps"):

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from onboard.answers.fleet.places import found
+from onboard.cli.fleet import pages_of
 from onboard.cli.main import run
 from tests.recordings.dataflash_writer import modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
@@ -119,6 +121,20 @@ def test_a_file_may_be_named_and_comes_once(fleet, capsys):
     assert run(["fleet", str(file), str(file.parent), "--json", "-"]) == 0
     files = [r["file"] for r in json.loads(capsys.readouterr().out)["recordings"]]
     assert files == [str(file), str(file.with_name("b.tlog"))]
+
+
+def test_names_tell_recordings_apart_and_so_do_their_pages(tmp_path):
+    for name in ("x/kite", "y/kite", "z"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "1.BIN").write_bytes(b"")
+    names = [name for _, name in found([tmp_path / "x" / "kite", tmp_path / "z"])]
+    assert names == ["kite/1.BIN", "z/1.BIN"]
+    names = [name for _, name in found([tmp_path / n for n in ("x/kite", "y/kite", "z")])]
+    assert len(set(names)) == 3
+    assert names[2] == "z/1.BIN"
+    pages = pages_of(["a/b.BIN", "a-b.BIN", "index"])
+    assert len(set(pages.values())) == 3
+    assert "index.html" not in pages.values()
 
 
 @pytest.mark.parametrize(

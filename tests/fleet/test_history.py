@@ -126,6 +126,12 @@ def test_what_a_type_shares_is_said_with_its_scatter_and_else_not():
     assert common_of(vehicles_of([o for o in logs if o.name[0] in "12"])).common == ()
 
 
+def test_recordings_that_may_be_one_vehicle_are_no_type():
+    logs = [flown(f"{k}", day=k, board="", seed=k, antenna=(0.5, 0, 0)) for k in range(9)]
+    found = common_of(vehicles_of(logs))
+    assert (found.common, found.looked_at) == ((), 0)
+
+
 def test_the_document_is_compatible_and_says_everything_in_finite_numbers():
     logs = season(8, lambda k: STEP * (k >= 5))
     histories = [history_of(v) for v in vehicles_of(logs)]

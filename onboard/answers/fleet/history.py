@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -214,13 +215,11 @@ def _asked(
 
 
 def first_heard(vehicle: Vehicle) -> list[tuple[Flight, ImuRecord]]:
-    """Of each flight the first accelerometer that says something: timing is the flight's."""
-    out = []
-    for flight in vehicle.counting:
-        imu = next((i for i in flight.record.imus if i.said is not None), None)
-        if imu is not None:
-            out.append((flight, imu))
-    return out
+    """Flights by the accelerometer that most of them count with: of each, timing is its own."""
+    every = [(f, i) for f in vehicle.counting for i in f.record.imus if i.said is not None]
+    count = Counter(i.calibration.imu for _, i in every)
+    best = max(count, key=lambda n: (count[n], -n), default=0)
+    return [(f, i) for f, i in every if i.calibration.imu == best]
 
 
 def _delays(vehicle: Vehicle) -> list[_Asked]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.answers.fleet.history import ANTENNA, COMMON, DELAYS, first_heard
-from onboard.answers.fleet.vehicles import Vehicle
+from onboard.answers.fleet.vehicles import RECORDING, Vehicle
 from onboard.core.fleet.limits import FEWEST_VEHICLES, SHARED_FALSE_ALARM
 from onboard.core.fleet.shared import Shared, pooled, shared
 
@@ -79,14 +79,17 @@ def common_of(vehicles: Sequence[Vehicle]) -> Comparison:
 
 def _values(vehicle: Vehicle) -> Iterator[Value]:
     """What one vehicle says of its type, flight by flight."""
+    if vehicle.identified_by == RECORDING:  # several of these may be one vehicle
+        return
+    built = vehicle.type if vehicle.latest.provenance.model else ""
     for flight, imu in first_heard(vehicle):
         receiver = flight.record.provenance.receiver
-        for name, of in ((LATENCY, receiver), (ATTITUDE, vehicle.type)):
+        for name, of in ((LATENCY, receiver), (ATTITUDE, built)):
             estimate = imu.calibration.timing.get(name)
             if estimate is not None and of and estimate.sigma > 0.0:
                 yield name, "s", of, vehicle.name, estimate.value, estimate.sigma
-        if imu.antenna is None:
+        if imu.antenna is None or not built:
             continue
         for name, value, sigma in zip(ANTENNA, imu.antenna.value, imu.antenna.sigma, strict=True):
             if value is not None and sigma is not None:
-                yield name, "m", vehicle.type, vehicle.name, value, sigma
+                yield name, "m", built, vehicle.name, value, sigma
