@@ -43,16 +43,16 @@ def busy(cluster) -> int:
 
 @pytest.mark.slow
 def test_a_lost_worker_changes_nothing(cluster, tmp_path):
-    paths = write(tmp_path, {f"{k}.BIN": 4 + k for k in range(6)})
+    paths = write(tmp_path, {f"{k}.BIN": 4 + k for k in range(4)})
     work = jobs(paths)
-    local = dict(outcomes(work, 2))
+    local = dict(outcomes(work, 1))
     found, lost = {}, None
     for number, outcome in on_cluster(cluster.scheduler_address, work, per_batch=1):
         found[number] = outcome
         if lost is None:
             lost = busy(cluster)
             os.kill(lost, signal.SIGKILL)
-    assert sorted(found) == list(range(6))
+    assert sorted(found) == list(range(4))
     for number, outcome in found.items():
         assert outcome.error == ""
         assert ENCODE(outcome.record) == ENCODE(local[number].record)

@@ -13,6 +13,9 @@ from onboard.cli.main import run
 from tests.recordings.dataflash_writer import modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
 
+ONE = ("--jobs", "1")
+"""Process: each costs a second to begin."""
+
 
 @pytest.fixture
 def fleet(tmp_path) -> Path:
@@ -39,7 +42,7 @@ def spoil(fleet: Path) -> None:
 @pytest.mark.slow
 def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
     lengthen(fleet)
-    assert run(["fleet", str(fleet)]) == 0
+    assert run(["fleet", str(fleet), *ONE]) == 0
     out, err = capsys.readouterr()
     assert err == ""
     head, *lines = out.splitlines()
@@ -51,10 +54,10 @@ def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
 
 
 def test_a_bad_one_is_told_of_and_the_rest_is_done(fleet, capsys):
-    run(["fleet", str(fleet)])
+    run(["fleet", str(fleet), *ONE])
     good = capsys.readouterr().out.splitlines()
     spoil(fleet)
-    assert run(["fleet", str(fleet)]) == 2
+    assert run(["fleet", str(fleet), *ONE]) == 2
     out, err = capsys.readouterr()
     assert err == "onboard: 1 of 4 recordings could not be read\n"
     assert set(good) <= set(out.splitlines())
@@ -64,7 +67,7 @@ def test_a_bad_one_is_told_of_and_the_rest_is_done(fleet, capsys):
 
 def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
     spoil(fleet)
-    assert run(["fleet", str(fleet), "--json", "-"]) == 2
+    assert run(["fleet", str(fleet), "--json", "-", *ONE]) == 2
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "onboard.fleet/1"
     assert (document["read"], document["failed"]) == (3, 1)
@@ -78,7 +81,9 @@ def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
 @pytest.mark.slow
 def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
     lengthen(fleet)
-    assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0
+    assert (
+        run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages"), *ONE]) == 0
+    )
     pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
     assert pages == ["a.BIN.html", "b.tlog.html", "index.html"]
     index = (tmp_path / "new" / "pages" / "index.html").read_text(encoding="utf-8")
@@ -118,7 +123,7 @@ def test_neither_processes_nor_the_store_change_a_digit(fleet, tmp_path, capsys)
 
 def test_a_file_may_be_named_and_comes_once(fleet, capsys):
     file = fleet / "one" / "a.BIN"
-    assert run(["fleet", str(file), str(file.parent), "--json", "-"]) == 0
+    assert run(["fleet", str(file), str(file.parent), "--json", "-", *ONE]) == 0
     files = [r["file"] for r in json.loads(capsys.readouterr().out)["recordings"]]
     assert files == [str(file), str(file.with_name("b.tlog"))]
 
