@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,8 +32,6 @@ from sitl.recording import FlightSpec, write_tlog
 
 MILLION = 1_000_000
 FLIGHT_S = 160.0
-LOG_BYTES = 50e6
-"""Of an ordinary DataFlash log of a quarter of an hour; told with --log-bytes."""
 CORE_HOUR = 0.04
 """Currency of a core for an hour, as clouds ask; told with --core-hour."""
 HOUR_S = 3600.0
@@ -46,6 +44,16 @@ class Run:
     wall_s: float
     cpu_s: float
     largest: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Of an hour of flight: s of processor, bytes of log; of a flight: bytes kept, in memory."""
+
+    cpu_s: float
+    log: float
+    record: float
+    memory: float
 
 
 def flights(folder: Path, count: int) -> None:
@@ -75,8 +83,8 @@ def run(folder: Path, jobs: int, store: Path, document: Path) -> Run:
     return Run(time.monotonic() - began, cpu, after.ru_maxrss * 1024)
 
 
-def measured(folder: Path, processes: Sequence[int]) -> tuple[float, float, float]:
-    """Print what a folder costs; s of processor an hour of flight, bytes of record, of flight."""
+def measured(folder: Path, processes: Sequence[int]) -> Cost:
+    """Print what a folder costs."""
     hours, accelerometers, records, per_hour = 0.0, 0, [0], 0.0
     documents: set[bytes] = set()
     with tempfile.TemporaryDirectory() as scratch:
@@ -105,19 +113,23 @@ def measured(folder: Path, processes: Sequence[int]) -> tuple[float, float, floa
         print(f"document: {len(out.read_bytes()) / len(seconds):.0f} B a flight")
         kept = next(store.rglob("*.record")).read_bytes()[len(MAGIC) + DIGEST :]
         statistics(msgspec.msgpack.decode(kept, type=Record))
-        return per_hour, float(np.mean(records)), _in_memory(kept)
+        return Cost(per_hour, size / hours, float(np.mean(records)), _in_memory(kept))
 
 
-def _in_memory(kept: bytes, count: int = 200) -> float:
-    """Bytes that a record takes in the process that puts vehicles together."""
-    before = _resident()
-    held = [msgspec.msgpack.decode(kept, type=Record) for _ in range(count)]
-    return (_resident() - before) / len(held)
-
-
-def _resident() -> int:
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE")
+def _in_memory(kept: bytes, count: int = 50) -> float:
+    """Bytes that a record takes in the process that puts vehicles together; prints both kinds."""
+    sizes = []
+    for lean in (False, True):
+        tracemalloc.start()
+        held = []
+        for _ in range(count):
+            record = msgspec.msgpack.decode(kept, type=Record)
+            held.append(record.lean if lean else record)
+        del record
+        sizes.append(tracemalloc.get_traced_memory()[0] / len(held))
+        tracemalloc.stop()
+    print(f"memory: {sizes[0]:.0f} B a flight, {sizes[1]:.0f} B without --json")
+    return sizes[1]
 
 
 def statistics(kept: Record) -> None:
@@ -136,17 +148,16 @@ def _another_day(record: Record, day: int) -> Record:
     return msgspec.structs.replace(record, sha256=str(day), provenance=where)
 
 
-def million(per_hour: float, record: float, memory: float, told: argparse.Namespace) -> None:
+def million(cost: Cost, told: argparse.Namespace) -> None:
     """Print the arithmetic."""
     hours = MILLION * told.flight_s / HOUR_S
-    cores = per_hour * hours / HOUR_S
-    logs = MILLION * told.log_bytes
-    print(f"\na million flights of {told.flight_s:.0f} s, logs of {told.log_bytes / 1e6:.0f} MB:")
-    print(f"flight: {hours:,.0f} h; cores: {cores:,.0f} core hours, at {told.core_hour} each "
-          f"{cores * told.core_hour:,.0f}")  # fmt: skip
+    cores, logs = cost.cpu_s * hours / HOUR_S, cost.log * hours
+    price = cores * told.core_hour
+    print(f"\na million flights of {told.flight_s:.0f} s: {hours:,.0f} h")
+    print(f"{cores:,.0f} core hours, at {told.core_hour} each {price:,.0f}")
     print(f"in a day: {cores / 24:,.0f} cores, which read {logs / 86400 / 1e6:,.0f} MB/s")
-    print(f"logs: {logs / 1e12:.1f} TB; store: {MILLION * record / 1e9:.1f} GB")
-    print(f"memory where vehicles are put together: {MILLION * memory / 1e9:.1f} GB")
+    print(f"logs: {logs / 1e12:.1f} TB; store: {MILLION * cost.record / 1e9:.1f} GB")
+    print(f"memory where vehicles are put together: {MILLION * cost.memory / 1e9:.1f} GB")
 
 
 def main() -> None:
@@ -156,14 +167,13 @@ def main() -> None:
     parser.add_argument("--jobs", nargs="+", type=int, default=[1, 2])
     parser.add_argument("--simulated", type=int, default=8, help="flights, without a folder")
     parser.add_argument("--flight-s", type=float, default=900.0, help="of the million")
-    parser.add_argument("--log-bytes", type=float, default=LOG_BYTES)
     parser.add_argument("--core-hour", type=float, default=CORE_HOUR)
     told = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = told.folder or Path(scratch)
         if told.folder is None:
             flights(folder, told.simulated)
-        million(*measured(folder, told.jobs), told)
+        million(measured(folder, told.jobs), told)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from onboard.answers.fleet.record import Flown
@@ -23,6 +23,7 @@ class Orders:
         processes: on this machine.
         imu: answer for this accelerometer only; None: all.
         paged: a report of each is wanted.
+        documents: what only a JSON document asks for is wanted.
         store: where results are kept; None: nowhere.
         scheduler: of a Dask cluster that does it instead; empty: this machine does.
         per_batch: recordings for each task of the cluster.
@@ -31,6 +32,7 @@ class Orders:
     processes: int
     imu: int | None = None
     paged: bool = False
+    documents: bool = True
     store: Path | None = None
     scheduler: str = ""
     per_batch: int = PER_BATCH
@@ -67,7 +69,10 @@ def fly(
             paged(name, outcome.page)
         if told is not None:
             told(number, 1.0)
-        early[number] = _flown(path, name, outcome, jobs[number])
+        one = _flown(path, name, outcome, jobs[number])
+        if one.record is not None and not orders.documents:
+            one = replace(one, record=one.record.lean)
+        early[number] = one
         while following in early:
             yield early.pop(following)
             following += 1

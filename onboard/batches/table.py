@@ -6,6 +6,7 @@ file too, as metadata of the fields.  What is not known is null.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ from onboard.core.estimate.result import SIX_NAMES
 from onboard.errors import UsageError
 
 TEXT, NUMBER, INTEGER, FLAG, TEXTS = "text", "number", "integer", "flag", "texts"
+ROWS_AT_ONCE = 10_000
+"""Rows are large before they are packed [cost: 50 MB]."""
 Value = str | float | int | bool | list[str] | None
 
 
@@ -94,7 +97,7 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
     """
     arrow, parquet = imported()
     of_vehicle = {id(f.flown): (h, f) for h in histories for f in h.vehicle.flights}
-    rows = [row for one in flown for row in rows_of(one, *of_vehicle.get(id(one), (None, None)))]
+    rows = (row for one in flown for row in rows_of(one, *of_vehicle.get(id(one), (None, None))))
     types = {
         TEXT: arrow.string(),
         NUMBER: arrow.float64(),
@@ -108,10 +111,11 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
             for c in COLUMNS
         ]
     )
-    table = arrow.Table.from_pylist(rows, schema=schema)
     beside = file.with_name(f".{file.name}.part")
     try:
-        parquet.write_table(table, str(beside), compression="zstd")
+        with parquet.ParquetWriter(str(beside), schema, compression="zstd") as writer:
+            while part := list(itertools.islice(rows, ROWS_AT_ONCE)):
+                writer.write_table(arrow.Table.from_pylist(part, schema=schema))
         beside.replace(file)
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror or error})") from None

@@ -128,6 +128,7 @@ def fleet(
         processes=jobs or cores(),
         imu=imu,
         paged=report_folder is not None,
+        documents=json_file is not None,
         store=store_folder,
         scheduler=scheduler,
         per_batch=per_batch,

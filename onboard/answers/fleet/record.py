@@ -99,6 +99,12 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         return msgspec.structs.replace(self, name=path.name, document=document)
 
     @property
+    def lean(self) -> Record:
+        """The same without what only a JSON document asks for: many are held at once."""
+        document = msgspec.structs.replace(self.document, imus=[], accelerometers=msgspec.UNSET)
+        return msgspec.structs.replace(self, document=document)
+
+    @property
     def trusted_s(self) -> float:
         """The most flight with trusted GPS that an accelerometer has, s."""
         return max((i.calibration.trusted_s for i in self.imus), default=0.0)
