@@ -38,8 +38,8 @@ def on_cluster(
         per_batch: jobs a task.
 
     Raises:
-        UsageError: dask.distributed is not installed, or a worker runs another version.
-        LinkError: no scheduler answers.
+        UsageError: dask.distributed is not installed, or a worker runs another version or none.
+        LinkError: no scheduler answers, or it has no workers.
     """
     distributed = imported()
     try:
@@ -83,7 +83,13 @@ def imported() -> Any:  # noqa: ANN401 - a library without types
 
 def _same_version(client: Any, address: str) -> None:  # noqa: ANN401
     """See that the workers give the same numbers as this machine."""
-    theirs = client.run(version)
+    try:
+        theirs = client.run(version)
+    except (ImportError, OSError) as error:
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise UsageError(f"--scheduler {address}: its workers lack onboard ({said})") from None
+    if not theirs:
+        raise LinkError(f"--scheduler {address}: it has no workers")
     other = {name: its for name, its in theirs.items() if its != version()}
     if other:
         worker, its = next(iter(sorted(other.items())))

@@ -58,6 +58,31 @@ def test_a_lost_worker_changes_nothing(cluster, tmp_path):
         assert ENCODE(outcome.record) == ENCODE(local[number].record)
 
 
+class Workers:
+    """A client whose workers answer so."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def run(self, _function):
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "error", "said"),
+    [
+        ({}, LinkError, "no workers"),
+        ({"w": "0.0-old"}, UsageError, "w runs another version"),
+        (ModuleNotFoundError("No module named 'onboard'"), UsageError, "lack onboard"),
+    ],
+)
+def test_workers_that_would_give_other_numbers_are_refused(answer, error, said):
+    with pytest.raises(error, match=said):
+        batches._same_version(Workers(answer), "tcp://a:1")
+
+
 def test_no_scheduler_is_one_line(monkeypatch):
     monkeypatch.setattr(batches, "CONNECT_S", 0.5)
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
