@@ -21,6 +21,14 @@ class RecordingError(UsageError):
     """A file that is absent, is not a log, or holds nothing usable; names the file."""
 
 
+class ArraysError(UsageError):
+    """Arrays that cannot be a flight: a shape, a unit, a time; names the column."""
+
+
+class ExtraError(UsageError):
+    """Something was asked for that needs an optional package; names the package and the extra."""
+
+
 class LinkError(OnboardError):
     """The link or the autopilot failed: no heartbeat, port in use, connection refused."""
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 from xdist.scheduler import LoadFileScheduling
 
 SHARED = {
+    "tests/api/test_arrays.py": "one flight of the Python API",
+    "tests/api/test_figures.py": "one flight of the Python API",
+    "tests/api/test_manual.py": "one flight of the Python API",
+    "tests/api/test_results.py": "one flight of the Python API",
     "tests/cli/test_replay_verb.py": "explained recordings",
     "tests/core/diagnosis/test_diagnosis.py": "explained recordings",
     "tests/report/test_one_answer.py": "explained recordings",
     "tests/report/test_recorded_advice.py": "explained recordings",
     "tests/report/test_report_page.py": "explained recordings",
 }
-"""Files that ask :mod:`tests.explained` for the same recordings."""
+"""Files that ask :mod:`tests.explained` for the same recordings, or fly the same flight."""
 
 
 class SharedWork(LoadFileScheduling):

@@ -12,6 +12,7 @@ from onboard.answers.explain_document import ExplainDocument, explain_document
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
+from onboard.recordings.recording import Recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class Explanation:
 
 
 def explain(
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path | Recording],
     *,
     imu: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -73,7 +74,7 @@ def explain(
     """Read recordings of one vehicle and diagnose one accelerometer.
 
     Args:
-        paths: at least one recording.
+        paths: at least one recording; files, or opened already.
         imu: which accelerometer; the first that can be diagnosed if None.
         progress: told the share of the reading that is done.
 

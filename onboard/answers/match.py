@@ -85,6 +85,11 @@ class Match:
     not_testable: tuple[NotTestable, ...]
     frame: Mapping[str, float | list[float]] = field(default_factory=dict)
 
+    @property
+    def silent(self) -> bool:
+        """Whether the recording says nothing; the vehicle's note says why."""
+        return self.vehicle.series is None and self.verdict is Verdict.INSUFFICIENT
+
 
 def match(
     real: str | Path | Recording,

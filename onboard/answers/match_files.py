@@ -1,12 +1,16 @@
-"""Settings and frame files that a match hands back to the simulator; plain ASCII."""
+"""Frame files that a match compares with, and what it hands back to the simulator; plain ASCII."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Final
 
 from onboard.answers.match import Match
 from onboard.answers.match_words import number
+from onboard.errors import UsageError
 
 DIGITS: Final = 7
 """Of a parameter: the 24 bits of single precision are 7.2 decimal digits [data sheet]."""
@@ -27,6 +31,23 @@ def settings_text(match: Match) -> str:
 def frame_text(match: Match) -> str:
     """A JSON object for SITL's ``--model``."""
     return json.dumps(dict(match.frame), indent=2) + "\n"
+
+
+def read_frame(file: str | PathLike[str]) -> Mapping[str, object]:
+    """Keys of a frame or coefficient file.
+
+    Raises:
+        UsageError: it cannot be read, or is no JSON object.
+    """
+    try:
+        found = json.loads(Path(file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{fspath(file)}: cannot be read ({error.strerror})") from None
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{fspath(file)}: no JSON ({error})") from None
+    if not isinstance(found, dict):
+        raise UsageError(f"{fspath(file)}: no JSON object")
+    return found
 
 
 def _plain(value: float) -> str:

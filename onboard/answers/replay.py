@@ -158,7 +158,7 @@ class Replay:
 
 
 def replay(
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path | Recording],
     estimator: Estimator,
     *,
     imu: int | None = None,
@@ -167,7 +167,7 @@ def replay(
     """Feed files to one estimator and ask it.
 
     Args:
-        paths: at least one recording, all of the same vehicle.
+        paths: at least one recording, all of the same vehicle; files, or opened already.
         estimator: a fresh one; restarted between files, finished after the last.
         imu: answer for this accelerometer only.
         progress: called every few thousand samples.

@@ -21,8 +21,7 @@ from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.finding import Finding
-from onboard.errors import UsageError
-from onboard.report.parameters import is_qgc, parameter_text
+from onboard.report.parameters import explanation_text
 
 MOST_SPANS = 3
 EXAMPLES = """\
@@ -67,22 +66,11 @@ def explain(
         write_json(result.document().to_json(), json_file)
     if report_file is not None:
         # jinja2 only when it is wanted.
-        from onboard.report.explain import explain_html
+        from onboard.report.explain import explanation_html
 
-        page = explain_html(
-            result.diagnosis,
-            files=result.files,
-            autopilot=result.source.autopilot,
-            duration_s=result.duration_s,
-            advice=result.advice,
-        )
-        write_text(page, report_file)
+        write_text(explanation_html(result), report_file)
     if param_file is not None:
-        if result.advice is None:
-            raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
-        qgc = is_qgc(param_file)
-        text = parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
-        write_text(text, param_file)
+        write_text(explanation_text(result, param_file), param_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file):
         console = Console(highlight=False)
         for part in summary(result):

@@ -2,37 +2,36 @@
 
 from __future__ import annotations
 
-import math
-import textwrap
-from collections.abc import Iterator
+import gzip
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 from rich.console import Console
 from rich.text import Text
 
-from onboard.answers.fleet import FleetDocument, Flown, fly, found
-from onboard.answers.knowledge import determined
-from onboard.cli.progress import numbered
+from onboard.answers.fleet.document import fleet_document
+from onboard.answers.fleet.history import history_of
+from onboard.answers.fleet.places import found
+from onboard.answers.fleet.record import Flown
+from onboard.answers.fleet.shared_numbers import common_of
+from onboard.answers.fleet.vehicles import vehicles_of
+from onboard.batches.cluster import MOST_PER_BATCH, PER_BATCH
+from onboard.batches.crew import cores
+from onboard.batches.running import Orders, fly
+from onboard.batches.store import Store
+from onboard.cli.fleet_table import HEAD, lines, vehicle_lines
+from onboard.cli.progress import many
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
-from onboard.core.estimate.result import Calibration, Status
 from onboard.errors import UsageError
 
-NAME = 26
-WIDTH = 80
-UNKNOWN = "-"
-STATES = {
-    Status.CALIBRATED: ("calibrated", "green"),
-    Status.COLLECTING: ("too short", "yellow"),
-    Status.INSUFFICIENT: ("not shown", "yellow"),
-    Status.INVALID: ("invalid", "red"),
-}
-ROW = "{:<26} {:>3} {:<10} {:>5} {:>7} {:>8} {:>14}"
-HEAD = ROW.format("recording", "imu", "state", "cover", "scale", "offset", "residual")
+INDEX = "index.html"
 EXAMPLES = """\
 \b
 onboard fleet logs/
-onboard fleet kite-1/ kite-2/ --json fleet.json --report pages/
+onboard fleet logs/ --jobs 8 --store results/ --report pages/
+onboard fleet kite-1/ kite-2/ --by-folder --json fleet.json
+onboard fleet logs/ --parquet fleet.parquet --scheduler tcp://10.0.0.1:8786
 onboard fleet logs/ --json - | jq '.recordings[] | select(.error) | .file'
 """
 
@@ -52,17 +51,66 @@ class UnreadError(UsageError):
     help="Write the results as JSON, '-' for standard output (then without the table).",
 )
 @click.option(
+    "--parquet",
+    "parquet_file",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write a table, a row for each accelerometer of each recording (needs pyarrow).",
+)
+@click.option(
     "--report",
     "report_folder",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Write one HTML page for each recording into this folder.",
+    help="Write one HTML page for each recording into this folder, and an index of the vehicles.",
 )
 @click.option(
     "--imu", type=click.IntRange(1, 5), metavar="N", help="This accelerometer only, 1 to 5."
 )
+@click.option(
+    "--by-folder",
+    is_flag=True,
+    help="Each folder holds recordings of one vehicle, where they do not say a serial number.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 1024),
+    metavar="N",
+    help="Processes beside each other; default: a process for each core.",
+)
+@click.option(
+    "--store",
+    "store_folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Keep results here; what is there already is not done again.",
+)
+@click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS",
+    help="Let a Dask cluster do it, e.g. tcp://10.0.0.1:8786 (needs dask.distributed).",
+)
+@click.option(
+    "--batch",
+    "per_batch",
+    type=click.IntRange(1, MOST_PER_BATCH),
+    default=PER_BATCH,
+    show_default=True,
+    metavar="N",
+    help="Recordings for each task of the cluster.",
+)
 def fleet(
-    places: tuple[Path, ...], json_file: str | None, report_folder: Path | None, imu: int | None
+    places: tuple[Path, ...],
+    json_file: str | None,
+    parquet_file: Path | None,
+    report_folder: Path | None,
+    imu: int | None,
+    by_folder: bool,  # noqa: FBT001 - an option of the command
+    jobs: int | None,
+    store_folder: Path | None,
+    scheduler: str,
+    per_batch: int,
 ) -> None:
     """Calibrate from every recording in folders: .BIN, .tlog and .ulg, sub-folders too.
 
@@ -70,84 +118,88 @@ def fleet(
     largest change of an observed scale (%) and offset (m/s^2), and the velocity residual (m/s)
     with the parameters in force and with the estimate.  A recording that cannot be read is told
     of and the rest goes on; the exit status is then 2.
+
+    Recordings of one vehicle, known by the serial number of its board, are then put together: what
+    drifts, what has stepped between two flights, and which flights contradict the others.
     """
     files = found(places)
+    _possible(parquet_file, report_folder, store_folder, scheduler)
+    orders = Orders(
+        processes=jobs or cores(),
+        imu=imu,
+        paged=report_folder is not None,
+        documents=json_file is not None,
+        store=store_folder,
+        scheduler=scheduler,
+        per_batch=per_batch,
+    )
     console = Console(highlight=False, soft_wrap=True)
     table = json_file != STANDARD_OUTPUT
-    if report_folder is not None:
-        _make(report_folder)
+    places_of, pages = pages_of([name for _, name in files]), dict[str, str]()
+
+    def paged(name: str, packed: bytes) -> None:
+        if report_folder is not None:
+            pages[name] = places_of[name]
+            write_text(gzip.decompress(packed).decode(), str(report_folder / pages[name]))
+
     if table:
         console.print(Text(HEAD, style="bold"))
     done: list[Flown] = []
-    for one in fly(files, imu=imu, watched=report_folder is not None, watching=numbered):
-        if report_folder is not None:
-            _report(one, report_folder)
-        if table:
-            for line in _lines(one):
+    with many(len(files)) as told:
+        for one in fly(files, orders, told=told, paged=paged):
+            done.append(one)
+            for line in lines(one) if table else ():
                 console.print(line)
-        # What a page was drawn from is large, and no longer needed.
-        done.append(Flown(one.path, one.name, one.replay, None, one.error))
+    histories = [history_of(v) for v in vehicles_of(done, by_folder=by_folder)]
+    compared = common_of([h.vehicle for h in histories])
+    for line in vehicle_lines(histories, compared) if table else ():
+        console.print(line)
+    if report_folder is not None:
+        from onboard.report.fleet import fleet_html
+
+        index = fleet_html(done, histories, compared, pages)
+        write_text(index, str(report_folder / INDEX))
+    if parquet_file is not None:
+        from onboard.batches.table import write_parquet
+
+        write_parquet(done, histories, parquet_file)
     if json_file is not None:
-        write_json(FleetDocument.of(done).to_json(), json_file)
+        write_json(fleet_document(done, histories, compared).to_json(), json_file)
     failed = sum(bool(one.error) for one in done)
     if failed:
         raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
 
 
-def _lines(one: Flown) -> Iterator[Text]:
-    if one.replay is None:
-        said = one.error.removeprefix(f"{one.path}: ")
-        yield from _wrapped(f"{_short(one.name):<{NAME}} {said}", "red")
-        return
-    name = _short(one.name)
-    for calibration in one.replay.calibrations:
-        yield _line(name, calibration)
-        name = ""
-    for recording in one.replay.recordings:
-        for damage in recording.damage:
-            yield from _wrapped(f"{'':<{NAME}} damage: {damage}", "yellow")
+def pages_of(names: Sequence[str]) -> dict[str, str]:
+    """The file of each recording's report, beside the index, by the name of the recording."""
+    out: dict[str, str] = {}
+    taken = {INDEX}
+    for name in names:
+        plain = "-".join(part for part in Path(name).parts if part != Path(name).anchor)
+        page, n = f"{plain}.html", 2
+        while page in taken:
+            page, n = f"{plain}-{n}.html", n + 1
+        taken.add(page)
+        out[name] = page
+    return out
 
 
-def _line(name: str, c: Calibration) -> Text:
-    words, style = STATES[c.status]
-    scale = _largest(c, (0, 1, 2), c.scale, c.in_force_scale)
-    offset = _largest(c, (3, 4, 5), c.offset, c.in_force_offset)
-    residual = f"{_fixed(c.velocity_rms_before, 2)} > {_fixed(c.velocity_rms_after, 2)}"
-    row = ROW.format(
-        name,
-        c.imu,
-        words,
-        f"{c.coverage.percent:.0f} %",
-        f"{100.0 * scale:+.2f}" if math.isfinite(scale) else UNKNOWN,
-        f"{offset:+.3f}" if math.isfinite(offset) else UNKNOWN,
-        residual,
-    )
-    line = Text(row)
-    line.stylize(style, NAME + 5, NAME + 15)
-    return line
+def _possible(
+    parquet_file: Path | None, report_folder: Path | None, store_folder: Path | None, scheduler: str
+) -> None:
+    """See to it before hours of work that their results can be written."""
+    if report_folder is not None:
+        _make(report_folder)
+    if store_folder is not None:
+        Store(store_folder).prepare()
+    if parquet_file is not None:
+        from onboard.batches.table import imported
 
+        imported()
+    if scheduler:
+        from onboard.batches.cluster import imported as cluster
 
-def _largest(
-    c: Calibration, which: tuple[int, ...], values: tuple[float, ...], held: tuple[float, ...]
-) -> float:
-    """The largest change of a known number, with its sign; NaN if none is known."""
-    found = determined(c)
-    flags = found.known if found is not None else (False,) * 6
-    changes = [values[i % 3] - held[i % 3] for i in which if flags[i]]
-    return max(changes, key=abs, default=math.nan)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= NAME else "..." + name[-NAME + 3 :]
-
-
-def _wrapped(text: str, style: str) -> Iterator[Text]:
-    for line in textwrap.wrap(text, WIDTH, subsequent_indent=" " * (NAME + 1)):
-        yield Text(line, style=style)
-
-
-def _fixed(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else UNKNOWN
+        cluster()
 
 
 def _make(folder: Path) -> None:
@@ -155,12 +207,3 @@ def _make(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder}: cannot be made ({error.strerror})") from None
-
-
-def _report(one: Flown, folder: Path) -> None:
-    if one.replay is None or one.chronicle is None:
-        return
-    from onboard.report.replay import replay_html
-
-    name = "-".join(Path(one.name).parts) + ".html"
-    write_text(replay_html(one.replay, one.chronicle), str(folder / name))

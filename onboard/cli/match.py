@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -16,11 +15,10 @@ from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import match_document
-from onboard.answers.match_files import frame_text, settings_text
+from onboard.answers.match_files import frame_text, read_frame, settings_text
 from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
 from onboard.cli.progress import reading, waiting
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
-from onboard.core.diagnosis.records import Verdict
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.recording import Recording
 from onboard.recordings.table import open_table
@@ -79,15 +77,15 @@ def match(
     """
     if len(logs) > TWO:
         raise UsageError("match takes one recording, or a simulation's and a real one")
-    frame = None if given_frame is None else _frame(given_frame)
+    frame = None if given_frame is None else read_frame(given_frame)
     opened = [_opened(log, columns_file) for log in logs]
     simulation = opened[0] if len(logs) == TWO else None
     try:
         with reading(logs, then="comparing vehicles") as progress:
             result = match_recordings(opened[-1], simulation, frame=frame, progress=progress)
     except ValueError as error:
-        raise UsageError(f"--frame {given_frame}: {error}") from None
-    if result.vehicle.series is None and result.verdict is Verdict.INSUFFICIENT:
+        raise UsageError(f"{given_frame}: no frame of a simulator ({error})") from None
+    if result.silent:
         raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
     verified = None
     if verifies:
@@ -126,23 +124,6 @@ def _opened(log: Path, columns: str | None) -> Path | Recording:
     if columns is None:
         raise UsageError(f"{log}: a table needs --columns: what its columns are")
     return open_table(log, columns)
-
-
-def _frame(file: str) -> Mapping[str, object]:
-    """Keys of a frame file.
-
-    Raises:
-        UsageError: it cannot be read, or is no JSON object.
-    """
-    try:
-        found = json.loads(Path(file).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"--frame {file}: cannot be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:
-        raise UsageError(f"--frame {file}: no JSON ({error})") from None
-    if not isinstance(found, dict):
-        raise UsageError(f"--frame {file}: no JSON object")
-    return found
 
 
 def summary(result: Match) -> Iterator[RenderableType]:

@@ -43,12 +43,20 @@ def waiting(what: str) -> Iterator[None]:
 
 
 @contextmanager
-def numbered(path: Path, number: int, total: int) -> Iterator[Told | None]:
-    """A bar for one recording of many."""
+def many(total: int) -> Iterator[Callable[[int, float], None] | None]:
+    """A bar for many recordings: told the number of one and the share of it that is done."""
     if not sys.stderr.isatty():
         yield None
         return
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn(f"{number} of {total}")
+    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
+    shares: dict[int, float] = {}
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"reading {path.name}", total=total, completed=number - 1)
-        yield lambda done: bar.update(task, completed=number - 1 + done)
+        task = bar.add_task(f"reading {total} recordings", total=total)
+
+        def told(number: int, share: float) -> None:
+            shares[number] = max(share, shares.get(number, 0.0))
+            done = sum(s >= 1.0 for s in shares.values())
+            said = f"reading, {done} of {total} done"
+            bar.update(task, completed=sum(shares.values()), description=said)
+
+        yield told

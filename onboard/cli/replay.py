@@ -7,12 +7,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from onboard.answers.flights import Flights, distinct
-from onboard.answers.recorded import Recorded
-from onboard.answers.replay import replay as replay_recordings
+from onboard.answers.calibrated import calibrated
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
-from onboard.errors import UsageError
+from onboard.report.files import save
 
 STANDARD_OUTPUT = "-"
 
@@ -58,29 +56,18 @@ def replay(
     contradict each other are named, not averaged.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
-    wanted, watched = () if imu is None else (imu,), report_file is not None
-    recorded: Recorded | Flights
-    if len(logs) == 1:
-        recorded = Recorded(wanted, watched=watched)
-    else:
-        recorded = Flights(distinct(logs), wanted, watched=watched)
     with reading(logs, then="comparing models") as progress:
-        result = replay_recordings(logs, recorded, imu=imu, progress=progress)
-    drawn = recorded.chronicle
+        made = calibrated(logs, imu=imu, watched=report_file is not None, progress=progress)
+    result, drawn = made.replay, made.chronicle
     if report_file is not None and drawn is not None:
         # jinja2 only when it is wanted.
         from onboard.report.replay import replay_html
 
         write_text(replay_html(result, drawn), report_file)
     if param_file is not None:
-        from onboard.report.parameters import calibration_text, is_qgc
+        from onboard.report.parameters import replay_text
 
-        advice = [its for its in result.advice if its is not None]
-        if not advice:
-            raise UsageError(f"--param {param_file}: {logs[0]} is not of an ArduPilot")
-        names = [recording.path.name for recording in result.recordings]
-        qgc = is_qgc(param_file)
-        write_text(calibration_text(result.answers, advice, names, qgc=qgc), param_file)
+        write_text(replay_text(result, param_file), param_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file):
@@ -95,13 +82,7 @@ def write_json(document: bytes, file: str) -> None:
     Raises:
         UsageError: the file cannot be written.
     """
-    if file == STANDARD_OUTPUT:
-        click.echo(document, nl=False)
-        return
-    try:
-        Path(file).write_bytes(document)
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
+    _write(document, file)
 
 
 def write_text(text: str, file: str) -> None:
@@ -110,10 +91,11 @@ def write_text(text: str, file: str) -> None:
     Raises:
         UsageError: the file cannot be written.
     """
+    _write(text, file)
+
+
+def _write(content: str | bytes, file: str) -> None:
     if file == STANDARD_OUTPUT:
-        click.echo(text, nl=False)
-        return
-    try:
-        Path(file).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
+        click.echo(content, nl=False)
+    else:
+        save(content, file)

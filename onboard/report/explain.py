@@ -8,6 +8,7 @@ from typing import Any
 
 from onboard.answers import verdict, words
 from onboard.answers.advice import Advice
+from onboard.answers.explain import Explanation
 from onboard.answers.knowledge import seen
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
@@ -15,7 +16,7 @@ from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
 from onboard.core.physics.finding import Finding, Where
 from onboard.report import residual_charts
 from onboard.report.chart import pair_bar
-from onboard.report.page import render
+from onboard.report.page import PAGE, render
 from onboard.report.parameters import changes
 
 TEMPLATE = "explain.html.j2"
@@ -29,6 +30,7 @@ def explain_html(
     autopilot: str,
     duration_s: float,
     advice: Advice | None,
+    base: str = PAGE,
 ) -> str:
     """The page of one diagnosis.
 
@@ -38,6 +40,7 @@ def explain_html(
         autopilot: where the recordings are from.
         duration_s: length of the recordings, s.
         advice: which of ArduPilot's parameters to set; None for another autopilot.
+        base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
@@ -46,6 +49,7 @@ def explain_html(
     refused = diagnosis.verdict is Verdict.INSUFFICIENT
     return render(
         TEMPLATE,
+        base,
         files=list(files),
         autopilot=autopilot,
         duration=words.fixed(duration_s, 0),
@@ -77,6 +81,18 @@ def explain_html(
         parameters=() if advice is None else _parameters(diagnosis, advice),
         ambiguous=[([title_of(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous],
         not_testable=[(title_of(n.name), n.why) for n in diagnosis.not_testable],
+    )
+
+
+def explanation_html(result: Explanation, base: str = PAGE) -> str:
+    """The page of an explanation, as :func:`explain_html` makes it."""
+    return explain_html(
+        result.diagnosis,
+        files=result.files,
+        autopilot=result.source.autopilot,
+        duration_s=result.duration_s,
+        advice=result.advice,
+        base=base,
     )
 
 

@@ -15,7 +15,7 @@ from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Curve, Difference, VehicleMatch
 from onboard.report import match_charts
 from onboard.report.chart import Band, pair_bar
-from onboard.report.page import render
+from onboard.report.page import PAGE, render
 
 TEMPLATE = "match.html.j2"
 MOST_PLACES = 3
@@ -33,8 +33,13 @@ OF_EFFECT = {
 """Curves that show an effect."""
 
 
-def match_html(match: Match, verified: FlownAgain | None = None) -> str:
+def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAGE) -> str:
     """The page of one match, with its verification if there was one.
+
+    Args:
+        match: what was found.
+        verified: the simulator's flights with it.
+        base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
@@ -44,6 +49,7 @@ def match_html(match: Match, verified: FlownAgain | None = None) -> str:
     wind = v.wind
     return render(
         TEMPLATE,
+        base,
         files=[r.name for r in (match.simulation, match.real) if r is not None],
         against=_against(match),
         vehicle=v.vehicle,

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from onboard.answers import words
 from onboard.answers.match_story import AXIS_WORDS
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.records import Curve, VehicleMatch, WindEstimate
+from onboard.core.vehicle.records import Curve, ForceSeries, VehicleMatch, WindEstimate
 from onboard.report.chart import Band, Line, Points, line_chart
 
 SPEEDS_M_S = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, math.inf)
@@ -43,15 +43,23 @@ def rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2))) if x.size else math.nan
 
 
+def most_shown(s: ForceSeries) -> float:
+    """How far errors of the force are drawn, m/s^2: nearly all of them.
+
+    One scale for all axes: where nothing differs, nothing should seem to.
+    """
+    errors = np.abs(np.concatenate([s.measured - s.before, s.measured - s.after]))
+    errors = errors[np.isfinite(errors)]
+    return 1.1 * float(np.percentile(errors, 99.7)) or 1.0 if errors.size else 1.0
+
+
 def of_forces(v: VehicleMatch, marks: list[Band]) -> list[Markup]:
     """Error of the predicted force over time, one chart for each axis."""
     s = v.series
     if s is None:
         return []
     out = []
-    # One scale for all: where nothing differs, nothing should seem to.
-    errors = np.abs(np.concatenate([s.measured - s.before, s.measured - s.after]))
-    most = 1.1 * float(np.percentile(errors[np.isfinite(errors)], 99.7)) or 1.0
+    most = most_shown(s)
     for k, axis in enumerate(s.axes):
         before, after = s.measured[:, k] - s.before[:, k], s.measured[:, k] - s.after[:, k]
         told = f"{words.number(rms(before))} m/s² before, {words.number(rms(after))} m/s² after"

@@ -1,20 +1,30 @@
-"""A self-contained HTML document from a template, with the look of the status page."""
+"""A self-contained HTML document from a template, with the look of the status page.
+
+A template extends its ``base``: :data:`PAGE` is a document, :data:`HEAD` a fragment with the
+answer at the top of that document, for a place that shows results among others, as a notebook.
+"""
 
 from __future__ import annotations
 
 from importlib import resources
+from typing import Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from onboard.web.page import look
 
+PAGE: Final = "page.html.j2"
+HEAD: Final = "head.html.j2"
+STYLES: Final = {PAGE: "report.css", HEAD: "head.css"}
 
-def render(template: str, **shown: object) -> str:
+
+def render(template: str, base: str = PAGE, **shown: object) -> str:
     """A page in UTF-8 without script and without references to anything outside itself.
 
     Args:
-        template: a file of this package, which extends ``page.html.j2``.
+        template: a file of this package, which extends ``base``.
+        base: :data:`PAGE` or :data:`HEAD`.
         **shown: what the template names; text is escaped, Markup is not.
     """
     environment = Environment(
@@ -24,6 +34,9 @@ def render(template: str, **shown: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    layout = resources.files("onboard.report").joinpath("report.css").read_text(encoding="utf-8")
-    style = Markup(look() + layout)  # noqa: S704  files of ours
-    return environment.get_template(template).render(style=style, **shown)
+    layout = resources.files("onboard.report").joinpath(STYLES[base]).read_text(encoding="utf-8")
+    common = look() if base == PAGE else ""  # it is for a document of its own
+    style = Markup(common + layout)  # noqa: S704  files of ours
+    return environment.get_template(template).render(
+        base=base, brief=base == HEAD, style=style, **shown
+    )

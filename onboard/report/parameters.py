@@ -11,12 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
+from onboard.answers.explain import Explanation
+from onboard.answers.replay import Replay
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.core.physics.catalogue import title_of
+from onboard.errors import UsageError
 
 REAL32 = 9
 INTEGERS = {
@@ -82,6 +86,31 @@ def calibration_text(
         lines += _about(given.calibration, its)
         lines += _settings(_six(its), qgc=qgc)
     return _text([*lines, "# Compare with the parameters in force before loading."])
+
+
+def replay_text(result: Replay, file: str | Path) -> str:
+    """The parameter file of a replay, in the format that its name asks for.
+
+    Raises:
+        UsageError: the recordings are of another autopilot.
+    """
+    advice = [its for its in result.advice if its is not None]
+    if not advice:
+        raise UsageError(f"{file}: {result.recordings[0].path} is not of an ArduPilot")
+    names = [recording.path.name for recording in result.recordings]
+    return calibration_text(result.answers, advice, names, qgc=is_qgc(str(file)))
+
+
+def explanation_text(result: Explanation, file: str | Path) -> str:
+    """The parameter file of an explanation, in the format that its name asks for.
+
+    Raises:
+        UsageError: the recordings are of another autopilot.
+    """
+    if result.advice is None:
+        raise UsageError(f"{file}: {result.source.recordings[0].path} is not of an ArduPilot")
+    qgc = is_qgc(str(file))
+    return parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
 
 
 def is_qgc(file: str) -> bool:

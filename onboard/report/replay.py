@@ -23,7 +23,7 @@ from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
 from onboard.report.flight_rows import flight_rows
-from onboard.report.page import render
+from onboard.report.page import PAGE, render
 
 Array = NDArray[np.float64]
 
@@ -61,12 +61,13 @@ HEADLINES = {
 }
 
 
-def replay_html(result: Replay, chronicle: Drawn) -> str:
+def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
     """The page of one replay.
 
     Args:
         result: what the replay gave; numbers that are not finite are shown as not known.
         chronicle: what stood before the calibrator in that replay.
+        base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
@@ -81,6 +82,7 @@ def replay_html(result: Replay, chronicle: Drawn) -> str:
         headline = HEADLINES[worst]
     return render(
         TEMPLATE,
+        base,
         files=[r.path.name for r in result.recordings],
         autopilot=result.autopilot,
         duration=words.fixed(result.duration_s, 0),
@@ -268,26 +270,32 @@ def _six_charts(course: Course) -> list[Markup]:
         t, value, sigma = course.t, course.value[:, i], course.sigma[:, i]
         low, high = value - SIGMAS * sigma, value + SIGMAS * sigma
         force = course.in_force[:, i]
-        later = slice(int(BEGINNING * len(t)), None)
-        needs = Needs()
-        least = needs.scale if i < 3 else needs.offset
-        bounds = np.concatenate([low[later], high[later], force[later]])
         unit = "factor" if i < 3 else "m/s²"
-        y_range = None
-        if len(bounds):
-            bottom, top = float(bounds.min()), float(bounds.max())
-            margin = 0.08 * max(top - bottom, least)
-            y_range = (bottom - margin, top + margin)
         charts.append(
             line_chart(
                 name,
                 unit,
                 [Line(t, force, "in-force", "in force"), Line(t, value, "estimate", "estimate")],
                 ribbons=[Ribbon(t, low, high, "estimate")],
-                y_range=y_range,
+                y_range=shown_range(course, i),
             )
         )
     return charts
+
+
+def shown_range(course: Course, i: int) -> tuple[float, float] | None:
+    """What of one number's course is shown: its wide beginning may leave the picture."""
+    spread = SIGMAS * course.sigma[:, i]
+    every = (course.value[:, i] - spread, course.value[:, i] + spread, course.in_force[:, i])
+    later = slice(int(BEGINNING * len(course.t)), None)
+    bounds = np.concatenate([curve[later] for curve in every])
+    bounds = bounds[np.isfinite(bounds)]
+    if not len(bounds):
+        return None
+    bottom, top = float(bounds.min()), float(bounds.max())
+    needs = Needs()
+    margin = 0.08 * max(top - bottom, needs.scale if i < 3 else needs.offset)
+    return bottom - margin, top + margin
 
 
 def _residual_chart(f: Figures, chronicle: Drawn) -> Markup:

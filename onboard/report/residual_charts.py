@@ -39,11 +39,7 @@ def shading(d: Diagnosis) -> dict[str, bool]:
 
 def of_flight(d: Diagnosis, duration_s: float) -> list[Markup]:
     """Residual over time by component, with located intervals and times of effects."""
-    bands = [Band(a, b, "interval") for e in d.effects for a, b in e.intervals[:MOST_BANDS]]
-    if is_located(d):
-        bands = [Band(w.start_s, w.end_s, "located") for w in d.mismatch.where] + bands
-    bands += [Band(t, t, "onset") for t in _onsets(d)]
-    s = d.series
+    bands, s = marks(d), d.series
     whole = (0.0, duration_s) if math.isfinite(duration_s) and duration_s > 0.0 else None
     if whole is not None and len(s.t):
         whole = (0.0, max(duration_s, float(np.max(s.t))))
@@ -71,6 +67,14 @@ def of_flight(d: Diagnosis, duration_s: float) -> list[Markup]:
         said = Markup('<p class="muted">{} velocity residual: no data to draw.</p>')
         out.append(said.format(words.listed(silent)))
     return out
+
+
+def marks(d: Diagnosis) -> list[Band]:
+    """Where the mismatch lives, times of effects and moments of jumps."""
+    bands = [Band(a, b, "interval") for e in d.effects for a, b in e.intervals[:MOST_BANDS]]
+    if is_located(d):
+        bands = [Band(w.start_s, w.end_s, "located") for w in d.mismatch.where] + bands
+    return bands + [Band(t, t, "onset") for t in _onsets(d)]
 
 
 def _onsets(d: Diagnosis) -> list[float]:

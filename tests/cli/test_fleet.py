@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from onboard.answers.fleet.places import found
+from onboard.cli.fleet import pages_of
 from onboard.cli.main import run
 from tests.recordings.dataflash_writer import modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
+
+ONE = ("--jobs", "1")
+"""Process: each costs a second to begin."""
 
 
 @pytest.fixture
@@ -37,7 +42,7 @@ def spoil(fleet: Path) -> None:
 @pytest.mark.slow
 def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
     lengthen(fleet)
-    assert run(["fleet", str(fleet)]) == 0
+    assert run(["fleet", str(fleet), *ONE]) == 0
     out, err = capsys.readouterr()
     assert err == ""
     head, *lines = out.splitlines()
@@ -49,10 +54,10 @@ def test_a_line_for_each_accelerometer_of_each_recording(fleet, capsys):
 
 
 def test_a_bad_one_is_told_of_and_the_rest_is_done(fleet, capsys):
-    run(["fleet", str(fleet)])
+    run(["fleet", str(fleet), *ONE])
     good = capsys.readouterr().out.splitlines()
     spoil(fleet)
-    assert run(["fleet", str(fleet)]) == 2
+    assert run(["fleet", str(fleet), *ONE]) == 2
     out, err = capsys.readouterr()
     assert err == "onboard: 1 of 4 recordings could not be read\n"
     assert set(good) <= set(out.splitlines())
@@ -62,7 +67,7 @@ def test_a_bad_one_is_told_of_and_the_rest_is_done(fleet, capsys):
 
 def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
     spoil(fleet)
-    assert run(["fleet", str(fleet), "--json", "-"]) == 2
+    assert run(["fleet", str(fleet), "--json", "-", *ONE]) == 2
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "onboard.fleet/1"
     assert (document["read"], document["failed"]) == (3, 1)
@@ -76,16 +81,65 @@ def test_json_has_a_replay_or_an_error_for_each(fleet, capsys):
 @pytest.mark.slow
 def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
     lengthen(fleet)
-    assert run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages")]) == 0
+    assert (
+        run(["fleet", str(fleet / "one"), "--report", str(tmp_path / "new" / "pages"), *ONE]) == 0
+    )
     pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
-    assert pages == ["a.BIN.html", "b.tlog.html"]
+    assert pages == ["a.BIN.html", "b.tlog.html", "index.html"]
+    index = (tmp_path / "new" / "pages" / "index.html").read_text(encoding="utf-8")
+    assert 'href="a.BIN.html"' in index
+    assert "http" not in index
+
+
+@pytest.mark.slow
+def test_neither_processes_nor_the_store_change_a_digit(fleet, tmp_path, capsys):
+    lengthen(fleet)
+    spoil(fleet)
+    store = ["--store", str(tmp_path / "store")]
+
+    def document(*more):
+        assert run(["fleet", str(fleet), "--json", str(tmp_path / "out.json"), *more]) == 2
+        return (tmp_path / "out.json").read_bytes(), capsys.readouterr().out
+
+    first, _ = document("--jobs", "1", *store)
+    again, _ = document("--jobs", "2")
+    assert again == first
+    kept = sorted((tmp_path / "store").rglob("*.record"))
+    assert len(kept) == 3
+    kept[0].write_bytes(kept[0].read_bytes()[:-1])
+    times = [file.stat().st_mtime_ns for file in kept]
+    again, told = document("--jobs", "2", *store)
+    assert again == first
+    assert "torn" in " ".join(told.split())
+    assert [file.stat().st_mtime_ns == t for file, t in zip(kept, times, strict=True)] == [
+        False, True, True,
+    ]  # fmt: skip
+    moved = fleet.rename(tmp_path / "elsewhere")
+    assert run(["fleet", str(moved), "--json", "-", *store]) == 2
+    recordings = json.loads(capsys.readouterr().out)["recordings"]
+    assert all(str(moved) in r["file"] for r in recordings)
+    assert all(r["replay"]["recording"]["files"] == [r["file"]] for r in recordings if r["replay"])
 
 
 def test_a_file_may_be_named_and_comes_once(fleet, capsys):
     file = fleet / "one" / "a.BIN"
-    assert run(["fleet", str(file), str(file.parent), "--json", "-"]) == 0
+    assert run(["fleet", str(file), str(file.parent), "--json", "-", *ONE]) == 0
     files = [r["file"] for r in json.loads(capsys.readouterr().out)["recordings"]]
     assert files == [str(file), str(file.with_name("b.tlog"))]
+
+
+def test_names_tell_recordings_apart_and_so_do_their_pages(tmp_path):
+    for name in ("x/kite", "y/kite", "z"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "1.BIN").write_bytes(b"")
+    names = [name for _, name in found([tmp_path / "x" / "kite", tmp_path / "z"])]
+    assert names == ["kite/1.BIN", "z/1.BIN"]
+    names = [name for _, name in found([tmp_path / n for n in ("x/kite", "y/kite", "z")])]
+    assert len(set(names)) == 3
+    assert names[2] == "z/1.BIN"
+    pages = pages_of(["a/b.BIN", "a-b.BIN", "index"])
+    assert len(set(pages.values())) == 3
+    assert "index.html" not in pages.values()
 
 
 @pytest.mark.parametrize(
@@ -95,6 +149,8 @@ def test_a_file_may_be_named_and_comes_once(fleet, capsys):
         (["{tmp}/empty"], "no recording"),
         ([], "DIR"),
         (["{fleet}", "--report", "{fleet}/notes.txt"], "cannot be made"),
+        (["{fleet}", "--store", "{fleet}/notes.txt"], "cannot be written"),
+        (["{fleet}", "--jobs", "0"], "--jobs"),
         (["{fleet}", "--json", "{tmp}/empty"], "cannot be written"),
     ],
 )

@@ -53,6 +53,12 @@ def test_help_fits_eighty_columns_and_shows_each_example_on_its_line(verb, capsy
         assert set(example_lines(verb)) <= {line.strip() for line in lines}
 
 
+FLEET_OPTIONS = {
+    "--json", "--parquet", "--report", "--imu", "--by-folder", "--jobs", "--store", "--scheduler",
+    "--batch", "--help",
+}  # fmt: skip
+
+
 def complete(words: str, index: int, shell: str = "bash") -> list[str]:
     environment = {
         **os.environ,
@@ -77,7 +83,7 @@ def complete(words: str, index: int, shell: str = "bash") -> list[str]:
         ("onboard re", 1, {"replay", "reject", "reset"}),
         ("onboard run --po", 2, {"--policy"}),
         ("onboard run --policy l", 3, {"landed"}),
-        ("onboard fleet --", 2, {"--json", "--report", "--imu", "--help"}),
+        ("onboard fleet --", 2, FLEET_OPTIONS),
     ],
 )
 def test_completion_offers_verbs_options_and_choices(words, index, offered):

@@ -1,0 +1,136 @@
+"""How urgently somebody should look at a vehicle, and why, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from enum import Enum
+
+from onboard.answers.fleet.history import Accelerometer, History, Number
+from onboard.answers.fleet.shared_numbers import Common
+from onboard.answers.fleet.vehicles import Flight
+from onboard.core.estimate.result import Status
+from onboard.core.fleet.course import Sized
+
+NAMES = {
+    "gps_delay_s": "latency of GPS",
+    "imu_delay_s": "delay of the attitude",
+    "antenna_x_m": "antenna forward",
+    "antenna_y_m": "antenna right",
+    "antenna_z_m": "antenna down",
+}
+"""Numbers that are not of an accelerometer, in words."""
+UNITS = {"1": "", "m/s^2": " m/s²", "s": " s", "m": " m"}
+
+
+class Severity(Enum):
+    """What there is to do, the most urgent first."""
+
+    CONTRADICTED = "contradicted"
+    CHANGED = "changed"
+    UNKNOWN = "unknown"
+    WELL = "well"
+
+
+SAID = {
+    Severity.CONTRADICTED: "flights contradict each other, or have no valid result",
+    Severity.CHANGED: "a number has changed",
+    Severity.UNKNOWN: "no flight has calibrated it",
+    Severity.WELL: "nothing to do",
+}
+
+
+def severity_of(h: History) -> Severity:
+    """The most urgent that holds."""
+    every = [n for a in h.accelerometers for n in a.numbers]
+    latest = [i.calibration.status for i in h.vehicle.latest.imus]
+    contradicted = any(n.course.odd for n in every) or any(
+        a.flights and (a.merged is None or a.merged.contradicted)
+        for a in h.accelerometers
+        if not any(n.course.drifts for n in a.numbers)
+    )
+    if contradicted or Status.INVALID in latest:
+        return Severity.CONTRADICTED
+    if any(n.course.steps or n.course.drifts for n in (*every, *h.numbers)) or any(
+        n.course.odd for n in h.numbers
+    ):
+        return Severity.CHANGED
+    statuses = {i.calibration.status for f in h.vehicle.counting for i in f.record.imus}
+    return Severity.WELL if Status.CALIBRATED in statuses else Severity.UNKNOWN
+
+
+def sentences(h: History) -> tuple[str, ...]:
+    """What there is to say of a vehicle over time."""
+    out: list[str] = []
+    for a in h.accelerometers:
+        out += [f"accelerometer {a.imu}: {said}" for n in a.numbers for said in _said(n)]
+        out += [f"accelerometer {a.imu}: {said}" for said in _merged(a)]
+    out += [said for n in h.numbers for said in _said(n)]
+    return tuple(out)
+
+
+def shared_sentence(c: Common) -> str:
+    """What a type shares, in one sentence."""
+    s, u = c.shared, UNITS[c.unit]
+    name = NAMES[c.name] + (" beside what is told" if c.unit == "m" else "")
+    scatter = f"which scatter by {_rounded(s.between, s.sigma)}{u}"
+    return (
+        f"{c.of}: {name} {sized(Sized(s.mean, s.sigma, s.p_value), u)} on {s.count} vehicles, "
+        f"{scatter if s.between else 'which scatter no more than their sigmas'}"
+    )
+
+
+def sized(x: Sized, unit: str) -> str:
+    """``+0.123 ± 0.011 m/s²``."""
+    return f"{_rounded(x.size, x.sigma, signed=True)} ± {_rounded(x.sigma, x.sigma)}{unit}"
+
+
+def day(flight: Flight) -> str:
+    """``2025-03-08``; empty where the recording does not say."""
+    began = flight.record.provenance.began_unix_s
+    return "" if began is None else datetime.fromtimestamp(began, UTC).strftime("%Y-%m-%d")
+
+
+def _said(n: Number) -> Iterator[str]:
+    name, unit = NAMES.get(n.name, n.name), UNITS[n.unit]
+    for step in n.course.steps:
+        yield (
+            f"{name} stepped by {sized(step.sized, unit)} between "
+            f"{_flight(n.flights[step.first])} and {_flight(n.flights[step.last + 1])}"
+        )
+    for odd in n.course.odd:
+        flight = n.flights[odd.flight]
+        last = " (the last flight: it erred, or something has changed since)"
+        yield (
+            f"{name} of {_flight(flight)} contradicts the others by {sized(odd.sized, unit)}"
+            f"{last if odd.flight == len(n.flights) - 1 and len(n.flights) > 2 else ''}"
+        )
+    if n.course.drifts and n.course.trend is not None:
+        yield f"{name} drifts by {sized(n.course.trend, unit)} a day"
+
+
+def _merged(a: Accelerometer) -> Iterator[str]:
+    if a.flights and a.why:
+        yield a.why
+    if a.merged is not None and a.merged.contradicted:
+        yield f"contradicted by {_listed([a.flights[i] for i in a.merged.contradicted])}"
+
+
+def _listed(flights: Sequence[Flight]) -> str:
+    return ", ".join(_flight(f) for f in flights)
+
+
+def _flight(flight: Flight) -> str:
+    when = day(flight)
+    return f"{flight.flown.name} ({when})" if when else flight.flown.name
+
+
+def _rounded(value: float, sigma: float, *, signed: bool = False) -> str:
+    """With two digits of the sigma."""
+    if not math.isfinite(value):
+        return "-"
+    places = 3
+    if math.isfinite(sigma) and sigma > 0.0:
+        places = min(9, max(0, 1 - math.floor(math.log10(sigma))))
+    return f"{value:+.{places}f}" if signed else f"{value:.{places}f}"

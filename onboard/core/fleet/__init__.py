@@ -1,0 +1,1 @@
+"""Many flights of one accelerometer, and many vehicles: numbers over time and over vehicles."""

@@ -1,0 +1,123 @@
+"""The six numbers of one accelerometer over its flights: each as a series, and all of them merged.
+
+A flight's answer leans on what was in force before it.  For its place in a series that is taken
+out: the flight is solved again with a prior :data:`~onboard.core.fleet.limits.WIDE` times as wide,
+and a number counts where the flight alone knows it to half of the usual prior's sigma.  Sigmas are
+those with its gyroscope (:func:`onboard.core.estimate.calibration_record.gyro_sigma`): the
+gyroscope's part is the same in all flights of a vehicle and neither a drift nor a step.
+
+Merged are the flights after the last step of any of the six
+(:mod:`onboard.core.estimate.merged_flights`), none of those that are odd, and nothing at all where
+a number drifts: of that there is no mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.estimate.joint import FLOOR
+from onboard.core.estimate.limits import PRIOR_SHARE
+from onboard.core.estimate.merged_flights import (
+    FlightSix,
+    Normal,
+    Prior,
+    merged,
+    reconciled,
+    scatter_of,
+)
+from onboard.core.fleet.limits import MOST_RECONCILED, WIDE
+from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
+from onboard.core.maths.arrays import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """What a flight says without any prior: (6,) scale (1) and offset (m/s^2), and sigmas.
+
+    NaN where the flight does not know the number by itself.
+    """
+
+    value: Array
+    sigma: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """Flights merged.
+
+    Attributes:
+        value: (6,) scale (1) and offset (m/s^2).
+        sigma: (6,) of them, with the gyroscope's part.
+        counted: indices of the flights in it.
+        contradicted: indices of flights that contradict the others.
+        inflation: factor on the variance of all flights, for their scatter.
+    """
+
+    value: Array
+    sigma: Array
+    counted: tuple[int, ...]
+    contradicted: tuple[int, ...]
+    inflation: float
+
+
+def alone(flight: FlightSix, prior: Prior) -> Alone:
+    """One flight's own values.
+
+    Args:
+        flight: what it says, with the floors.
+        prior: of any sensor, about what was in force.
+    """
+    unit, said = prior.sigma, _in_units(flight, prior)
+    A = said.N + np.eye(6) / WIDE**2
+    linear = prior.center + unit * np.linalg.solve(A, said.b)
+    J = parameters_jacobian(linear)
+    P = J @ (np.linalg.inv(A) * np.outer(unit, unit)) @ J.T
+    value, sigma = parameters_of(linear), np.sqrt(np.maximum(np.diag(P), 0.0))
+    known = np.isfinite(value) & (sigma > 0.0) & (sigma < PRIOR_SHARE * unit)
+    return Alone(np.where(known, value, np.nan), np.where(known, sigma, np.nan))
+
+
+def together(
+    flights: Sequence[FlightSix], which: Sequence[int], prior: Prior, gyro_sigma: Array
+) -> Together | None:
+    """Flights merged; None if nobody can say which are right.
+
+    Args:
+        flights: of one accelerometer, in order.
+        which: indices of those that may count, in order, at least one.
+        prior: of any sensor, about what was in force last.
+        gyro_sigma: (6,) what the gyroscope's axes put into the six.
+    """
+    counted, odd = _agreeing([flights[i] for i in which], prior)
+    if not counted:
+        return None
+    found = merged([flights[which[i]] for i in counted], prior)
+    J = parameters_jacobian(found.estimate)
+    P = J @ found.covariance @ J.T + np.diag(FLOOR**2 + gyro_sigma**2)
+    return Together(
+        parameters_of(found.estimate),
+        np.sqrt(np.diag(P)),
+        tuple(which[i] for i in counted),
+        tuple(which[i] for i in odd),
+        found.inflation,
+    )
+
+
+def _agreeing(said: Sequence[FlightSix], prior: Prior) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Which flights count and which contradict; of many that contradict each other, the last."""
+    if not scatter_of([_in_units(f, prior) for f in said]).contradicted:
+        return tuple(range(len(said))), ()
+    recent = max(0, len(said) - MOST_RECONCILED)
+    found = reconciled(said[recent:], prior)
+    return (
+        tuple(i + recent for i in found.counted),
+        tuple(i + recent for i in found.contradicted),
+    )
+
+
+def _in_units(f: FlightSix, prior: Prior) -> Normal:
+    b = f.floored_vector - f.floored @ prior.center
+    return Normal(f.floored * np.outer(prior.sigma, prior.sigma), b * prior.sigma)

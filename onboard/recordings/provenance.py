@@ -1,0 +1,220 @@
+"""Which vehicle a recording is of and when it was flown: what the log says of it, and no guess.
+
+* *Board.*  ArduPilot's log has the serial number of the processor as text, ``Pixhawk6X 003E0026
+  3033510B 35303731``: three words, the bytes of each from the last to the first (``get_system_id``
+  in AP_HAL_ChibiOS).  MAVLink's AUTOPILOT_VERSION has the same bytes in order, PX4's ULog as
+  ``sys_uuid``.  A simulated board has none.
+* *Accelerometers.*  INS_ACC*_ID (PX4: CAL_ACC*_ID) are bus, address and kind of chip: boards of
+  one model all have the same.  They tell vehicles apart and prove nothing alike.
+* A .tlog with several vehicles says nothing of either.
+* *When.*  GPS week and time of the first and last fix, or the autopilot's Unix time.  The clock of
+  a ground station or a file is not asked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from onboard.core.maths.accelerometer import parameter_names
+from onboard.recordings.arrays import Arrays, read_arrays
+from onboard.recordings.dataflash_formats import Records
+from onboard.recordings.ulog_information import ulog_information
+
+SERIAL = re.compile(r"^(\S.*?) ([0-9A-F]{8}) ([0-9A-F]{8}) ([0-9A-F]{8})$")
+RECEIVERS = (
+    re.compile(r"^(u-blox) \d HW: (\w+)"),
+    re.compile(r"^GPS 1: detected (?:as )?([\w.+ -]+?)(?: at \d+ baud)?$"),
+)
+"""Texts that name the receiver, the one that says most first."""
+GPS_EPOCH_UNIX_S = 315_964_800.0
+LEAP_S = 18.0
+"""GPS time less UTC since 2017."""
+WEEK_S = 604_800.0
+EARLIEST_UNIX_S = 1_262_304_000.0
+"""2010: no autopilot of which there is a log flew before; a clock that says so is not set."""
+FIX_3D = 3
+AUTOPILOT = 1
+"""MAV_COMP_ID_AUTOPILOT1."""
+WANTED = (
+    "MSG", "PARM", "GPS", "AUTOPILOT_VERSION", "STATUSTEXT", "SYSTEM_TIME", "HEARTBEAT",
+    "PARAM_VALUE", "vehicle_gps_position", "sensor_gps",
+)  # fmt: skip
+SYSTEM = ("SYSID_THISMAV", "MAV_SYSID", "MAV_SYS_ID")
+ACCELEROMETERS = {imu: parameter_names(imu).device_id for imu in (1, 2, 3, 4, 5)}
+PX4_ACCELEROMETERS = {imu: f"CAL_ACC{imu - 1}_ID" for imu in (1, 2, 3, 4)}
+DELAYS = ("GPS1_DELAY_MS", "GPS_DELAY_MS")
+PLACES = (("GPS1_POS_X", "GPS1_POS_Y", "GPS1_POS_Z"), ("GPS_POS1_X", "GPS_POS1_Y", "GPS_POS1_Z"))
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """What a recording says of its vehicle; empty or None where it does not say.
+
+    Attributes:
+        board: serial number in hex, the bytes in order.
+        model: of the board.
+        system: MAVLink system id.
+        accelerometers: device ids by number of the accelerometer.
+        receiver: of GPS.
+        frame: FRAME_CLASS.
+        told_delay_s: latency of the receiver that the autopilot is told, s.
+        antenna_m: where the autopilot is told that the antenna is, body axes, m.
+        began_unix_s: when the first fix was, s since 1970, UTC.
+        ended_unix_s: when the last one was.
+    """
+
+    board: str = ""
+    model: str = ""
+    system: int | None = None
+    accelerometers: Mapping[int, int] = field(default_factory=dict)
+    receiver: str = ""
+    frame: int | None = None
+    told_delay_s: float | None = None
+    antenna_m: tuple[float, float, float] | None = None
+    began_unix_s: float | None = None
+    ended_unix_s: float | None = None
+
+
+def provenance(path: str | Path) -> Provenance:
+    """Read what a recording says of its vehicle.
+
+    Raises:
+        RecordingError: the file cannot be read, or is no recording.
+    """
+    arrays = read_arrays(path, WANTED)
+    if len(_systems(arrays)) > 1:  # whose a message is that names a board, nobody asks here
+        began, ended = _times(arrays)
+        return Provenance(began_unix_s=began, ended_unix_s=ended)
+    information = ulog_information(Path(path)) if arrays.kind == "ulog" else None
+    parameters = _parameters(arrays) if information is None else information.parameters
+    board, model = _board(arrays, information.texts if information else {})
+    names = PX4_ACCELEROMETERS if information else ACCELEROMETERS
+    began, ended = _times(arrays)
+    place = next((p for p in PLACES if all(n in parameters for n in p)), None)
+    delay = _first(parameters, DELAYS)
+    frame = parameters.get("FRAME_CLASS")
+    return Provenance(
+        board=board,
+        model=model,
+        system=_system(arrays, parameters),
+        accelerometers={i: int(parameters[n]) for i, n in names.items() if parameters.get(n)},
+        receiver=_receiver(_texts(arrays)),
+        frame=None if frame is None else int(frame),
+        told_delay_s=None if delay is None else delay / 1e3,
+        antenna_m=None if place is None else _three([parameters[n] for n in place]),
+        began_unix_s=began,
+        ended_unix_s=ended,
+    )
+
+
+def _three(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
+
+
+def _parameters(arrays: Arrays) -> dict[str, float]:
+    """Numbers by name, the last value of each."""
+    table, name, value = arrays.tables.get("PARM"), "Name", "Value"
+    if table is None:
+        table, name, value = _of_autopilot(arrays, "PARAM_VALUE"), "param_id", "param_value"
+    if table is None or not {name, value} <= set(table.dtype.names or ()):
+        return {}
+    finite = table[np.isfinite(table[value])]
+    texts = (bytes(x).decode("ascii", "replace") for x in finite[name])
+    return dict(zip(texts, finite[value].astype(float).tolist(), strict=True))
+
+
+def _texts(arrays: Arrays) -> list[str]:
+    """What the autopilot said in words."""
+    out: list[str] = []
+    said = (arrays.tables.get("MSG"), "Message"), (_of_autopilot(arrays, "STATUSTEXT"), "text")
+    for records, column in said:
+        if records is not None and column in (records.dtype.names or ()):
+            out += [bytes(x).decode("ascii", "replace") for x in records[column]]
+    return out
+
+
+def _board(arrays: Arrays, information: Mapping[str, str]) -> tuple[str, str]:
+    """Serial number and model."""
+    uuid = information.get("sys_uuid", "").lower()
+    if uuid.strip("0 \0"):
+        return uuid, information.get("ver_hw", "")
+    for text in _texts(arrays):
+        if found := SERIAL.match(text):
+            words = [bytes.fromhex(word)[::-1].hex() for word in found.groups()[1:]]
+            if any(word.strip("0f") for word in words):
+                return "".join(words), found[1]
+    versions = _of_autopilot(arrays, "AUTOPILOT_VERSION")
+    for record in versions if versions is not None else ():
+        long, short = record["uid2"].tobytes().rstrip(b"\0"), int(record["uid"])
+        if long or short:
+            return (long.hex() if long else f"{short:016x}"), ""
+    return "", ""
+
+
+def _receiver(texts: Sequence[str]) -> str:
+    for pattern in RECEIVERS:
+        for text in texts:
+            if found := pattern.match(text):
+                return " ".join(found.groups())
+    return ""
+
+
+def _system(arrays: Arrays, parameters: Mapping[str, float]) -> int | None:
+    told = _first(parameters, SYSTEM)
+    if told is not None:
+        return int(told)
+    return next(iter(_systems(arrays)), None)
+
+
+def _systems(arrays: Arrays) -> tuple[int, ...]:
+    """System ids of the autopilots that a .tlog has heartbeats of."""
+    beats = _of_autopilot(arrays, "HEARTBEAT")
+    return () if beats is None else tuple(int(x) for x in np.unique(beats["sender_system"]))
+
+
+def _of_autopilot(arrays: Arrays, name: str) -> Records | None:
+    """Messages of a .tlog that the autopilot has sent."""
+    table = arrays.tables.get(name)
+    return None if table is None else table[table["sender_component"] == AUTOPILOT]
+
+
+def _first(parameters: Mapping[str, float], names: Sequence[str]) -> float | None:
+    return next((parameters[n] for n in names if n in parameters), None)
+
+
+def _times(arrays: Arrays) -> tuple[float | None, float | None]:
+    """Unix time of the first and the last fix, s."""
+    unix = np.zeros(0)
+    if (gps := arrays.tables.get("GPS")) is not None:
+        unix = _of_gps(gps)
+    elif (system := _of_autopilot(arrays, "SYSTEM_TIME")) is not None:
+        unix = system["time_unix_usec"] / 1e6
+    else:
+        for name in ("vehicle_gps_position", "sensor_gps"):
+            fixes = arrays.tables.get(name)
+            if fixes is not None and "time_utc_usec" in (fixes.dtype.names or ()):
+                unix = fixes["time_utc_usec"] / 1e6
+                break
+    unix = unix[np.isfinite(unix) & (unix > EARLIEST_UNIX_S)]
+    return (float(unix.min()), float(unix.max())) if len(unix) else (None, None)
+
+
+def _of_gps(fixes: Records) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Unix times of ArduPilot's GPS records that have a fix."""
+    columns = fixes.dtype.names or ()
+    pairs = (("GWk", "GMS"), ("Week", "TimeMS"))
+    names = next((p for p in pairs if set(p) <= set(columns)), None)
+    if names is None or "Status" not in columns:
+        return np.zeros(0)
+    week, ms = (fixes[n].astype(np.float64) for n in names)
+    unix = GPS_EPOCH_UNIX_S + week * WEEK_S + ms / 1e3 - LEAP_S
+    out: np.ndarray[tuple[int], np.dtype[np.float64]] = unix[
+        (fixes["Status"] >= FIX_3D) & (week > 0)
+    ]
+    return out

@@ -1,0 +1,21 @@
+"""Reports, documents and parameters as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from onboard.errors import UsageError
+
+
+def save(content: str | bytes, file: str | Path) -> Path:
+    """Write a document to a file, text in UTF-8; returns its path.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    path = Path(file)
+    try:
+        path.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
+    return path

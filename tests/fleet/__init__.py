@@ -1,0 +1,1 @@
+"""Tests of ``answers.fleet`` and of its pages."""

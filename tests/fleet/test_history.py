@@ -1,0 +1,164 @@
+"""A vehicle's numbers over time, from simulated records to the words and the document."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from onboard.answers.fleet.document import FleetDocument, fleet_document
+from onboard.answers.fleet.history import history_of
+from onboard.answers.fleet.record import Record
+from onboard.answers.fleet.severity import Severity, sentences, severity_of, shared_sentence
+from onboard.answers.fleet.shared_numbers import common_of
+from onboard.answers.fleet.vehicles import vehicles_of
+from onboard.core.estimate.joint import FLOOR
+from onboard.core.maths.chi_square import survival
+from tests.fleet.records_by_hand import TRUE, flown
+
+STEP = np.array([0.0, 0.0, 0.0, 0.4, 0.0, 0.0])
+
+
+def history(recordings):
+    (vehicle,) = vehicles_of(recordings)
+    return history_of(vehicle)
+
+
+def number(h, name):
+    return next(n for n in h.accelerometers[0].numbers if n.name == name)
+
+
+def season(count, change=lambda k: np.zeros(6), seed=0, **more):
+    return [
+        flown(f"{k:02}.BIN", TRUE + change(k), day=3.0 * k, seed=100 * seed + k, **more)
+        for k in range(count)
+    ]
+
+
+def test_a_vehicle_on_which_nothing_happened_is_well_and_merged():
+    h = history(season(10))
+    assert severity_of(h) is Severity.WELL
+    assert sentences(h) == ()
+    merged = h.accelerometers[0].merged
+    assert len(merged.counted) == 10
+    assert np.all(np.abs(merged.value - TRUE) < 4.0 * merged.sigma)
+
+
+def test_nothing_is_said_of_vehicles_on_which_nothing_happened():
+    """All numbers of a vehicle together have one false alarm in a hundred."""
+    said = sum(bool(sentences(history(season(8, seed=s)))) for s in range(60))
+    assert said <= 3
+
+
+def test_maintenance_is_named_with_the_flights_about_it_and_ends_what_is_merged():
+    h = history(season(12, lambda k: STEP * (k >= 7)))
+    course = number(h, "x offset").course
+    assert [s.after for s in course.steps] == [6]
+    merged = h.accelerometers[0].merged
+    assert set(merged.counted) == {7, 8, 9, 10, 11}
+    assert merged.value[3] == pytest.approx(TRUE[3] + 0.4, abs=4.0 * merged.sigma[3])
+    assert severity_of(h) is Severity.CHANGED
+    (said,) = sentences(h)
+    assert "x offset stepped by +0.4" in said
+    assert "between 06.BIN" in said
+    assert "and 07.BIN" in said
+
+
+def test_no_number_of_flights_makes_the_floors_less():
+    """What no model knows is the same in all flights: averaging them does not help against it."""
+    h = history(season(60))
+    for n in (*h.accelerometers[0].numbers, *h.numbers):
+        assert n.latest[1] >= n.common
+    assert number(h, "x scale").common == FLOOR[0]
+    assert number(h, "x scale").latest[1] > 0.9 * FLOOR[0]
+
+
+def test_a_flight_that_contradicts_the_others_is_named_and_not_averaged():
+    h = history(season(9, lambda k: 2.0 * STEP * (k == 4)))
+    assert [o.flight for o in number(h, "x offset").course.odd] == [4]
+    merged = h.accelerometers[0].merged
+    assert 4 not in merged.counted
+    assert merged.value[3] == pytest.approx(TRUE[3], abs=4.0 * merged.sigma[3])
+    assert severity_of(h) is Severity.CONTRADICTED
+    assert any("04.BIN" in s for s in sentences(h))
+
+
+def test_what_drifts_has_no_mean_but_a_value_now():
+    h = history(season(14, lambda k: STEP * k / 6.0))
+    course = number(h, "x offset").course
+    assert course.drifts
+    assert course.trend.size == pytest.approx(0.4 / 18.0, abs=4.0 * course.trend.sigma)
+    assert course.latest[0] == pytest.approx(TRUE[3] + 0.4 * 13 / 6.0, abs=5.0 * course.latest[1])
+    assert h.accelerometers[0].merged is None
+    assert "x offset drifts" in h.accelerometers[0].why
+
+
+def test_another_sensor_in_its_place_is_another_sensor():
+    logs = season(5) + [flown(f"n{k}", TRUE + STEP, day=40.0 + k, device=9) for k in range(4)]
+    h = history(logs)
+    assert [(a.device, len(a.flights)) for a in h.accelerometers] == [(7, 5), (9, 4)]
+
+
+def test_a_flight_that_says_nothing_is_listed_with_its_reason():
+    h = history([*season(4), flown("hover.BIN", day=50.0, why="it hovered")])
+    left_out = h.accelerometers[0].left_out
+    assert [(f.flown.name, why) for f, why in left_out] == [("hover.BIN", "it hovered")]
+
+
+def test_what_a_type_shares_is_said_with_its_scatter_and_else_not():
+    rng = np.random.default_rng(3)
+    logs = [
+        flown(
+            f"{v}-{k}", day=v + 10.0 * k, board=f"{v:024x}", seed=10 * v + k,
+            antenna=(0.3 + place, 0.0, 0.0), delay=0.12 + late,
+        )
+        for v, (place, late) in enumerate(rng.normal(0.0, [0.02, 0.01], (8, 2)), start=1)
+        for k in range(3)
+    ]  # fmt: skip
+    found = common_of(vehicles_of(logs))
+    assert {(c.name, c.of) for c in found.common} == {
+        ("antenna_x_m", "copter Pixhawk6X frame class 1"),
+        ("gps_delay_s", "u-blox 000A0000"),
+    }
+    place = next(c for c in found.common if c.name == "antenna_x_m")
+    assert place.shared.mean == pytest.approx(0.3, abs=4.0 * place.shared.sigma)
+    assert "antenna forward beside what is told +0.29" in shared_sentence(place)
+    assert common_of(vehicles_of([o for o in logs if o.name[0] in "12"])).common == ()
+
+
+def test_recordings_that_may_be_one_vehicle_are_no_type():
+    logs = [flown(f"{k}", day=k, board="", seed=k, antenna=(0.5, 0, 0)) for k in range(9)]
+    found = common_of(vehicles_of(logs))
+    assert (found.common, found.looked_at) == ((), 0)
+
+
+def test_the_document_is_compatible_and_says_everything_in_finite_numbers():
+    logs = season(8, lambda k: STEP * (k >= 5))
+    histories = [history_of(v) for v in vehicles_of(logs)]
+    document = fleet_document(logs, histories, common_of([h.vehicle for h in histories]))
+    text = document.to_json()
+    assert b"NaN" not in text
+    assert b"Infinity" not in text
+    again = msgspec.json.decode(text, type=FleetDocument)
+    assert again.schema == "onboard.fleet/1"
+    assert (again.read, again.failed) == (8, 0)
+    (vehicle,) = again.vehicles
+    assert vehicle.identified_by == "board"
+    numbers = {n.name: n for n in vehicle.accelerometers[0].numbers}
+    step = numbers["x offset"].steps[0]
+    assert (step.after, step.before) == ("/logs/04.BIN", "/logs/05.BIN")
+    assert step.step.p_value <= vehicle.false_alarm / vehicle.looked_at
+    assert numbers["x offset"].chi_square < 40.0
+    assert survival(numbers["x offset"].chi_square, numbers["x offset"].dof) > 1e-4
+
+
+def test_a_record_goes_through_the_store_unchanged_to_the_last_digit():
+    record = flown("a", TRUE * (1.0 + 1e-15), seed=1).record
+    data = msgspec.msgpack.encode(record)
+    again = msgspec.msgpack.decode(data, type=Record)
+    assert msgspec.msgpack.encode(again) == data
+    one, other = again.imus[0].calibration, record.imus[0].calibration
+    assert one.scale + one.offset == other.scale + other.offset
+    assert one.covariance == other.covariance
+    assert one.status is other.status
+    assert again.imus[0].said == record.imus[0].said
