@@ -98,7 +98,7 @@ class Flown:
         fixes = [s for s in self._kept if isinstance(s, GpsFix) and s.fix_type >= 3]
         if fixes:
             t = np.array([f.t for f in fixes])
-            v = np.array([(f.v_n, f.v_e, f.v_d or 0.0) for f in fixes])
+            v = np.array([(f.v_n, f.v_e, math.nan if f.v_d is None else f.v_d) for f in fixes])
             height = np.array([f.altitude for f in fixes])
             if not self.airborne:
                 self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")

@@ -23,10 +23,11 @@ def grounded_spans(
     """
     if len(t) < 2:
         return []
-    slow = np.linalg.norm(np.nan_to_num(v_n), axis=1) < STILL_M_S
+    v_n = np.where(np.isnan(v_n), np.stack([0.0 * t, 0.0 * t, -_climb(t, height)], axis=1), v_n)
+    slow = np.linalg.norm(v_n, axis=1) < STILL_M_S
     runs = [(i, j) for i, j in _runs(slow) if t[j - 1] - t[i] >= STILL_S]
     if rolls:
-        level = np.abs(np.nan_to_num(v_n[:, 2])) < LEVEL_M_S
+        level = np.abs(v_n[:, 2]) < LEVEL_M_S
         low = height < float(np.min(height)) + GROUND_M
         runs += [(i, j) for i, j in _runs(level & low) if t[j - 1] - t[i] >= STILL_S]
     if not runs:
@@ -41,6 +42,14 @@ def grounded_spans(
         for (i, j), level_m in zip(runs, levels, strict=True)
         if level_m < lowest + GROUND_M
     ]
+
+
+def _climb(t: Array, height: Array) -> Array:
+    """(n,) m/s, from the height a second before and after: a climb on the spot is no standing."""
+    before, after = np.maximum(t - STILL_S, t[0]), np.minimum(t + STILL_S, t[-1])
+    rise = np.interp(after, t, height) - np.interp(before, t, height)
+    out: Array = rise / np.maximum(after - before, 1e-3)
+    return out
 
 
 def inside(t: Array, spans: list[tuple[float, float]]) -> Mask:

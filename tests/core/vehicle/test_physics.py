@@ -156,3 +156,15 @@ def test_a_tilt_of_the_attitude_is_found_from_the_velocity():
     )
     out = smoothed(steps, Levels(1e-4, 0.02))
     assert np.mean(out.x[:, PSI], axis=0)[:2] == pytest.approx(tilt[:2], abs=2e-3)
+
+
+def test_a_climb_on_the_spot_is_no_standing_where_no_vertical_speed_is_measured():
+    t = np.arange(0.0, 90.0, 0.2)
+    climb = np.interp(t, [0.0, 10.0, 30.0, 60.0, 75.0, 90.0], [0.0, 0.0, 40.0, 40.0, 0.0, 0.0])
+    rng = np.random.default_rng(3)
+    v = np.column_stack([0.05 * rng.standard_normal((len(t), 2)), np.full(len(t), np.nan)])
+    v[(t > 30.0) & (t < 60.0), 0] = 5.0
+    spans = grounded_spans(t, v, 500.0 + climb + 0.05 * rng.standard_normal(len(t)))
+    assert len(spans) == 2
+    assert spans[0] == pytest.approx((-3.0, 13.0), abs=1.5)
+    assert spans[1] == pytest.approx((72.0, 92.8), abs=1.5)
