@@ -151,7 +151,7 @@ def _blank(height: float) -> Figure:
     except ImportError:
         raise ExtraError("plots need matplotlib: pip install 'onboard-calibration[plot]'") from None
 
-    class Figure(figure.Figure):  # type: ignore[misc]  # of a package that may not be there
+    class Figure(figure.Figure):
         def _repr_png_(self) -> bytes:
             file = io.BytesIO()
             self.savefig(file, format="png", dpi=DOTS_PER_INCH)
