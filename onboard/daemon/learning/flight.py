@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.daemon.learning.meaning import in_force
@@ -53,10 +52,9 @@ class JudgedFlight:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether it was too short, or too quiet, for any of its accelerometers."""
-        return all(
-            found.verdict == Verdict.INSUFFICIENT.value
-            and found.calibration.status is not Status.CALIBRATED
+        """Whether it neither calibrates nor doubts any of its accelerometers: short, or quiet."""
+        return not any(
+            found.missing or found.calibration.status is Status.CALIBRATED
             for found in self.diagnosed.values()
         )
 
