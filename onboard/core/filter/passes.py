@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.innovations import WhitenedInnovations
+from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
@@ -161,25 +164,54 @@ class Pass:
     def _go_through(self, segment: Segment, ready: Prepared, result: PassResult) -> BankSums:
         """Predict and update step by step; sums of this segment alone."""
         sums = BankSums(len(self.filter.bank), self.model.size)
-        for k, e in enumerate(ready.measured.tolist()):
-            # Between fixes the latitude of the first does: 1e-6 rad.
-            latitude = float(ready.epochs.latitude[max(e, 0)])
-            self.filter.predict(ready.steps[k], self.theta, latitude)
-            if e < 0:
-                continue
-            epoch = ready.epochs[e]
-            if self.uses.recorded_attitude:
-                self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
-            made = self.filter.update(epoch, self.theta, self.covariance)
-            result.epochs += 1
-            if made is None:
-                continue
-            sums.add(made.y, made.h, made.log_det)
-            self._note(made, result)
-            self._estimate(sums)
-            if made.velocities:
-                result.states.append(self._state(made))
+        ordinary = ordinary_flight(self.filter, ready)
+        k, ends = 0, ready.measured.tolist()
+        while k < len(ends):
+            begun = False
+            if ordinary is not None and self.filter.calm:
+                gone = ordinary.go(k, self.theta, self._until_solved)
+                self._note_all(gone, ready, result, sums)
+                k, begun = gone.step, gone.pending
+                if not begun:
+                    continue
+            if not begun:
+                # Between fixes the latitude of the first does: 1e-6 rad.
+                latitude = float(ready.epochs.latitude[max(ends[k], 0)])
+                self.filter.predict(ready.steps[k], self.theta, latitude)
+            if ends[k] >= 0:
+                self._at_epoch(ready.epochs[ends[k]], segment, result, sums)
+            k += 1
         return sums
+
+    def _at_epoch(self, epoch: Epoch, segment: Segment, result: PassResult, sums: BankSums) -> None:
+        """Take what an epoch measured, whatever it is."""
+        if self.uses.recorded_attitude:
+            self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
+        made = self.filter.update(epoch, self.theta, self.covariance)
+        result.epochs += 1
+        if made is None:
+            return
+        sums.add(made.y, made.h, made.log_det)
+        self._note(made, result)
+        self._estimate(sums)
+        if made.velocities:
+            result.states.append(self._state(made))
+
+    def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
+        """What :meth:`_at_epoch` does, for all epochs that were gone through at once."""
+        if not len(gone.epochs):
+            return
+        result.epochs += len(gone.epochs)
+        sums.add(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_det)
+        with_velocity = gone.epochs[gone.velocities > 0]
+        if len(with_velocity):
+            self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
+        if self.keep_traces:
+            result.traces += gone.traces(ready.epochs)
+        self._estimate(sums, len(gone.epochs))
+        if not self._held:
+            gone.states[-1, 12:] = self.filter.velocity(self.theta)
+        result.states += gone.noted(ready.epochs, self.bias_b)
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:
         """Count what was refused, keep the trace if traces are kept."""
@@ -203,12 +235,23 @@ class Pass:
                 )
             )
 
-    def _estimate(self, block: BankSums) -> None:
-        """Solve the sums so far, ``block`` included, now and then."""
-        self._epochs += 1
-        self._since_solve += 1
-        due = 1 if self._epochs < EAGER_EPOCHS else LAZY_EPOCHS
-        if self._held or self._since_solve < due:
+    @property
+    def _until_solved(self) -> int:
+        """Epochs until the sums are solved."""
+        if self._held:
+            return sys.maxsize
+        return max(1, self._due(self._epochs + 1) - self._since_solve)
+
+    @staticmethod
+    def _due(epochs: int) -> int:
+        """After how many epochs sums are solved again, when so many are in."""
+        return 1 if epochs < EAGER_EPOCHS else LAZY_EPOCHS
+
+    def _estimate(self, block: BankSums, epochs: int = 1) -> None:
+        """Solve the sums so far, ``block`` with ``epochs`` more included, now and then."""
+        self._epochs += epochs
+        self._since_solve += epochs
+        if self._held or self._since_solve < self._due(self._epochs):
             return
         self._since_solve = 0
         self.covariance = np.linalg.inv(self.sums.N[0] + block.N[0] + self._information)

@@ -144,10 +144,10 @@ def _epochs(
     rate = np.linalg.norm(around.now.w_b, axis=1)
     noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
     return Epochs(
-        around.now.t,
+        np.ascontiguousarray(around.now.t),
         fixes.v_n,
         fixes.height,
-        fixes.latitude,
+        np.ascontiguousarray(fixes.latitude),
         R_att,
         near,
         body,
