@@ -30,6 +30,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
+from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import EpochState, PassResult
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
@@ -130,16 +131,30 @@ class Engine:
             self._observer.begin()
         return made
 
-    def _new_pass(self, members: tuple[NoiseLevels, ...] | None = None) -> Pass:
-        """A pass whose gates know the last solution: an outlier at the start must not pass."""
+    def _new_pass(
+        self,
+        members: tuple[NoiseLevels, ...] | None = None,
+        ready: Preparations | None = None,
+    ) -> Pass:
+        """A pass whose gates know the last solution: an outlier at the start must not pass.
+
+        Args:
+            members: levels of the filter bank; None: those that hold.
+            ready: what passes about the present point have made ready; the last solution is then
+                about that point, too.
+        """
         solution = self._seed
+        theta = None if solution is None else solution.theta
+        if theta is not None and not ready:
+            theta = self._about_point(theta)
         return Pass(
             self.model,
             self.point,
             members or (self.noise,),
             uses=self.uses,
-            theta=None if solution is None else self._about_point(solution.theta),
+            theta=theta,
             covariance=None if solution is None else solution.covariance,
+            preparations=ready,
         )
 
     def _about_point(self, theta: Array) -> Array:
@@ -228,18 +243,22 @@ class Engine:
             noise_rounds: in how many of them a search for noise levels may begin.
         """
         search = NoiseSearch(noise_rounds)
+        at, ready = self.point, Preparations()
         for turn in range(MOST_ROUNDS):
             if turn >= rounds and not search.unfinished:
                 break
-            made = self._new_pass(search.members(turn, self.noise))
+            made = self._new_pass(search.members(turn, self.noise), ready)
             self._seed = solve(self._over_sample(made), self.model)
-            point = moved(self.point, self.model, self._seed.theta)
-            timed = point.near(self.point, STEADY)
+            before, at = at, moved(self.point, self.model, self._seed.theta)
             levels = search.better(self.noise, made.log_likelihoods())
             settled = search.settled(self.noise, levels)
-            self._move(point, levels)
-            if timed and settled:
+            self.noise = levels
+            if at.near(before, STEADY) and settled:
                 break
+            if not self.point.stands_for(at):
+                self._move(at, levels)
+                ready = Preparations()
+        self._move(at, self.noise)
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = self.shift(self.point, point)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.filter import loops
+from onboard.core.filter import loops, runs
 from onboard.core.filter.innovations import Epoch, Step
 from onboard.core.filter.kernel import Kernel, Process, Whitening
 from onboard.core.filter.readings import Reading
@@ -49,4 +49,4 @@ def take(carried: Array, made: Whitening, reading: Reading, gram: Array | None) 
         loops.take_noise(carried[0], made.W[0], made.whitener, reading.number, m1, gram)
 
 
-COMPILED = Kernel(measured, predict, whiten, take)
+COMPILED = Kernel(measured, predict, whiten, take, runs.run)

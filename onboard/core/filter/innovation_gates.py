@@ -101,6 +101,15 @@ class InnovationGates:
         self._good: list[tuple[float, Array]] = []
         self._height_off_since: float | None = None
 
+    @property
+    def recovering(self) -> bool:
+        """Whether a velocity was outside, and has not been inside and steady for long enough."""
+        return self._velocity_off
+
+    def height_is_inside(self) -> None:
+        """A height was inside its gate."""
+        self._height_off_since = None
+
     def judge(
         self,
         t: float,
@@ -149,7 +158,7 @@ class InnovationGates:
             if nis > limit:
                 return self._outside(kind, name, t)
             if kind == "h":
-                self._height_off_since = None
+                self.height_is_inside()
             elif kind == "v" and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
                 return GateRefusal("recovery")
         return None

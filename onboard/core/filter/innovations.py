@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.filter.state import MEASURED
 from onboard.core.maths.arrays import Array
@@ -38,6 +39,22 @@ class Step:
     columns: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """K steps of prediction side by side: fields as in :class:`Step`, each with (K,) in front."""
+
+    duration: Array
+    turn: Array
+    moved: Array
+    columns: Array
+
+    def __len__(self) -> int:
+        return len(self.duration)
+
+    def __getitem__(self, k: int) -> Step:
+        return Step(float(self.duration[k]), self.turn[k], self.moved[k], self.columns[k])
+
+
 def steps(
     duration: Array,
     turn: Array,
@@ -47,7 +64,7 @@ def steps(
     columns: Array,
     columns_to_end: Array,
     columns_turn: Array,
-) -> list[Step]:
+) -> Steps:
     """K steps of prediction from their integrals.
 
     Args:
@@ -70,9 +87,7 @@ def steps(
     stack[:, 0:3, 1:] = arm @ columns_turn - columns
     stack[:, 3:6, 1:] = columns_to_end
     stack[:, 6:9, 1:] = -columns_turn
-    return [
-        Step(T, turn[k], moved[k], stack[k]) for k, T in enumerate(np.asarray(duration).tolist())
-    ]
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +120,45 @@ class Epoch:
     trusted: bool
     noise: Array = field(default_factory=lambda: np.zeros(MEASURED))
     stamp: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Epochs:
+    """n epochs side by side: fields as in :class:`Epoch`, each with (n,) in front.
+
+    ``near`` (n,) says where a sample of the recorded attitude is near; elsewhere there is none.
+    """
+
+    t: Array
+    velocity: Array
+    height: Array
+    latitude: Array
+    R_attitude: Array
+    near: NDArray[np.bool_]
+    body: Array
+    ned: Array
+    along_velocity: Array
+    trusted: NDArray[np.bool_]
+    noise: Array
+    stamp: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, e: int) -> Epoch:
+        return Epoch(
+            float(self.t[e]),
+            self.velocity[e],
+            float(self.height[e]),
+            float(self.latitude[e]),
+            self.R_attitude[e] if self.near[e] else None,
+            self.body[e],
+            self.ned[e],
+            self.along_velocity[e],
+            bool(self.trusted[e]),
+            self.noise[e],
+            float(self.stamp[e]),
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,13 +66,21 @@ class Whitening(NamedTuple):
     log_det: Array
 
 
+Run = Callable[..., int]
+"""Type of :func:`onboard.core.filter.runs.run`."""
+
+
 class Kernel(NamedTuple):
-    """Who does the filter's arithmetic: the functions of these names here, or others."""
+    """Who does the filter's arithmetic: the functions of these names here, or others.
+
+    ``run`` goes through many epochs that are like most; None: they are gone through one by one.
+    """
 
     measured: Callable[[Array, Epoch, float, Array], Array]
     predict: Callable[[Array, Array, Step, Process], None]
     whiten: Callable[[Array, Array, Reading, Array], Whitening]
     take: Callable[[Array, Whitening, Reading, Array | None], None]
+    run: Run | None = None
 
 
 def diagonal(carried: Array, m1: int) -> Array:

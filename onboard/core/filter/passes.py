@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.innovations import WhitenedInnovations
+from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
+from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
 from onboard.core.filter.traces import EpochState, EpochTrace, PassResult
@@ -33,6 +37,7 @@ class Pass:
         traces: bool = False,
         theta: Array | None = None,
         covariance: Array | None = None,
+        preparations: Preparations | None = None,
     ) -> None:
         """Take the model, the linearisation and the noise.
 
@@ -45,6 +50,8 @@ class Pass:
             theta: (m,) estimate held for gates and attitude feedback until :meth:`release`; None:
                 estimate as it goes.
             covariance: (m, m) of it.
+            preparations: what passes with the same model and linearisation have made ready; this
+                one adds to it.  None: everything is made anew.
         """
         self.model = model
         self.point = point
@@ -59,6 +66,7 @@ class Pass:
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
         self.bias_b = np.zeros(3)
+        self._preparations = preparations
         self._running = False
         self._before: Segment | None = None
         self._since_solve = 0
@@ -100,34 +108,51 @@ class Pass:
             fixes: n GPS epochs on the boot clock as stamped (latency not removed).
             trusted: (n,) whether the receiver is to be believed there.
         """
+        skipped = 0
         if not self._running:
-            first_good = _first_believed(fixes, trusted)
-            if len(fixes) - first_good < 2:
+            skipped = _first_believed(fixes, trusted)
+            if len(fixes) - skipped < 2:
                 at = float(fixes.t[-1])
                 return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
-            fixes, trusted = fixes.between(first_good, len(fixes)), trusted[first_good:]
-        segment = self.model.remembering(segment, self._before.slow if self._before else {})
-        self._before = segment
-        ready = prepare(
-            segment,
-            fixes,
-            trusted,
-            self.model,
-            self.point,
-            self.bias_b,
-            recorded_attitude=self.uses.recorded_attitude,
-        )
+        made = self._made_ready(Source(segment, fixes, trusted, self._before, skipped))
+        self._before, ready = made.segment, made.ready
         if not self._running:
-            self._start(segment, ready)
+            self._start(made.segment, ready)
+        self._subtract(made.bias_b - self.bias_b)
         self.filter.begin_block()
         result = PassResult(Block(ready.start, ready.end, NormalSums.zeros(0)))
-        sums = self._go_through(segment, ready, result)
+        sums = self._go_through(made.segment, ready, result)
         self._take_bias_out()
         self.sums += sums
         result.block.sums = block = sums.member(0)
         if self.filter.noise_gram is not None:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
         return result
+
+    def _made_ready(self, source: Source) -> Kept:
+        """The segment with its regressors, from another pass or made now."""
+        kept = self._preparations
+        found = None if kept is None else kept.of(source)
+        if found is not None and found.serves(self.bias_b):
+            return found
+        if found is None:
+            before = source.before.slow if source.before else {}
+            segment = self.model.remembering(source.segment, before)
+        else:
+            segment = found.segment
+        ready = prepare(
+            segment,
+            source.fixes.between(source.skipped, len(source.fixes)),
+            source.trusted[source.skipped :],
+            self.model,
+            self.point,
+            self.bias_b,
+            recorded_attitude=self.uses.recorded_attitude,
+        )
+        made = Kept(source, segment, ready, self.bias_b)
+        if kept is not None:
+            kept.keep(made)
+        return made
 
     def _start(self, segment: Segment, ready: Prepared) -> None:
         first = ready.epochs[0]
@@ -139,24 +164,54 @@ class Pass:
     def _go_through(self, segment: Segment, ready: Prepared, result: PassResult) -> BankSums:
         """Predict and update step by step; sums of this segment alone."""
         sums = BankSums(len(self.filter.bank), self.model.size)
-        for step, e in ready:
-            # Between fixes the latitude of the first does: 1e-6 rad.
-            self.filter.predict(step, self.theta, ready.epochs[max(e, 0)].latitude)
-            if e < 0:
-                continue
-            epoch = ready.epochs[e]
-            if self.uses.recorded_attitude:
-                self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
-            made = self.filter.update(epoch, self.theta, self.covariance)
-            result.epochs += 1
-            if made is None:
-                continue
-            sums.add(made.y, made.h, made.log_det)
-            self._note(made, result)
-            self._estimate(sums)
-            if made.velocities:
-                result.states.append(self._state(made))
+        ordinary = ordinary_flight(self.filter, ready)
+        k, ends = 0, ready.measured.tolist()
+        while k < len(ends):
+            begun = False
+            if ordinary is not None and self.filter.calm:
+                gone = ordinary.go(k, self.theta, self._until_solved)
+                self._note_all(gone, ready, result, sums)
+                k, begun = gone.step, gone.pending
+                if not begun:
+                    continue
+            if not begun:
+                # Between fixes the latitude of the first does: 1e-6 rad.
+                latitude = float(ready.epochs.latitude[max(ends[k], 0)])
+                self.filter.predict(ready.steps[k], self.theta, latitude)
+            if ends[k] >= 0:
+                self._at_epoch(ready.epochs[ends[k]], segment, result, sums)
+            k += 1
         return sums
+
+    def _at_epoch(self, epoch: Epoch, segment: Segment, result: PassResult, sums: BankSums) -> None:
+        """Take what an epoch measured, whatever it is."""
+        if self.uses.recorded_attitude:
+            self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
+        made = self.filter.update(epoch, self.theta, self.covariance)
+        result.epochs += 1
+        if made is None:
+            return
+        sums.add(made.y, made.h, made.log_det)
+        self._note(made, result)
+        self._estimate(sums)
+        if made.velocities:
+            result.states.append(self._state(made))
+
+    def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
+        """What :meth:`_at_epoch` does, for all epochs that were gone through at once."""
+        if not len(gone.epochs):
+            return
+        result.epochs += len(gone.epochs)
+        sums.add(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_det)
+        with_velocity = gone.epochs[gone.velocities > 0]
+        if len(with_velocity):
+            self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
+        if self.keep_traces:
+            result.traces += gone.traces(ready.epochs)
+        self._estimate(sums, len(gone.epochs))
+        if not self._held:
+            gone.states[-1, 12:] = self.filter.velocity(self.theta)
+        result.states += gone.noted(ready.epochs, self.bias_b)
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:
         """Count what was refused, keep the trace if traces are kept."""
@@ -180,12 +235,23 @@ class Pass:
                 )
             )
 
-    def _estimate(self, block: BankSums) -> None:
-        """Solve the sums so far, ``block`` included, now and then."""
-        self._epochs += 1
-        self._since_solve += 1
-        due = 1 if self._epochs < EAGER_EPOCHS else LAZY_EPOCHS
-        if self._held or self._since_solve < due:
+    @property
+    def _until_solved(self) -> int:
+        """Epochs until the sums are solved."""
+        if self._held:
+            return sys.maxsize
+        return max(1, self._due(self._epochs + 1) - self._since_solve)
+
+    @staticmethod
+    def _due(epochs: int) -> int:
+        """After how many epochs sums are solved again, when so many are in."""
+        return 1 if epochs < EAGER_EPOCHS else LAZY_EPOCHS
+
+    def _estimate(self, block: BankSums, epochs: int = 1) -> None:
+        """Solve the sums so far, ``block`` with ``epochs`` more included, now and then."""
+        self._epochs += epochs
+        self._since_solve += epochs
+        if self._held or self._since_solve < self._due(self._epochs):
             return
         self._since_solve = 0
         self.covariance = np.linalg.inv(self.sums.N[0] + block.N[0] + self._information)
@@ -206,7 +272,10 @@ class Pass:
         """Subtract the estimated gyroscope bias from the next segment's rates."""
         if self.uses.recorded_attitude:
             return
-        shift = self.filter.bias(self.theta)
+        self._subtract(self.filter.bias(self.theta))
+
+    def _subtract(self, shift: Array) -> None:
+        """Subtract ``shift`` (3,), rad/s, more from the rates; the filter's bias counts from it."""
         self.bias_b = self.bias_b + shift
         self.filter.shift_bias(shift)
 

@@ -6,13 +6,12 @@ loops are not; the filter then goes through them one by one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.innovations import Epoch, Step, steps
+from onboard.core.filter.innovations import Epochs, Steps, steps
 from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
@@ -34,22 +33,25 @@ class Prepared:
         epochs: what the n fixes measure; the filter starts at the first, no step ends there.
     """
 
-    steps: list[Step]
+    steps: Steps
     measured: NDArray[np.int_]
-    epochs: list[Epoch]
+    epochs: Epochs
 
-    def __iter__(self) -> Iterator[tuple[Step, int]]:
-        return zip(self.steps, self.measured.tolist(), strict=True)
+    @property
+    def size(self) -> int:
+        """Bytes of all arrays."""
+        both = (self.steps, self.epochs)
+        return sum(getattr(x, f.name).nbytes for x in both for f in fields(x))
 
     @property
     def start(self) -> float:
         """Time of the first fix, latency removed, s."""
-        return self.epochs[0].t
+        return float(self.epochs.t[0])
 
     @property
     def end(self) -> float:
         """Time of the last fix, latency removed, s."""
-        return self.epochs[-1].t
+        return float(self.epochs.t[-1])
 
 
 def prepare(
@@ -99,7 +101,7 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
     return start, end, np.where(last, k + 1, -1)
 
 
-def _steps(intervals: Intervals, regressors: SegmentRegressors) -> list[Step]:
+def _steps(intervals: Intervals, regressors: SegmentRegressors) -> Steps:
     force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
     return steps(
         intervals.duration,
@@ -120,7 +122,7 @@ def _epochs(
     point: Linearisation,
     around: Around,
     c: SegmentRegressors,
-) -> list[Epoch]:
+) -> Epochs:
     R_att, near = point.attitude(segment, around.now.t)
     kappa = mean_weights(around.offset, point.window)
     known = np.einsum("j,kja->ka", kappa, around.f_epoch)
@@ -141,19 +143,17 @@ def _epochs(
     noise = np.zeros((n, MEASURED))
     rate = np.linalg.norm(around.now.w_b, axis=1)
     noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
-    return [
-        Epoch(
-            float(around.now.t[e]),
-            fixes.v_n[e],
-            float(fixes.height[e]),
-            float(fixes.latitude[e]),
-            R_att[e] if near[e] else None,
-            body[e],
-            ned[e],
-            c.along_velocity[e],
-            bool(trusted[e]),
-            noise[e],
-            float(fixes.t[e]),
-        )
-        for e in range(len(fixes))
-    ]
+    return Epochs(
+        np.ascontiguousarray(around.now.t),
+        fixes.v_n,
+        fixes.height,
+        np.ascontiguousarray(fixes.latitude),
+        R_att,
+        near,
+        body,
+        ned,
+        c.along_velocity,
+        trusted,
+        noise,
+        fixes.t,
+    )

@@ -85,6 +85,12 @@ class WhiteningFilter:
     Attributes:
         m: number of unknowns.
         bank: noise levels of the B members.
+        uses: measurements that are used.
+        carried: (B, STATES, C) as in :mod:`onboard.core.filter.kernel`, whose functions ``kernel``
+            has.
+        variances: of the levels.
+        gates: None: nothing is refused.
+        updates: how many there have been.
         R_nb: (3, 3) attitude, body axes to NED.
         t: time on the boot clock, s.
         noise_gram: (3,) sum since :meth:`begin_block` of the whitened noise of each body axis
@@ -103,13 +109,18 @@ class WhiteningFilter:
         self.noise_gram = np.zeros(3) if B == 1 else None
         self._m1 = unknowns + 1
         matrices = 1 if self.noise_gram is None else 4
-        self._carried = np.zeros((B, STATES, self._m1 + matrices * STATES))
+        self.carried = np.zeros((B, STATES, self._m1 + matrices * STATES))
         self.R_nb = np.eye(3)
         self.t = float("nan")
-        self._kernel = chosen()
-        self._variances = Variances(self.bank, attitude=not self.uses.recorded_attitude)
-        self._gates = InnovationGates(self.bank[0]) if self.uses.gates else None
-        self._updates = 0
+        self.kernel = chosen()
+        self.variances = Variances(self.bank, attitude=not self.uses.recorded_attitude)
+        self.gates = InnovationGates(self.bank[0]) if self.uses.gates else None
+        self.updates = 0
+
+    @property
+    def calm(self) -> bool:
+        """Whether no velocity was refused that has to recover."""
+        return self.gates is None or not self.gates.recovering
 
     def begin_block(self) -> None:
         """Count :attr:`noise_gram` from here on; the noise that was integrated goes on."""
@@ -132,21 +143,21 @@ class WhiteningFilter:
         self.t = epoch.t
         down = float(epoch.velocity[2])
         known = not math.isnan(down)
-        z = self._kernel.measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
+        z = self.kernel.measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
         if not known:
             z[2, 0] = R_nb[2] @ epoch.body[:3, 0]
         m1 = self._m1
-        self._carried[:] = 0.0
-        self._carried[:, V, :m1] = z[V]
-        self._carried[:, H, :m1] = z[H]
-        covariances(self._carried, m1)[:, 0] = self._variances.at_start(
+        self.carried[:] = 0.0
+        self.carried[:, V, :m1] = z[V]
+        self.carried[:, H, :m1] = z[H]
+        covariances(self.carried, m1)[:, 0] = self.variances.at_start(
             tilt_sigma,
             heading_sigma,
             down=known,
             height=self.uses.height,
         )
-        if self._gates is not None:
-            self._gates.forget()
+        if self.gates is not None:
+            self.gates.forget()
 
     def bias(self, theta: Array) -> Array:
         """(3,) gyroscope bias of member 0 at ``theta`` (m,), body axes, rad/s."""
@@ -157,13 +168,13 @@ class WhiteningFilter:
         return self._mean(V, theta)
 
     def _mean(self, states: slice, theta: Array) -> Array:
-        X = self._carried[0, states, : self._m1]
+        X = self.carried[0, states, : self._m1]
         mean: Array = X[:, 0] - X[:, 1:] @ theta
         return mean
 
     def shift_bias(self, by: Array) -> None:
         """The caller subtracts ``by`` (3,), rad/s, more from the gyroscope from now on."""
-        self._carried[:, BIAS, 0] -= by
+        self.carried[:, BIAS, 0] -= by
 
     def predict(self, step: Step, theta: Array, latitude: float) -> None:
         """Carry mean, regressors and covariance through one step.
@@ -183,8 +194,8 @@ class WhiteningFilter:
         times = (COLOUR_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S)
         cv, tilt, heading = (math.exp(-T / time) for time in times)
         decay = np.array([cv, cv, cv, 1.0, tilt, tilt, heading])
-        process = Process(fall, decay, *self._variances.over(T, decay))
-        self._kernel.predict(self._carried, R, step, process)
+        process = Process(fall, decay, *self.variances.over(T, decay))
+        self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
         self.t += T
@@ -212,18 +223,18 @@ class WhiteningFilter:
         off = np.zeros(0)
         unlikely = np.zeros(len(self.bank))
         z = self._measured(epoch, theta)
-        white = self._variances.reading + epoch.noise
+        white = self.variances.reading + epoch.noise
         while kinds:
-            made = self._kernel.whiten(self._carried, z, reading(kinds), white)
+            made = self.kernel.whiten(self.carried, z, reading(kinds), white)
             refusal = None
-            if self._gates is not None:
+            if self.gates is not None:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                 known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
-                refusal = self._gates.judge(
+                refusal = self.gates.judge(
                     epoch.t, kinds, made.E, y, h, theta, covariance, velocity=known
                 )
             if refusal is None:
-                if self._gates is not None:
+                if self.gates is not None:
                     made = self._in_tail(made, z, kinds, white, theta, covariance)
                 self._take(made, kinds, theta)
                 return whitened(made, kinds, epoch.t, theta, refused, off, unlikely)
@@ -255,7 +266,7 @@ class WhiteningFilter:
         white = white.copy()
         for kind, factor in wider.items():
             white[:, reading(kind * kinds.count(kind)).number] *= factor
-        return self._kernel.whiten(self._carried, z, reading(kinds), white)
+        return self.kernel.whiten(self.carried, z, reading(kinds), white)
 
     def _surprise(self, z: Array, kinds: str, white: Array, theta: Array) -> Array:
         """What a refused measurement takes off twice the log-likelihood of each member, (B,).
@@ -263,7 +274,7 @@ class WhiteningFilter:
         It is noise, or anything at all, whichever is likelier.  Had it no say, levels would become
         likelier by making the gate refuse more.
         """
-        made = self._kernel.whiten(self._carried, z, reading(kinds), white)
+        made = self.kernel.whiten(self.carried, z, reading(kinds), white)
         y = made.W[:, :, 0] - made.W[:, :, 1 : self._m1] @ theta
         out: Array = np.minimum(made.log_det + (y * y).sum(axis=1), ANYTHING[kinds])
         return out
@@ -286,9 +297,9 @@ class WhiteningFilter:
         if not kinds:
             return None
         read = reading(kinds)
-        both = innovations(self._carried[:1], self._measured(epoch, theta), read)[0]
+        both = innovations(self.carried[:1], self._measured(epoch, theta), read)[0]
         E, PH = both[:, : self._m1], both[:, self._m1 :]
-        noise = np.diag(self._variances.reading[0, read.first])
+        noise = np.diag(self.variances.reading[0, read.first])
         S = noise - PH[:, read.first] - PH[:, read.second]
         D = E[:, 1:]
         return E[:, 0] - D @ theta, S + D @ covariance @ D.T
@@ -297,27 +308,27 @@ class WhiteningFilter:
         turned = _NOT_TURNED
         if self.uses.attitude and epoch.R_attitude is not None:
             turned = angle_of(epoch.R_attitude @ self.R_nb.T)
-        down = self._carried[0, 2, : self._m1]
+        down = self.carried[0, 2, : self._m1]
         v_down = float(down[0] - down[1:] @ theta)
-        return self._kernel.measured(self.R_nb, epoch, v_down, turned)
+        return self.kernel.measured(self.R_nb, epoch, v_down, turned)
 
     def _take(self, made: Whitening, kinds: str, theta: Array) -> None:
         """Update all that is carried; turn the attitude by what was found."""
-        self._kernel.take(self._carried, made, reading(kinds), self.noise_gram)
-        self._updates += 1
-        if self._updates % SYMMETRY_UPDATES == 0:
-            P = covariances(self._carried, self._m1)[:, 0]
+        self.kernel.take(self.carried, made, reading(kinds), self.noise_gram)
+        self.updates += 1
+        if self.updates % SYMMETRY_UPDATES == 0:
+            P = covariances(self.carried, self._m1)[:, 0]
             P[:] = (P + np.swapaxes(P, -1, -2)) / 2
         if self.uses.recorded_attitude:
             return
         # Turned by the filter's own estimate, so that errors stay small angles.
         psi = self._mean(PSI, theta)
         self.R_nb = turn_by(psi) @ self.R_nb
-        self._carried[:, PSI, 0] -= psi
+        self.carried[:, PSI, 0] -= psi
 
     def _renew(self, reference: str) -> None:
         """What a reference (height, tilt or heading) differs by is unknown from here on."""
-        var = diagonal(self._carried, self._m1)
+        var = diagonal(self.carried, self._m1)
         if reference == "height":
             var[:, CH] += RENEWED_HEIGHT_VAR
         else:

@@ -96,22 +96,25 @@ class Segment:
             return interpolate_rotation(at, t_k, R_k)
         at = np.clip(at, t_k[0], t_k[-1])
         k = np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
-        start, end = t_k[k], t_k[k + 1]
+        used, which = np.unique(k, return_inverse=True)
+        start, end = t_k[used], t_k[used + 1]
         rate = Hermite(self.t, self.w_b)
 
-        def turned(until: Array) -> Array:
-            """Rotation (m, 3, 3) by the gyroscope since the sample before: PARTS turns in a row."""
-            h = (until - start) / PARTS
-            out = np.broadcast_to(np.eye(3), (len(until), 3, 3))
-            for part in range(PARTS):
-                middle = start - delay + (part + 0.5) * h
-                out = out @ rotation_from_vector(rate(middle) * h[:, None])
-            return out
+        def turned(since: Array, until: Array) -> Array:
+            """Rotation (m, 3, 3) by the gyroscope between two times: PARTS turns in a row."""
+            h = (until - since) / PARTS
+            middle = (since - delay)[:, None] + h[:, None] * (np.arange(PARTS) + 0.5)
+            parts = rotation_from_vector(rate(middle.T) * h[:, None])
+            turn: Array = parts[0]
+            for part in parts[1:]:
+                turn = turn @ part
+            return turn
 
-        share = ((at - start) / (end - start))[:, None]
-        recorded = np.swapaxes(R_k[k], -1, -2) @ R_k[k + 1]
-        missed = vector_from_rotation(np.swapaxes(turned(end), -1, -2) @ recorded)
-        out: Array = R_k[k] @ turned(at) @ rotation_from_vector(share * missed)
+        share = ((at - start[which]) / (end - start)[which])[:, None]
+        recorded = np.swapaxes(R_k[used], -1, -2) @ R_k[used + 1]
+        missed = vector_from_rotation(np.swapaxes(turned(start, end), -1, -2) @ recorded)
+        between = turned(start[which], at) @ rotation_from_vector(share * missed[which])
+        out: Array = R_k[k] @ between
         return out
 
     def slow_at(self, name: str, at: Array) -> Array | None:

@@ -82,13 +82,22 @@ def rotation_from_vector(phi: ArrayLike) -> Array:
         (..., 3, 3), to rounding also for ``phi`` of 0.
     """
     v = np.asarray(phi, dtype=np.float64)
-    angle = np.linalg.norm(v, axis=-1)[..., None, None]
-    K = skew(v)
-    # np.sinc(x) = sin(pi x) / (pi x): both factors are smooth at zero.
-    first = np.sinc(angle / np.pi)
-    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    result: Array = np.eye(3) + first * K + second * (K @ K)
-    return result
+    angle = np.sqrt(np.square(v).sum(axis=-1))
+    half = 0.5 * angle
+    # By way of the unit quaternion: its vector is ``phi`` times a factor that is smooth at zero.
+    factor = np.full_like(angle, 0.5)
+    np.divide(np.sin(half), angle, out=factor, where=angle > 0.0)
+    w = 2.0 * np.cos(half)
+    x, y, z = factor * v[..., 0], factor * v[..., 1], factor * v[..., 2]
+    x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
+    xx, yy, zz = x * x2, y * y2, z * z2
+    xy, xz, yz = x * y2, x * z2, y * z2
+    wx, wy, wz = w * x, w * y, w * z
+    R = np.empty((*v.shape, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1.0 - yy - zz, xy - wz, xz + wy
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = xy + wz, 1.0 - xx - zz, yz - wx
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = xz - wy, yz + wx, 1.0 - xx - yy
+    return R
 
 
 def quaternion_from_rotation(R: ArrayLike) -> Array:

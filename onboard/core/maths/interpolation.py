@@ -15,28 +15,31 @@ from onboard.core.maths.arrays import Array
 class Hermite:
     """Cubic Hermite interpolant with three-point slopes (exact for parabolas)."""
 
-    __slots__ = ("_slope", "_t", "_x")
+    __slots__ = ("_cubics", "_shape", "_t")
 
     def __init__(self, t: Array, x: Array) -> None:
         """Take samples ``x`` (n, ...) at strictly increasing times ``t`` (n,), n >= 2."""
         self._t = t
-        self._x = x
-        self._slope = np.gradient(x, t, axis=0, edge_order=2 if len(t) > 2 else 1)
+        self._shape = x.shape[1:]
+        flat = x.reshape(len(t), -1)
+        h = np.diff(t)[:, None]
+        slope = np.gradient(flat, t, axis=0, edge_order=2 if len(t) > 2 else 1)
+        start, end, rise = h * slope[:-1], h * slope[1:], np.diff(flat, axis=0)
+        # Powers of the share of the interval, side by side: one look-up for each time asked for.
+        self._cubics = np.stack(
+            [flat[:-1], start, 3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise], axis=1
+        )
 
     def __call__(self, at: Array) -> Array:
         """Values (*at.shape, ...) at times ``at``; outside the samples the end cubic goes on."""
-        i = np.clip(np.searchsorted(self._t, at, side="right") - 1, 0, len(self._t) - 2)
+        times = np.asarray(at).ravel()
+        i = np.clip(np.searchsorted(self._t, times, side="right") - 1, 0, len(self._t) - 2)
         t0 = self._t[i]
-        h = self._t[i + 1] - t0
-        extra = (1,) * (self._x.ndim - 1)
-        u = ((at - t0) / h).reshape(*at.shape, *extra)
-        step = h.reshape(*at.shape, *extra)
-        u2 = u * u
-        rest = 1.0 - u
-        rest2 = rest * rest
-        value: Array = (
-            self._x[i] * ((1.0 + 2.0 * u) * rest2)
-            + self._x[i + 1] * (u2 * (3.0 - 2.0 * u))
-            + step * (self._slope[i] * (u * rest2) - self._slope[i + 1] * (u2 * rest))
-        )
-        return value
+        u = ((times - t0) / (self._t[i + 1] - t0))[:, None]
+        cubic = self._cubics[i]
+        value: Array = cubic[:, 3] * u
+        for power in (2, 1):
+            value += cubic[:, power]
+            value *= u
+        value += cubic[:, 0]
+        return value.reshape(*np.shape(at), *self._shape)

@@ -14,6 +14,10 @@ from onboard.core.maths.frames import rotation_from_euler
 MOVING = ("gps_delay", "window_squared", "attitude_delay", "heading")
 """Unknowns that are estimated about the linearisation, which follows them."""
 
+LINEAR = ((1e-3, 2e-3, 5e-3, 0.02), 0.01, 0.1, 0.015, 1e-5)
+"""Moves of :data:`MOVING`, scale (1), beta (m/s^2), antenna (m) and clock (s/s) over which unknowns
+are linear well enough to find noise levels, and the point where the sums are to be made [cost]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Linearisation:
@@ -61,6 +65,19 @@ class Linearisation:
         """Whether no unknown has moved by as much as ``within``."""
         moves = np.abs(np.subtract(self.moving, other.moving))
         return bool(np.all(moves < np.array(within)))
+
+    def stands_for(self, other: Linearisation) -> bool:
+        """Whether unknowns about this point say where that one is: :data:`LINEAR`."""
+        timing, scale, beta, antenna, clock = LINEAR
+        moves = (
+            (self.scale, other.scale, scale),
+            (self.beta, other.beta, beta),
+            (self.antenna, other.antenna, antenna),
+            (self.skew, other.skew, clock),
+        )
+        return self.near(other, timing) and all(
+            float(np.abs(np.subtract(a, b)).max()) < most for a, b, most in moves
+        )
 
     def attitude(self, segment: Segment, t: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""

@@ -8,11 +8,15 @@ mean is a weighted sum: ``mean(V) - V(t) = integral kappa(s) a(t + s) ds`` with
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 
 _FINE = 4001
+_KEPT = 16
+"""Windows whose weights are kept: every segment of a pass asks for the same few [cost]."""
 SECOND_DERIVATIVE_S = 0.12
 """s; to either side, over which a second derivative is taken: shorter is noise, longer misses a
 manoeuvre of 1 Hz."""
@@ -31,14 +35,21 @@ def mean_weights(offset: Array, window: float) -> Array:
     Returns:
         (n,) s.
     """
-    s = np.linspace(offset[0], offset[-1], _FINE)
-    half = window / 2.0
     if window <= 0.0:
         return np.zeros(len(offset))
+    return _mean_weights(float(offset[0]), float(offset[-1]), len(offset), float(window))
+
+
+@lru_cache(maxsize=_KEPT)
+def _mean_weights(first: float, last: float, count: int, window: float) -> Array:
+    """The same for ``count`` equidistant nodes; not to be written to, for it is kept."""
+    s, offset = np.linspace(first, last, _FINE), np.linspace(first, last, count)
+    half = window / 2.0
     kernel = np.where(np.abs(s) < half, np.sign(s) * (half - np.abs(s)) / window, 0.0)
     step = offset[1] - offset[0]
     hats = np.clip(1.0 - np.abs(s[:, None] - offset) / step, 0.0, None)
     weights: Array = np.trapezoid(kernel[:, None] * hats, s, axis=0)
+    weights.flags.writeable = False
     return weights
 
 

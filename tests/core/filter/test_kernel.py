@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,7 @@ def reads(kinds):
 
 
 def assert_close(a, b, tolerance=1e-11):
-    np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(1.0, np.abs(b).max()))
+    np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * np.abs(b).max(initial=1.0))
 
 
 banks = st.sampled_from([(1, True), (1, False), (4, False)])
@@ -218,6 +219,61 @@ def test_a_flight_gives_the_same_sums_either_way(engine, bank):
     assert results[-1].block.sums.G.any() == (len(bank) == 1)
 
 
+def troubled(batches):
+    """Flight with fixes that gates refuse, that are not believed, or that lack something."""
+    out = []
+    for i, batch in enumerate(batches):
+        v_n, height = batch.fixes.v_n.copy(), batch.fixes.height.copy()
+        trusted = batch.trusted.copy()
+        n = len(v_n)
+        if i == 2:
+            v_n[n // 2 : n // 2 + 5, 0] += 30.0
+            trusted[3:5] = False
+        if i == 3:
+            v_n[n // 3 : n // 3 + 4, 2] = np.nan
+            v_n[n // 2, 0] = np.nan
+            height[-3:] += 80.0
+            v_n[1::7, 1] += 0.6
+        out.append(
+            replace(batch, fixes=replace(batch.fixes, v_n=v_n, height=height), trusted=trusted)
+        )
+    return out
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["held", "as it goes"])
+@pytest.mark.usefixtures("_preference_kept")
+def test_epoch_by_epoch_either_way_sees_the_same(engine, held):
+    batches = troubled(engine.batches)
+    prior = engine.model.prior, np.diag(engine.model.prior_sigma**2)
+
+    def seen():
+        made = Pass(engine.model, engine.point, (NoiseLevels(),), traces=True)
+        if held:
+            made.hold(*prior)
+        return made, [through(made, batch, 30.0) for batch in batches]
+
+    (one, results), (two, others) = both_ways(seen)
+    assert any(r.refused for r in results)
+    assert_close(two.bias_b, one.bias_b, 1e-9)
+    assert two.dead_reckoning_since == one.dead_reckoning_since
+    for a, b in zip(results, others, strict=True):
+        assert (b.refused, b.epochs) == (a.refused, a.epochs)
+        for x, y in zip(a.traces, b.traces, strict=True):
+            assert (y.t, y.velocities, y.height, y.refused) == (
+                x.t,
+                x.velocities,
+                x.height,
+                x.refused,
+            )
+            for name in ("innovation", "columns", "y", "h", "refused_by"):
+                assert_close(getattr(y, name), getattr(x, name), 1e-7)
+        for x, y in zip(a.states, b.states, strict=True):
+            assert y.t == x.t
+            np.testing.assert_allclose(y.innovation, x.innovation, atol=1e-8, equal_nan=True)
+            for name in ("R_nb", "v_n", "bias_b"):
+                assert_close(getattr(y, name), getattr(x, name), 1e-8)
+
+
 @pytest.mark.usefixtures("_preference_kept")
 def test_without_numba_numpy_does_it(monkeypatch):
     monkeypatch.delattr(onboard.core.filter, "compiled")
@@ -252,7 +308,7 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
     def nowhere(*_):
         raise RuntimeError("cannot cache function: no locator available")
 
-    for name in ("compiled", "loops"):
+    for name in ("compiled", "loops", "motion", "runs"):
         monkeypatch.delattr(onboard.core.filter, name)
         monkeypatch.delitem(sys.modules, f"onboard.core.filter.{name}")
     monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", nowhere)

@@ -21,6 +21,7 @@ from onboard.core.physics.effects.accelerometer_hysteresis import (
     PLAYS,
     WEIGHTS,
     AccelerometerHysteresis,
+    _branches,
 )
 from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis as Concealed
 
@@ -147,3 +148,13 @@ def test_a_flight_that_conceals_it_is_explained_however_wide_it_is(vehicle, widt
         true = getattr(concealed, key)
         assert abs(q.value - true) < max(0.1 * abs(true), 3.0 * q.sigma), key
     assert said.mismatch.held_out_after < said.mismatch.held_out_before
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 500, 513])
+def test_followers_of_a_known_load_are_the_limit_of_those_of_a_reading(count):
+    rng = np.random.default_rng(count)
+    reading = np.cumsum(rng.normal(0.0, 0.4, count))
+    start = rng.uniform(-1.0, 1.0) * np.minimum(1.0, 0.3 / np.array(PLAYS))
+    alone = _branches(reading, start, np.zeros(len(PLAYS)))
+    almost = _branches(reading, start, np.full(len(PLAYS), 1e-12))
+    np.testing.assert_allclose(alone, almost, rtol=0.0, atol=1e-9)

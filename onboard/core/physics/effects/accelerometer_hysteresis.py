@@ -151,6 +151,10 @@ def _branches(reading: Array, start: Array, weights: Array) -> Array:
         weights: (plays,) as far as they are known, m/s^2.
     """
     plays = np.array(PLAYS)
+    if not np.any(weights):
+        followers = _dragged(reading, float(reading[0]) + start * plays)
+        known: Array = (followers - reading[:, None]) / plays
+        return known
     shares = (weights / plays).tolist()
     followers = (float(reading[0]) - start @ weights + start * plays).tolist()
     narrowest, at_rest = PLAYS[0], 1.0 - sum(shares)
@@ -177,3 +181,28 @@ def _branches(reading: Array, start: Array, weights: Array) -> Array:
     found = np.array(out)
     branches: Array = (found[:, 1:] - found[:, :1]) / plays
     return branches
+
+
+def _dragged(load: Array, followers: Array) -> Array:
+    """Followers (n, plays) of a load (n,) that is known: each for itself, without a loop over n.
+
+    A follower is held between ``load - play`` and ``load + play``.  Two such holds in a row are one
+    hold between other limits, so the limits since the beginning of 1, 2, 4, ... samples follow from
+    each other.
+
+    Args:
+        load: m/s^2.
+        followers: (plays,) where they begin, m/s^2.
+    """
+    plays = np.array(PLAYS)
+    low, high = load[:, None] - plays, load[:, None] + plays
+    reach = 1
+    while reach < len(load):
+        later = slice(reach, None)
+        before_low, before_high = low[:-reach], high[:-reach]
+        low[later], high[later] = (
+            np.clip(before_low, low[later], high[later]),
+            np.clip(before_high, low[later], high[later]),
+        )
+        reach *= 2
+    return np.clip(followers, low, high)

@@ -1,0 +1,110 @@
+"""One step of the filter with the attitude that goes with it, as loops that numba compiles.
+
+What :class:`~onboard.core.filter.whitening.WhiteningFilter` does in Python between calls of
+:mod:`onboard.core.filter.loops`, equal to it to rounding.  numba notices changes of this file
+alone: whoever changes the other one has to touch this one, too.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from onboard.core.filter.loops import compiled, predict
+from onboard.core.filter.state import ERRORS, MEASURED, STATES
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import EARTH_RATE, SEMI_MAJOR_AXIS
+
+
+@compiled("f8(f8[:,:,::1], i8, f8[::1])")
+def mean(carried: Array, state: int, theta: Array) -> float:
+    """A state of member 0 at ``theta``."""
+    row = carried[0, state]
+    x = row[0]
+    for c in range(len(theta)):
+        x -= row[c + 1] * theta[c]
+    return float(x)
+
+
+@compiled("void(f8, f8, f8, f8[:,::1])")
+def turn_by(x: float, y: float, z: float, R: Array) -> None:
+    """``exp([x, y, z]) R`` in place: :func:`onboard.core.maths.small_turns.turn_by`."""
+    angle2 = x * x + y * y + z * z
+    s, c = 1.0, 0.5
+    if angle2 >= 1e-8:
+        angle = math.sqrt(angle2)
+        s, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle2
+    sx, sy, sz, cx, cy, cz = s * x, s * y, s * z, c * x, c * y, c * z
+    for j in range(3):
+        a, b, d = R[0, j], R[1, j], R[2, j]
+        R[0, j] = (1.0 - cy * y - cz * z) * a + (cx * y - sz) * b + (cx * z + sy) * d
+        R[1, j] = (cx * y + sz) * a + (1.0 - cx * x - cz * z) * b + (cy * z - sx) * d
+        R[2, j] = (cx * z - sy) * a + (cy * z + sx) * b + (1.0 - cx * x - cy * y) * d
+
+
+@compiled("void(f8[:,:], f8[:,::1], f8[::1])")
+def angle_of(R_attitude: Array, R_nb: Array, turned: Array) -> None:
+    """Rotation vector from one attitude to the other, NED: ``small_turns.angle_of``."""
+    M = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for n in range(3):
+                M[i, j] += R_attitude[i, n] * R_nb[j, n]
+    x, y, z = 0.5 * (M[2, 1] - M[1, 2]), 0.5 * (M[0, 2] - M[2, 0]), 0.5 * (M[1, 0] - M[0, 1])
+    s = math.sqrt(x * x + y * y + z * z)
+    longer = 1.0
+    if s >= 1e-9:
+        longer = math.atan2(s, 0.5 * (M[0, 0] + M[1, 1] + M[2, 2] - 1.0)) / s
+    turned[0], turned[1], turned[2] = x * longer, y * longer, z * longer
+
+
+@compiled(
+    "void(f8[:,:,::1], f8[:,::1], f8, f8[:,:], f8[:,::1], f8[:,::1], f8, f8[::1],"
+    " f8[:,::1], f8[:,::1], f8[::1], f8, i8)"
+)
+def carry(
+    carried: Array,
+    R_nb: Array,
+    T: float,
+    turn: Array,
+    moved: Array,
+    columns: Array,
+    latitude: float,
+    theta: Array,
+    walk: Array,
+    settled: Array,
+    times: Array,
+    gravity: float,
+    earth: int,
+) -> None:
+    """One step of prediction, attitude included."""
+    fall, decay, w = np.zeros(MEASURED), np.ones(MEASURED), np.zeros(3)
+    if earth:
+        north, east = mean(carried, 0, theta), mean(carried, 1, theta)
+        down = mean(carried, 2, theta)
+        c, s = math.cos(latitude), math.sin(latitude)
+        w[0], w[1] = east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS
+        w[2] = -east * s / c / SEMI_MAJOR_AXIS
+        x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
+        fall[0], fall[1] = (z * east - y * down) * T, (x * down - z * north) * T
+        gravity += y * north - x * east
+        w[0] += EARTH_RATE * c
+        w[2] -= EARTH_RATE * s
+    fall[2], fall[3] = gravity * T, -0.5 * T * T * gravity
+    decay[0] = decay[1] = decay[2] = math.exp(-T / times[0])
+    decay[4] = decay[5] = math.exp(-T / times[1])
+    decay[6] = math.exp(-T / times[2])
+    before, after = np.empty(walk.shape), np.empty(walk.shape)
+    for b in range(len(walk)):
+        for i in range(STATES):
+            before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
+        for i in range(MEASURED):
+            after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[i] * decay[i])
+    predict(carried, R_nb, T, moved, columns, fall, decay, before, after)
+    for i in range(3):
+        a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]
+        for j in range(3):
+            R_nb[i, j] = a * turn[0, j] + b_ * turn[1, j] + c_ * turn[2, j]
+    if earth:
+        turn_by(-w[0] * T, -w[1] * T, -w[2] * T, R_nb)

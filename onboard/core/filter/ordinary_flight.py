@@ -1,0 +1,223 @@
+"""Flight in which nothing is out of the ordinary: many epochs in one call of compiled loops.
+
+Most epochs are like that: no gate refuses anything, nothing is in the tail of its distribution.
+They go through :mod:`onboard.core.filter.runs`; what is left goes through
+:class:`~onboard.core.filter.whitening.WhiteningFilter` one by one, whose arithmetic it is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from onboard.core.filter.innovations import Epochs
+from onboard.core.filter.kernel import Run
+from onboard.core.filter.limits import (
+    ATTITUDE_TIME_S,
+    COLOUR_TIME_S,
+    GATE_HEADING,
+    GATE_HEIGHT,
+    GATE_TILT,
+    GATE_VELOCITY,
+    HEADING_TIME_S,
+    SYMMETRY_UPDATES,
+    TAIL,
+)
+from onboard.core.filter.prepared import Prepared
+from onboard.core.filter.readings import Index
+from onboard.core.filter.traces import EpochState, EpochTrace
+from onboard.core.filter.whitening import Uses, WhiteningFilter
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.earth import STANDARD_GRAVITY
+
+_TIMES = np.array([COLOUR_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S])
+_GATES = np.array([GATE_VELOCITY, GATE_HEIGHT, GATE_TILT, GATE_HEADING])
+_TAILS = np.array([np.inf, TAIL[1], TAIL[2], TAIL[3]])
+_BELIEVED, _REFUSED = 1, 2
+"""What may be known of a velocity before it is looked at; 0: nothing."""
+
+
+_NONE = np.zeros(0)
+
+
+class Gone(NamedTuple):
+    """What has been gone through; arrays hold until the next call.
+
+    Attributes:
+        step: number of the first step that was not finished.
+        pending: whether that step was made, and only the epoch at its end is not taken.
+        epochs: (n,) numbers of the epochs that were taken.
+        velocities: (n,) how many components of velocity each has.
+        heights: (n,) how many heights.
+        first_row: (n + 1,) where the whitened innovations of each begin, and where the last end.
+        rows: (B, r, m + 1) the innovations: ``y``, then ``h``.
+        raw: (r, m + 1) those of member 0 before whitening.
+        log_det: (B,) sum of the log determinants of their covariances.
+        states: (n, 15) velocity innovation (3, NaN where there is none), attitude (9) and velocity
+            (3) after each epoch.
+    """
+
+    step: int
+    pending: bool
+    epochs: Index
+    velocities: Index
+    heights: Index
+    first_row: Index
+    rows: Array
+    raw: Array
+    log_det: Array
+    states: Array
+
+    def noted(self, ready: Epochs, bias_b: Array) -> list[EpochState]:
+        """The filter's state after each of the epochs ``ready`` that had a velocity.
+
+        Args:
+            ready: of the segment.
+            bias_b: (3,) gyroscope bias, body axes, rad/s.
+        """
+        kept = self.states.copy()
+        return [
+            EpochState(t, state[:3], state[3:12].reshape(3, 3), state[12:], bias_b)
+            for t, v, state in zip(
+                ready.t[self.epochs].tolist(), self.velocities.tolist(), kept, strict=True
+            )
+            if v
+        ]
+
+    def traces(self, ready: Epochs) -> list[EpochTrace]:
+        """What each of the epochs ``ready`` measured."""
+        rows, raw = self.rows[0].copy(), self.raw.copy()
+        first = self.first_row.tolist()
+        return [
+            EpochTrace(
+                t,
+                raw[a : a + v, 0],
+                raw[a : a + v, 1:],
+                rows[a:b, 0],
+                rows[a:b, 1:],
+                v,
+                bool(h),
+                (),
+                _NONE,
+            )
+            for t, v, h, a, b in zip(
+                ready.t[self.epochs].tolist(),
+                self.velocities.tolist(),
+                self.heights.tolist(),
+                first,
+                first[1:],
+                strict=False,
+            )
+        ]
+
+
+class OrdinaryFlight:
+    """Takes a filter through a segment as far as nothing is out of the ordinary."""
+
+    def __init__(self, run: Run, made: WhiteningFilter, ready: Prepared) -> None:
+        """Take the loops, the filter and what it goes through."""
+        self._run, self._filter, self._ready = run, made, ready
+        self._offered = _offered(ready, made.uses)
+        numbers = self._offered[:, 0] + self._offered[:, 1] + 3 * self._offered[:, 2]
+        self._numbers = numbers
+        n, most, m1 = len(numbers), int(numbers.sum()), made.m + 1
+        self._rows = np.empty((len(made.bank), most, m1))
+        self._raw = np.empty((most, m1))
+        self._taken = np.empty(n, dtype=np.int64)
+        self._states = np.empty((n, 15))
+        self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
+
+    def go(self, step: int, theta: Array, most: int) -> Gone:
+        """Go on from a step (its number) until ``most`` epochs are taken or one is not ordinary.
+
+        Args:
+            step: number of the first step.
+            theta: (m,) estimate.
+            most: epochs.
+        """
+        made, steps, epochs = self._filter, self._ready.steps, self._ready.epochs
+        progress = np.array([step, 0, 0, made.updates])
+        log_det = np.zeros(len(made.bank))
+        made.R_nb = np.array(made.R_nb)
+        levels, gram = made.variances, made.noise_gram
+        pending = self._run(
+            made.carried,
+            made.R_nb,
+            progress,
+            most,
+            SYMMETRY_UPDATES,
+            np.ascontiguousarray(theta),
+            steps.duration,
+            steps.turn,
+            steps.moved,
+            steps.columns,
+            epochs.latitude,
+            self._ends,
+            self._offered,
+            epochs.R_attitude,
+            epochs.body,
+            epochs.ned,
+            epochs.along_velocity,
+            epochs.noise,
+            levels.walk,
+            levels.settled,
+            levels.reading,
+            _TIMES,
+            _GATES,
+            _TAILS,
+            STANDARD_GRAVITY,
+            int(made.uses.earth),
+            int(gram is not None),
+            np.zeros(3) if gram is None else gram,
+            self._rows,
+            self._raw,
+            log_det,
+            self._taken,
+            self._states,
+        )
+        after, rows, count, made.updates = progress.tolist()
+        done = slice(step, after + pending)
+        made.t += float(steps.duration[done].sum())
+        taken = self._taken[:count]
+        first = np.concatenate([[0], np.cumsum(self._numbers[taken])])
+        velocities, heights = self._offered[taken, 0], self._offered[taken, 1]
+        if made.gates is not None and heights.any():
+            made.gates.height_is_inside()
+        return Gone(
+            after,
+            bool(pending),
+            taken,
+            velocities,
+            heights,
+            first,
+            self._rows[:, :rows],
+            self._raw[:rows],
+            log_det,
+            self._states[:count],
+        )
+
+
+def ordinary_flight(made: WhiteningFilter, ready: Prepared) -> OrdinaryFlight | None:
+    """For a filter whose arithmetic is compiled, and whose gates judge; else None."""
+    run, gates = made.kernel.run, made.gates
+    if run is None or gates is None or made.uses.recorded_attitude:
+        return None
+    return OrdinaryFlight(run, made, ready)
+
+
+def _offered(ready: Prepared, uses: Uses) -> Index:
+    """(n, 4) components of velocity, of height, of attitude over three; what is known."""
+    epochs = ready.epochs
+    out = np.zeros((len(epochs), 4), dtype=np.int64)
+    finite = np.isfinite(epochs.velocity)
+    level = finite[:, 0] & finite[:, 1] & epochs.trusted
+    out[:, 0] = np.where(level, 2 + finite[:, 2], 0)
+    if uses.height:
+        out[:, 1] = np.isfinite(epochs.height) & epochs.trusted
+    if uses.attitude:
+        out[:, 2] = epochs.near
+    if uses.refused is not None:
+        named = [bool(uses.refused.by(stamp)) for stamp in epochs.stamp.tolist()]
+        out[:, 3] = np.where(named, _REFUSED, _BELIEVED)
+    return out

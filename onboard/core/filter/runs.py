@@ -1,0 +1,247 @@
+"""Many epochs in one call: the loop over steps and epochs that numba compiles.
+
+What :class:`~onboard.core.filter.whitening.WhiteningFilter` does to an epoch of which a gate
+refuses nothing, and of which nothing is in the tail of its distribution, epoch after epoch, until
+one is not like that.  Equal to it to rounding.  numba notices changes of this file alone: whoever
+changes :mod:`~onboard.core.filter.loops` or :mod:`~onboard.core.filter.motion` has to touch this
+one, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from onboard.core.filter.loops import compiled, measured, take, take_noise, whiten
+from onboard.core.filter.motion import angle_of, carry, mean, turn_by
+from onboard.core.filter.readings import Index
+from onboard.core.filter.state import STATES
+from onboard.core.maths.arrays import Array
+
+
+@compiled("b1(f8[:,:,::1], f8[::1], i8[::1], i8, f8[::1], f8[::1])")
+def _ordinary(
+    W: Array, theta: Array, offered: Index, judged: int, gates: Array, tails: Array
+) -> bool:
+    """Whether no gate could refuse anything, and nothing is in the tail of its distribution."""
+    at = 0
+    counts = (offered[0], offered[1], 2 * offered[2], offered[2])
+    for kind in range(4):
+        n, nis = counts[kind], 0.0
+        for a in range(at, at + n):
+            x = W[0, a, 0]
+            for c in range(len(theta)):
+                x -= W[0, a, c + 1] * theta[c]
+            nis += x * x
+        at += n
+        if n > 0 and (kind > 0 or judged) and not nis <= gates[kind]:
+            return False
+        if n > 0 and kind < 2 and not nis <= tails[n]:
+            return False
+    return True
+
+
+@compiled("void(f8[:,:,::1], i8)")
+def _symmetric(carried: Array, m1: int) -> None:
+    """Covariances made symmetric, in place."""
+    for b in range(len(carried)):
+        P = carried[b, :, m1 : m1 + STATES]
+        for i in range(STATES):
+            for j in range(i):
+                P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2.0
+
+
+@compiled("i8[::1](i8[::1])")
+def _numbers(offered: Index) -> Index:
+    """Which numbers an epoch has to offer: :func:`onboard.core.filter.readings.reading`."""
+    v, h, a = offered[0], offered[1], offered[2]
+    number = np.empty(v + h + 3 * a, dtype=np.int64)
+    for i in range(v):
+        number[i] = i
+    if h:
+        number[v] = 3
+    for i in range(3 * a):
+        number[v + h + i] = 4 + i
+    return number
+
+
+@compiled("f8[:,::1](f8[:,::1], f8[::1])")
+def _sum(white: Array, more: Array) -> Array:
+    """Variances (B, n) and what an epoch (n,) adds to them."""
+    out = np.empty(white.shape)
+    for b in range(len(white)):
+        for i in range(len(more)):
+            out[b, i] = white[b, i] + more[i]
+    return out
+
+
+@compiled("void(f8[:,:,::1], f8[:,::1], f8[::1], i8, f8[:,:,::1], f8[:,::1], f8[::1])")
+def _keep(W: Array, E: Array, det: Array, at: int, rows: Array, raw: Array, log_det: Array) -> None:
+    """Write down the innovations of an epoch from row ``at`` on."""
+    r, m1 = E.shape
+    for b in range(len(W)):
+        log_det[b] += det[b]
+        for a in range(r):
+            for c in range(m1):
+                rows[b, at + a, c] = W[b, a, c]
+    for a in range(r):
+        for c in range(m1):
+            raw[at + a, c] = E[a, c]
+
+
+@compiled("void(f8[:,:,::1], f8[:,::1], f8[:,::1], i8, f8[::1], f8[::1])")
+def _note(
+    carried: Array, R_nb: Array, E: Array, velocities: int, theta: Array, state: Array
+) -> None:
+    """Turn the attitude by what was found, and write down what there is after the epoch."""
+    psi = (mean(carried, 4, theta), mean(carried, 5, theta), mean(carried, 6, theta))
+    turn_by(psi[0], psi[1], psi[2], R_nb)
+    for i in range(3):
+        for b in range(len(carried)):
+            carried[b, 4 + i, 0] -= psi[i]
+        state[i] = np.nan
+    for i in range(velocities):
+        x = E[i, 0]
+        for c in range(len(theta)):
+            x -= E[i, c + 1] * theta[c]
+        state[i] = x
+    for i in range(3):
+        for j in range(3):
+            state[3 + 3 * i + j] = R_nb[i, j]
+        state[12 + i] = mean(carried, i, theta)
+
+
+@compiled(
+    "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
+    " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
+    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
+    " f8[::1], f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1])"
+)
+def run(
+    carried: Array,
+    R_nb: Array,
+    progress: Index,
+    most: int,
+    symmetry: int,
+    theta: Array,
+    duration: Array,
+    turn: Array,
+    moved: Array,
+    columns: Array,
+    latitude: Array,
+    ends: Index,
+    offered: Index,
+    R_attitude: Array,
+    body: Array,
+    ned: Array,
+    along: Array,
+    noise: Array,
+    walk: Array,
+    settled: Array,
+    white: Array,
+    times: Array,
+    gates: Array,
+    tails: Array,
+    gravity: float,
+    earth: int,
+    noisy: int,
+    gram: Array,
+    rows: Array,
+    raw: Array,
+    log_det: Array,
+    taken: Index,
+    states: Array,
+) -> int:
+    """Go on through steps and epochs while they are ordinary, in place.
+
+    Args:
+        carried: (B, STATES, C) as in :mod:`onboard.core.filter.kernel`.
+        R_nb: (3, 3) attitude.
+        progress: (4,) the step to go on with; numbers that were read; epochs that were taken;
+            updates so far.
+        most: epochs to take.
+        symmetry: updates after which covariances are made symmetric.
+        theta: (m,) estimate.
+        duration: (K,), turn, moved and columns as in :class:`~..innovations.Steps`.
+        turn: see there.
+        moved: see there.
+        columns: see there.
+        latitude: (n,) rad.
+        ends: (K,) the epoch at the end of each step; -1: none.
+        offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
+            the velocity: 0 nothing, 1 that it is not refused, 2 that it is.
+        R_attitude: (n, 3, 3) and body, ned, along and noise as in :class:`~..innovations.Epochs`.
+        body: see there.
+        ned: see there.
+        along: see there.
+        noise: see there.
+        walk: (B, STATES) and settled and white as in :class:`~..variances.Variances`.
+        settled: see there.
+        white: see there.
+        times: (3,) of the slow errors of velocity, tilt and heading, s.
+        gates: (4,) limits of velocity, height, tilt and heading.
+        tails: (4,) by degrees of freedom.
+        gravity: m/s^2.
+        earth: whether it turns.
+        noisy: whether the noise in regressors is carried.
+        gram: (3,) of it.
+        rows: (B, .., m + 1) whitened innovations are written to.
+        raw: (.., m + 1) those of member 0 before whitening.
+        log_det: (B,) is added to.
+        taken: (n,) epochs that were taken, in order, are written to.
+        states: (n, 15) velocity innovation, attitude and velocity after each of them.
+
+    Returns:
+        1 if the step ``progress[0]`` was made, but the epoch at its end is out of the ordinary;
+        else 0.
+    """
+    members, _, width = carried.shape
+    m1 = columns.shape[2]
+    turned, stop = np.zeros(3), progress[2] + most
+    while progress[0] < len(duration) and progress[2] < stop:
+        k = progress[0]
+        e = ends[k]
+        carry(
+            carried,
+            R_nb,
+            duration[k],
+            turn[k],
+            moved[k],
+            columns[k],
+            latitude[max(e, 0)],
+            theta,
+            walk,
+            settled,
+            times,
+            gravity,
+            earth,
+        )
+        if e < 0:
+            progress[0] += 1
+            continue
+        number = _numbers(offered[e])
+        r = len(number)
+        if r == 0 or offered[e, 3] == 2:
+            return 1
+        turned[0] = turned[1] = turned[2] = 0.0
+        if offered[e, 2]:
+            angle_of(R_attitude[e], R_nb, turned)
+        z = ned[e].copy()
+        measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
+        E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
+        det = np.empty(members)
+        if whiten(carried, z, number, _sum(white, noise[e]), E, W, whitener, det):
+            return 1
+        if not _ordinary(W, theta, offered[e], 1 - offered[e, 3], gates, tails):
+            return 1
+        take(carried, W, m1)
+        if noisy:
+            take_noise(carried[0], W[0], whitener, number, m1, gram)
+        progress[3] += 1
+        if progress[3] % symmetry == 0:
+            _symmetric(carried, m1)
+        at, n = progress[1], progress[2]
+        _keep(W, E, det, at, rows, raw, log_det)
+        taken[n] = e
+        _note(carried, R_nb, E, offered[e, 0], theta, states[n])
+        progress[0], progress[1], progress[2] = k + 1, at + r, n + 1
+    return 0
