@@ -28,23 +28,26 @@ from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
 
 
 class _Shock(Family):
-    """Force and turn that the samples have missed, for a while after a moment."""
+    """Force, and turn, that the samples have missed, for a while after a moment."""
 
-    def __init__(self, moment: float, lasts: float) -> None:
-        """Take the moment, s on the boot clock, and for how long, s."""
-        self.moment, self.lasts = moment, lasts
+    def __init__(self, moment: float, lasts: float, *, turns: bool) -> None:
+        """Take the moment, s on the boot clock, for how long, s, and whether it turns, too."""
+        self.moment, self.lasts, self.turns = moment, lasts, turns
         self.name = f"shock_{moment:.2f}"
         self.unknowns = (
             *(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXIS),
-            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS),
+            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS if turns),
         )
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-e_i`` for as long as it lasts."""
-        return np.concatenate([self._during(nodes), np.zeros((*nodes.t.shape, 3, 3))], axis=-1)
+        turn = np.zeros((*nodes.t.shape, 3, 3 if self.turns else 0))
+        return np.concatenate([self._during(nodes), turn], axis=-1)
 
-    def rate(self, nodes: Signals) -> Array:
+    def rate(self, nodes: Signals) -> Array | None:
         """The same of the rates."""
+        if not self.turns:
+            return None
         return np.concatenate([np.zeros((*nodes.t.shape, 3, 3)), self._during(nodes)], axis=-1)
 
     def _during(self, nodes: Signals) -> Array:
@@ -70,11 +73,16 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
 
 
 def shock_instead(full: Examination, chosen: Sequence[Effect], jump: BiasStep) -> Family | None:
-    """A shock near a jump that is less of a chance than the jump; None: none is."""
+    """A shock near a jump that is less of a chance than the jump; None: none is.
+
+    A turn that the gyroscope has missed tilts the EKF as well: for as long as that is not
+    forgotten, it looks like a jump.  Where flight goes on for longer, a jump is still there.
+    """
+    turns = jump.moment > full.blocks[-1].end - FORGOTTEN_S
     centre, width = jump.moment, _reach(full)
     for spacing in SPACINGS_S:
         times = np.arange(centre - width, centre + width + 1e-6, spacing)
-        shocks = [_Shock(float(t), spacing) for t in times]
+        shocks = [_Shock(float(t), spacing, turns=turns) for t in times]
         own, *gains = _gains(full, chosen, [jump, *shocks])
         best = shocks[int(np.argmax(gains))]
         centre, width = best.moment, spacing
