@@ -13,7 +13,7 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import FORGOTTEN_S, FURTHEST, LARGEST_TURN, SPACINGS_S
+from onboard.core.diagnosis.limits import AT_ONCE, FORGOTTEN_S, FURTHEST, LARGEST_TURN, SPACINGS_S
 from onboard.core.diagnosis.score import surprise
 from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
@@ -56,6 +56,23 @@ class _Shock(Family):
         return on_axes(np.repeat(inside[..., None], 3, axis=-1))
 
 
+def jumps_at_blocks(full: Examination) -> list[tuple[float, float]]:
+    """Moment (s) and gain of a jump at the start of each block, beside nothing of the catalogue.
+
+    What shows a jump forwards or sideways is the half minute after it: then the tilt has taken it
+    over.  So each is gone through, some neighbours at once.  Not while an EKF that has just begun
+    converges: its attitude jumps then.
+    """
+    settled = full.blocks[0].start + FORGOTTEN_S
+    moments = [float(b.start) for b in full.blocks[1:] if b.start >= settled]
+    jump = BiasStep(Origin(full.point.skew_from))
+    out: list[tuple[float, float]] = []
+    for i in range(0, len(moments), AT_ONCE):
+        some = moments[i : i + AT_ONCE]
+        out += zip(some, _gains(full, (), [jump.at(t) for t in some]), strict=True)
+    return out
+
+
 def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:
     """The jump near ``centre`` (s) that explains most beside ``chosen``.
 
@@ -72,7 +89,7 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
     return _best(full, chosen, centre, fine, 1.5 * coarse)
 
 
-def shock_instead(full: Examination, chosen: Sequence[Effect], jump: BiasStep) -> Family | None:
+def shock_instead(full: Examination, jump: BiasStep) -> Family | None:
     """A shock near a jump that is less of a chance than the jump; None: none is.
 
     A turn that the gyroscope has missed tilts the EKF as well: for as long as that is not
@@ -83,7 +100,7 @@ def shock_instead(full: Examination, chosen: Sequence[Effect], jump: BiasStep) -
     for spacing in SPACINGS_S:
         times = np.arange(centre - width, centre + width + 1e-6, spacing)
         shocks = [_Shock(float(t), spacing, turns=turns) for t in times]
-        own, *gains = _gains(full, chosen, [jump, *shocks])
+        own, *gains = _gains(full, (), [jump, *shocks])
         best = shocks[int(np.argmax(gains))]
         centre, width = best.moment, spacing
     likelier = surprise(max(gains), len(best.unknowns)) > surprise(own, len(jump.unknowns))
@@ -174,11 +191,6 @@ def _with_jumps(
     sums.b[mine] = sign[mine] * block.sums.b[source[mine]]
     sums.s, sums.rows, sums.log_det = block.sums.s, block.sums.rows, block.sums.log_det
     return Block(block.start, block.end, sums)
-
-
-def boundary_of(fitter: Fitter, block: int) -> float:
-    """When a block starts, s on the boot clock."""
-    return float(fitter.blocks[block].start)
 
 
 def candidate_of(made: Examination, family: Effect) -> Candidate:

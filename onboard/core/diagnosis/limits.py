@@ -42,6 +42,8 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
+AT_ONCE: Final = 6
+"""Jumps in one pass of the search [cost: more columns against more flight around them]."""
 LARGEST_TURN: Final = 0.2
 """rad/s over the last spacing that a gyroscope may miss in a shock, one sigma: 6 degrees, as much
 as a hard landing turns a vehicle by [physics]."""

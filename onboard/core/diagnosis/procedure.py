@@ -14,7 +14,7 @@ from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
-from onboard.core.diagnosis.jumps import boundary_of, candidate_of, jump_near, shock_instead
+from onboard.core.diagnosis.jumps import candidate_of, jump_near, jumps_at_blocks, shock_instead
 from onboard.core.diagnosis.limits import FURTHEST
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
@@ -82,11 +82,10 @@ def _selected(full: Examination, testable: Sequence[Effect]) -> tuple[Examinatio
     """Effects by their scores, a jump among them if there is one; and the sums that say so."""
     choice = _chosen(full, testable)
     for _ in range(FURTHEST):
-        steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
-        jump = _jump(full, steady, choice)
+        jump = _jump(full, choice)
         if jump is None:
             break
-        shock = shock_instead(full, steady, jump)
+        shock = shock_instead(full, jump)
         if shock is None:
             return _with_jump(full, testable, choice, jump)
         full = full.shaken(shock)
@@ -108,21 +107,22 @@ def _with_jump(
     return full, choice
 
 
-def _jump(full: Examination, steady: Sequence[Effect], choice: Choice) -> BiasStep | None:
-    """The jump that explains most beside ``steady`` effects; None if nothing looks like one.
+def _jump(full: Examination, choice: Choice) -> BiasStep | None:
+    """The jump that explains most by itself; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
-    for noise; a jump is no column until its moment is known, and at a block's start, seconds
-    away, it explains little of what it does.
+    for noise; a jump is no column until its moment is known.  It is looked for beside nothing else:
+    something with unknowns enough may have stood in for it.
     """
-    fitter = Fitter(full.all_blocks, full.model, 1.0, full.absent)
-    jumps = fitter.jumps([*choice.base, *full.indices_of(steady)])
-    if len(fitter.blocks) < FEWEST_BLOCKS or not jumps:
+    if len(full.blocks) < FEWEST_BLOCKS:
         return None
-    boundary, gain = max(jumps, key=lambda x: x[1])
-    if not _wanders(choice) and surprise(gain, 3, len(jumps)) < least():
+    places = jumps_at_blocks(full)
+    if not places:
         return None
-    return jump_near(full, steady, boundary_of(fitter, boundary))
+    moment, gain = max(places, key=lambda x: x[1])
+    if not _wanders(choice) and surprise(gain, 3, len(places)) < least():
+        return None
+    return jump_near(full, (), moment)
 
 
 def _wanders(choice: Choice) -> bool:

@@ -74,7 +74,7 @@ def test_it_is_found_to_the_second(full):
     # Moments are on the boot clock, as the effect's is; samples begin a second later.
     found = jumps.jump_near(full, (), AT + 31.0)
     assert found.moment == pytest.approx(AT, abs=1.0)
-    assert jumps.shock_instead(full, (), found) is None
+    assert jumps.shock_instead(full, found) is None
 
 
 @pytest.mark.slow
