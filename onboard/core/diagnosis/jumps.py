@@ -13,8 +13,15 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import AT_ONCE, FORGOTTEN_S, FURTHEST, LARGEST_TURN, SPACINGS_S
-from onboard.core.diagnosis.score import surprise
+from onboard.core.diagnosis.limits import (
+    AT_ONCE,
+    CONTACT_S,
+    FORGOTTEN_S,
+    FURTHEST,
+    LARGEST_TURN,
+    SPACINGS_S,
+)
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import OFFSETS, Fitter
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.arrays import Array
@@ -27,27 +34,24 @@ from onboard.core.physics.effect import Effect, Origin, on_axes
 from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
 
 
-class _Shock(Family):
-    """Force, and turn, that the samples have missed, for a while after a moment."""
+class Shock(Family):
+    """Force and turn that the samples have missed, for a while after a moment."""
 
-    def __init__(self, moment: float, lasts: float, *, turns: bool) -> None:
-        """Take the moment, s on the boot clock, for how long, s, and whether it turns, too."""
-        self.moment, self.lasts, self.turns = moment, lasts, turns
+    def __init__(self, moment: float, lasts: float) -> None:
+        """Take the moment, s on the boot clock, and for how long, s."""
+        self.moment, self.lasts = moment, lasts
         self.name = f"shock_{moment:.2f}"
         self.unknowns = (
             *(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXIS),
-            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS if turns),
+            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS),
         )
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-e_i`` for as long as it lasts."""
-        turn = np.zeros((*nodes.t.shape, 3, 3 if self.turns else 0))
-        return np.concatenate([self._during(nodes), turn], axis=-1)
+        return np.concatenate([self._during(nodes), np.zeros((*nodes.t.shape, 3, 3))], axis=-1)
 
-    def rate(self, nodes: Signals) -> Array | None:
+    def rate(self, nodes: Signals) -> Array:
         """The same of the rates."""
-        if not self.turns:
-            return None
         return np.concatenate([np.zeros((*nodes.t.shape, 3, 3)), self._during(nodes)], axis=-1)
 
     def _during(self, nodes: Signals) -> Array:
@@ -89,22 +93,27 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
     return _best(full, chosen, centre, fine, 1.5 * coarse)
 
 
-def shock_instead(full: Examination, jump: BiasStep) -> Family | None:
-    """A shock near a jump that is less of a chance than the jump; None: none is.
+def shock_instead(full: Examination, jump: BiasStep) -> Shock | None:
+    """A shock that is less of a chance than a jump at the end of the flight; None: none is.
 
-    A turn that the gyroscope has missed tilts the EKF as well: for as long as that is not
-    forgotten, it looks like a jump.  Where flight goes on for longer, a jump is still there.
+    Nothing hits a vehicle in the air: a jump before the last :data:`CONTACT_S` is none.
     """
-    turns = jump.moment > full.blocks[-1].end - FORGOTTEN_S
-    centre, width = jump.moment, _reach(full)
+    start, end = full.blocks[-1].end - CONTACT_S, full.blocks[-1].end
+    if jump.moment < start:
+        return None
     for spacing in SPACINGS_S:
-        times = np.arange(centre - width, centre + width + 1e-6, spacing)
-        shocks = [_Shock(float(t), spacing, turns=turns) for t in times]
+        shocks = [Shock(float(t), spacing) for t in np.arange(start, end, spacing)]
         own, *gains = _gains(full, (), [jump, *shocks])
         best = shocks[int(np.argmax(gains))]
-        centre, width = best.moment, spacing
+        start, end = best.moment - spacing, best.moment + spacing
     likelier = surprise(max(gains), len(best.unknowns)) > surprise(own, len(jump.unknowns))
     return best if likelier else None
+
+
+def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
+    """Whether what a shock explains beside ``chosen`` effects is no chance at all its moments."""
+    (gain,) = _gains(full, chosen, [shock])
+    return surprise(gain, len(shock.unknowns), full.trusted_s / SPACINGS_S[-1]) >= least()
 
 
 def _reach(full: Examination) -> float:
@@ -128,7 +137,7 @@ def _best(
 
 
 def _gains(
-    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | _Shock]
+    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
 ) -> list[float]:
     """Gain of each jump alone beside the chosen effects, from one pass with all of them.
 
@@ -167,7 +176,7 @@ def _with_jumps(
     block: Block,
     full: Examination,
     model: Model,
-    steps: Sequence[BiasStep | _Shock],
+    steps: Sequence[BiasStep | Shock],
     *,
     after: bool,
 ) -> Block:
@@ -180,7 +189,7 @@ def _with_jumps(
             theirs = full.model.slices[family.name]
             source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
     if after:
-        for step in (s for s in steps if not isinstance(s, _Shock)):
+        for step in (s for s in steps if not isinstance(s, Shock)):
             # What the sensor reads too much; the offsets' columns are what is added to it.
             source[model.slices[step.name]], sign[model.slices[step.name]] = OFFSETS, -1.0
     mine = np.flatnonzero(source >= 0)

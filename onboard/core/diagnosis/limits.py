@@ -44,6 +44,9 @@ SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
 AT_ONCE: Final = 6
 """Jumps in one pass of the search [cost: more columns against more flight around them]."""
+CONTACT_S: Final = 10.0
+"""s before the end of a flight in which the ground may have been touched: bounces, and the seconds
+that an autopilot takes to see that it has landed [physics]."""
 LARGEST_TURN: Final = 0.2
 """rad/s over the last spacing that a gyroscope may miss in a shock, one sigma: 6 degrees, as much
 as a hard landing turns a vehicle by [physics]."""

@@ -14,7 +14,13 @@ from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
-from onboard.core.diagnosis.jumps import candidate_of, jump_near, jumps_at_blocks, shock_instead
+from onboard.core.diagnosis.jumps import (
+    candidate_of,
+    explains,
+    jump_near,
+    jumps_at_blocks,
+    shock_instead,
+)
 from onboard.core.diagnosis.limits import FURTHEST
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
@@ -88,6 +94,9 @@ def _selected(full: Examination, testable: Sequence[Effect]) -> tuple[Examinatio
         shock = shock_instead(full, jump)
         if shock is None:
             return _with_jump(full, testable, choice, jump)
+        steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
+        if not explains(full, steady, shock):
+            break
         full = full.shaken(shock)
         choice = _chosen(full, testable)
     return full, choice
