@@ -81,6 +81,13 @@ EAGER_EPOCHS: Final = 60
 LAZY_EPOCHS: Final = 5
 """Later after each so many: it moves no more within half a second [cost]."""
 
+MOST_PREPARED_BYTES: Final = 22_000_000
+"""Of segments made ready that are kept for the next pass; what is more is made anew.  Five minutes
+with five fixes a second and every effect are 20 MB [cost]."""
+NEAR_BIAS_RAD_S: Final = 2e-3
+"""rad/s; within it attitude is linear in a bias: over the half second to either side of a fix a
+turn changes by a milliradian [physics]."""
+
 # Correlation times of Gauss-Markov errors (noise).
 
 COLOUR_TIME_S: Final = 3.0

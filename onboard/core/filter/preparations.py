@@ -9,21 +9,14 @@ it goes on from a segment that was made ready with another one as soon as that s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.filter.limits import MOST_PREPARED_BYTES, NEAR_BIAS_RAD_S
 from onboard.core.filter.prepared import Prepared
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
-
-MOST_BYTES: Final = 22_000_000
-"""Of what is kept; what is more is made anew in each pass.  Five minutes with five fixes a second
-and every effect are 20 MB [cost]."""
-NEAR_BIAS_RAD_S: Final = 2e-3
-"""rad/s; within it attitude is linear in a bias: over the half second to either side of a fix a
-turn changes by a milliradian [physics]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +75,7 @@ class Kept:
 class Preparations:
     """What the passes about one linearisation, with one model, have made ready."""
 
-    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, most_bytes: int = MOST_PREPARED_BYTES) -> None:
         """Take how much may be kept."""
         self._room = most_bytes
         self._kept: dict[tuple[int, ...], Kept] = {}

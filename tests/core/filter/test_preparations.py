@@ -7,9 +7,10 @@ from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import through
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.filter.limits import MOST_PREPARED_BYTES
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.preparations import MOST_BYTES, Preparations
+from onboard.core.filter.preparations import Preparations
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.accelerometer_hysteresis import AccelerometerHysteresis
@@ -92,4 +93,4 @@ def test_five_minutes_with_every_effect_are_less_than_what_may_be_kept(batches, 
     kept = list(ready._kept.values())
     fixes = sum(len(k.ready.epochs) for k in kept)
     per_unknown = sum(k.ready.size for k in kept) / fixes / (model.size + 1)
-    assert per_unknown * 60 * 300 * 5 < MOST_BYTES
+    assert per_unknown * 60 * 300 * 5 < MOST_PREPARED_BYTES
