@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class CalibrationResult(Result):
     """What :func:`calibrate` gives: one entry for each accelerometer, in their order.
 
-    It keeps what the report draws, which is the flight: some tens of megabytes for half an hour.
+    It keeps what the report draws, which is the flight: some 5 MB for each minute.
 
     Attributes:
         accelerometers: the entries; iterating over the result gives them, too.
