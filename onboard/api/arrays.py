@@ -14,9 +14,9 @@ from onboard.api.streams import Attitude, Inertial, Told, Velocity, put
 from onboard.errors import ArraysError
 
 MOST_ROLL = 2.0 * np.pi
-"""rad, and of longitude: either of the usual ranges."""
+"""rad, and of longitude: either of the usual ranges [definition]."""
 MOST_PITCH = 0.5 * np.pi
-"""rad, and of latitude."""
+"""rad, and of latitude [definition]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,9 +16,11 @@ from onboard.batches.job import Job, Outcome, version
 from onboard.errors import LinkError, UsageError
 
 PER_BATCH = 100
-"""Recordings a task: minutes of work beside milliseconds of scheduling."""
+"""Recordings a task: minutes of work beside milliseconds of scheduling [cost]."""
 MOST_PER_BATCH = 1_000
+"""More would be hours that a lost worker loses [cost]."""
 CONNECT_S = 10.0
+"""s to wait for a scheduler, one that answers at all does so at once [cost]."""
 
 
 def batch(jobs: Sequence[Job]) -> list[Outcome]:

@@ -23,6 +23,7 @@ from onboard.recordings.provenance import provenance
 CODE = ("answers", "core", "mavlink", "recordings", "report")
 """Rooms that a record and a page come from."""
 BLOCK = 1 << 20
+"""Bytes of a file that are hashed at once [cost]."""
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):

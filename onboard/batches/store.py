@@ -22,6 +22,7 @@ from onboard.errors import UsageError
 
 MAGIC = b"onboard fleet 1\n"
 DIGEST = 64
+"""Hexadecimal digits of SHA-256 [definition]."""
 
 
 class Store:

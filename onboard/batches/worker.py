@@ -12,6 +12,7 @@ from onboard.batches.frames import Result, Share, next_job, send
 from onboard.batches.job import done
 
 TOLD_EVERY_S = 0.2
+"""s between two reports of progress: as often as an eye follows [cost]."""
 
 
 def main() -> None:

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.text import Text
 
 from onboard.answers.fleet.document import fleet_document
-from onboard.answers.fleet.history import history_of
+from onboard.answers.fleet.history import History, history_of
 from onboard.answers.fleet.places import found
 from onboard.answers.fleet.record import Flown
-from onboard.answers.fleet.shared_numbers import common_of
+from onboard.answers.fleet.shared_numbers import Comparison, common_of
 from onboard.answers.fleet.vehicles import vehicles_of
 from onboard.batches.cluster import MOST_PER_BATCH, PER_BATCH
 from onboard.batches.crew import cores
@@ -155,19 +155,40 @@ def fleet(
     for line in vehicle_lines(histories, compared) if table else ():
         console.print(line)
     if report_folder is not None:
-        from onboard.report.fleet import fleet_html
+        _write_index(done, histories, compared, pages, report_folder)
+    _write_numbers(done, histories, compared, parquet_file, json_file)
+    failed = sum(bool(one.error) for one in done)
+    if failed:
+        raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
 
-        index = fleet_html(done, histories, compared, pages)
-        write_text(index, str(report_folder / INDEX))
+
+def _write_index(
+    done: Sequence[Flown],
+    histories: Sequence[History],
+    compared: Comparison,
+    pages: dict[str, str],
+    folder: Path,
+) -> None:
+    """The page that leads to the others."""
+    from onboard.report.fleet import fleet_html
+
+    write_text(fleet_html(done, histories, compared, pages), str(folder / INDEX))
+
+
+def _write_numbers(
+    done: Sequence[Flown],
+    histories: Sequence[History],
+    compared: Comparison,
+    parquet_file: Path | None,
+    json_file: str | None,
+) -> None:
+    """The table and the document, those that are asked for."""
     if parquet_file is not None:
         from onboard.batches.table import write_parquet
 
         write_parquet(done, histories, parquet_file)
     if json_file is not None:
         write_json(fleet_document(done, histories, compared).to_json(), json_file)
-    failed = sum(bool(one.error) for one in done)
-    if failed:
-        raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
 
 
 def pages_of(names: Sequence[str]) -> dict[str, str]:

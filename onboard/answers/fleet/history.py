@@ -22,6 +22,7 @@ from onboard.core.fleet.sensor import Together, alone, together
 from onboard.core.maths.accelerometer import SixParameters
 
 DAY_S = 86_400.0
+"""s of a day [definition]."""
 UNITS = ("1", "1", "1", "m/s^2", "m/s^2", "m/s^2")
 DELAYS = tuple(name for name in TIMING if name.endswith("_delay_s"))
 """Followed over time; the averaging window has no sigma of its own at zero."""

@@ -21,7 +21,8 @@ from onboard.answers.fleet.record import Flown, Record
 
 BOARD, FOLDER, RECORDING = "board", "folder", "recording"
 OVERLAP_S = 1.0
-"""Recordings that overlap by more are of one flight."""
+"""s; recordings that overlap by more are of one flight: dates are of GPS, to the second
+[definition]."""
 UNDATED = "it does not say when it was flown: it might be another recording of the same flight"
 
 

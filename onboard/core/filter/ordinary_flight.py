@@ -176,9 +176,14 @@ class OrdinaryFlight:
             self._taken,
             self._states,
         )
+        return self._gone(step, progress, log_det, pending=bool(pending))
+
+    def _gone(self, step: int, progress: Index, log_det: Array, *, pending: bool) -> Gone:
+        """What a call has done, from step number ``step`` on; the filter's time follows."""
+        made = self._filter
         after, rows, count, made.updates = progress.tolist()
         done = slice(step, after + pending)
-        made.t += float(steps.duration[done].sum())
+        made.t += float(self._ready.steps.duration[done].sum())
         taken = self._taken[:count]
         first = np.concatenate([[0], np.cumsum(self._numbers[taken])])
         velocities, heights = self._offered[taken, 0], self._offered[taken, 1]
@@ -186,7 +191,7 @@ class OrdinaryFlight:
             made.gates.height_is_inside()
         return Gone(
             after,
-            bool(pending),
+            pending,
             taken,
             velocities,
             heights,
