@@ -48,7 +48,7 @@ NAMES = {
 """Catalogue by vehicle."""
 SAME: Final = 0.05
 """Share of a number within which two vehicles are the same [use]."""
-DESCRIBING = ("lowest", "capacity", "rms_below_5_hz")
+DESCRIBING = ("lowest", "capacity", "rms_with_faster")
 """Numbers that tell of the flight, not of the vehicle."""
 SLOW_M_S: Final = 3.0
 FAST_M_S: Final = 7.0
@@ -268,9 +268,10 @@ def settings_of(
     wind = vehicle.wind
     if "wind" in named and wind is not None:
         out += _wind_settings(vehicle)
-    if "turbulence" in named:
-        value = named["turbulence"].values["rms"]
-        # The simulator's gusts point anywhere: the setting is their length, not a component.
+    if "turbulence" in named and "rms_with_faster" in named["turbulence"].values:
+        # The simulator's gusts change with each of its steps, and point anywhere: the setting is
+        # their length, not a component, and slow gusts alone do not tell it.
+        value = named["turbulence"].values["rms_with_faster"]
         gain = math.sqrt(2.0)
         if value.sigma < 0.5 * value.real:
             length, its = gain * value.real, gain * value.sigma

@@ -26,7 +26,6 @@ from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import THRUST_AXIS
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.signals import Signals, Stream
 
@@ -158,9 +157,7 @@ def copter_model(
     ]
     effects = tuple(e for e in everything if not e.missing(still))
     axes = (0, 1, 2) if still.commands is not None else (0, 1)
-    return ForceModel(
-        flight, effects, axes, start, instrumented=(THRUST_AXIS,) if variant.gusty else ()
-    )
+    return ForceModel(flight, effects, axes, start, instrumented=axes if variant.gusty else ())
 
 
 def copter_missing(flight: Flight, frame: CopterAirframe) -> dict[str, str]:

@@ -10,20 +10,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FEWEST_BLOCKS,
-    INSTRUMENT_WINDOWS,
     NOISE_ROUNDS,
     ROUNDS,
     SETTLED,
     STALE,
 )
 from onboard.core.vehicle.model import ForceModel
-from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
+from onboard.core.vehicle.noise import AxisNoise, fitted_noise
 from onboard.core.vehicle.windows import windows_of
 
 
@@ -136,7 +135,8 @@ def summed(
     jacobian = model.jacobian(theta)
     block = np.floor((model.flight.t - model.flight.t[0]) / BLOCK_S)
     of_row = block[windows_of(model.flight).first]
-    rows = _rows(model, residual, jacobian, noise, sensitivity)
+    level = _level(model, theta)
+    rows = whitened_rows(model, residual, jacobian, noise, sensitivity, level)
     sums = []
     for number in np.unique(of_row):
         mine = of_row == number
@@ -165,16 +165,17 @@ def _settled(
     measured, nominal = model.measured(), model.nominal
 
     def cost(at: Array) -> float:
-        rows = _rows(model, measured - model.predicted(at), None, noise, sensitivity)
+        rows = whitened_rows(model, measured - model.predicted(at), None, noise, sensitivity)
         apart = at - nominal
         return float(sum(np.sum(r[:, 0] ** 2) for r in rows) + prior @ (apart * apart))
 
     now = cost(theta)
-    at, slope = theta, model.steps(theta)
+    at, slope, level = theta, model.steps(theta), _level(model, theta)
     for _ in range(ROUNDS):
         if np.max(np.abs(theta - at) / model.plausible) > STALE:
-            at, slope = theta, model.steps(theta)
-        rows = _rows(model, measured - model.predicted(theta), slope, noise, sensitivity)
+            at, slope, level = theta, model.steps(theta), _level(model, theta)
+        left = measured - model.predicted(theta)
+        rows = whitened_rows(model, left, slope, noise, sensitivity, level)
         N, b = np.diag(prior), prior * (nominal - theta)
         for r in rows:
             N = N + r[:, 1:].T @ r[:, 1:]
@@ -196,49 +197,9 @@ def _settled(
     return theta
 
 
-def _rows(
-    model: ForceModel,
-    residual: Array,
-    jacobian: Array | None,
-    noise: Sequence[AxisNoise],
-    sensitivity: Array,
-) -> list[Array]:
-    """For each axis (r, 1 + m): whitened residual and regressors, of means over windows."""
-    windows = windows_of(model.flight)
-    step = windows.length_s
-    out = []
-    for k, its in enumerate(noise):
-        rows = residual[:, k, None]
-        if jacobian is not None:
-            rows = np.hstack([rows, jacobian[:, k]])
-        sensitive = windows.mean(sensitivity[:, k])
-        made = whitened(windows.mean(rows), its, sensitive, windows.piece, step)
-        if jacobian is not None and model.axes[k] in model.instrumented:
-            made[:, 1:] = _instrumented(made[:, 1:], windows.piece)
-        out.append(made)
-    return out
-
-
-def _instrumented(rows: Array, piece: NDArray[np.int64]) -> Array:
-    """(r, m) regressors as far as their own past tells them (two-stage least squares).
-
-    An autopilot answers a gust at once: its commands are no longer independent of the disturbance,
-    and least squares would take the answer for the cause.  What the commands were before the gust
-    is independent of it.  J. D. Angrist and J.-S. Pischke, *Mostly Harmless Econometrics* (2009),
-    chapter 4.
-    """
-    past = []
-    for lag in INSTRUMENT_WINDOWS:
-        moved = np.zeros_like(rows)
-        moved[lag:] = rows[:-lag]
-        moved[np.concatenate([np.ones(lag, dtype=bool), piece[lag:] != piece[:-lag]])] = 0.0
-        past.append(moved)
-    instruments = np.hstack(past)
-    size = np.linalg.norm(instruments, axis=0)
-    instruments = instruments[:, size > 0.0] / size[size > 0.0]
-    told, *_ = np.linalg.lstsq(instruments, rows, rcond=1e-8)
-    out: Array = instruments @ told
-    return out
+def _level(model: ForceModel, theta: Array) -> Array | None:
+    """(n, k, m) derivatives without a tilt; None where they are not needed."""
+    return model.levelled.steps(theta) if model.instrumented else None
 
 
 def _inflation(blocks: Sequence[BlockSums], prior: Array) -> Array:

@@ -75,6 +75,20 @@ class Flight:
         """Mean height above the ground, m."""
         return float(np.mean(self.height)) - self.ground
 
+    def levelled(self) -> Flight:
+        """The same path and heading, flown without a tilt.
+
+        What a vehicle's axes would be if it had answered nothing: an autopilot leans into a gust at
+        once, and is moved by it over seconds.
+        """
+        north, east = self.R_bn[:, 0, 0], self.R_bn[:, 0, 1]
+        length = np.maximum(np.hypot(north, east), 1e-9)
+        R_bn = np.zeros_like(self.R_bn)
+        R_bn[:, 0, 0] = R_bn[:, 1, 1] = north / length
+        R_bn[:, 0, 1], R_bn[:, 1, 0] = east / length, -east / length
+        R_bn[:, 2, 2] = 1.0
+        return replace(self, R_bn=R_bn, v_b=np.einsum("nij,nj->ni", R_bn, self.v_n))
+
     def kept(self, mask: Mask) -> Flight:
         """The steps (n,) that are True."""
         cut = {name: getattr(self, name)[mask] for name in _BY_STEP}

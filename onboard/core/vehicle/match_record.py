@@ -100,10 +100,9 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         )
     if m.turbulence.found:
         t = m.turbulence
-        value = {
-            "rms": Compared(0.0, t.whole, t.whole_sigma, "m/s"),
-            "rms_below_5_hz": Compared(0.0, t.rms, t.sigma, "m/s"),
-        }
+        value = {"rms": Compared(0.0, t.rms, t.sigma, "m/s")}
+        if t.whole is not None:
+            value["rms_with_faster"] = Compared(0.0, t.whole, t.whole_sigma, "m/s")
         out.append(Difference("turbulence", "vehicle", value, 0.0))
     return tuple(out)
 

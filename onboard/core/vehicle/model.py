@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -34,7 +34,7 @@ class ForceModel:
         axes: body axes that it predicts.
         start: makes the air.
         instrumented: axes along which what the vehicle does answers the disturbance, so that
-            regressors must be told from their past (see :func:`onboard.core.vehicle.fit.fitted`).
+            regressors must be told from what does not (:mod:`onboard.core.vehicle.instruments`).
     """
 
     flight: Flight
@@ -57,6 +57,11 @@ class ForceModel:
     def plausible(self) -> Array:
         """(m,) prior standard deviations."""
         return np.array([u.plausible for u in self.unknowns])
+
+    @property
+    def levelled(self) -> ForceModel:
+        """Of the same flight without its tilt."""
+        return replace(self, flight=self.flight.levelled())
 
     def indices(self, name: str) -> list[int]:
         """Places of an effect's unknowns; empty if it is not in the model."""

@@ -73,17 +73,13 @@ def unstalled(flight: Flight, frame: PlaneAirframe, wind_n: Array) -> Flight:
     return replace(out, piece=np.concatenate([[0], np.cumsum(breaks)]))
 
 
-def plane_model(
-    flight: Flight, frame: PlaneAirframe, force_sigma: Array, *, gusty: bool = False
-) -> ForceModel:
+def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> ForceModel:
     """Every effect of a plane that this recording can speak of.
 
     Args:
         flight: with throttle and rudder, if the recording has outputs.
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
-        gusty: whether the air is turbulent: then a plane that keeps its lift turns its nose by the
-            gusts, and least squares would take that for lift that hardly depends on the angle.
     """
     sensor = has_airspeed(flight)
 
@@ -110,7 +106,7 @@ def plane_model(
     else:
         axes = (0, 1, 2)
     axes = (*axes, COLUMN) if sensor else axes
-    return ForceModel(flight, effects, axes, start, instrumented=axes if gusty else ())
+    return ForceModel(flight, effects, axes, start)
 
 
 DENSITY_RANGE_M = 500.0

@@ -32,10 +32,10 @@ class Turbulence:
 
     Attributes:
         rms: of those that the noise shows, slower than the steps, m/s.
-        sigma: of it.
+        sigma: of it, as the air's: a flight meets some gusts, not all.
         evidence: twice the log-likelihood that it adds.
-        whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; the same as
-            ``rms`` where that is not known.
+        whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; None where
+            that is not known.
         whole_sigma: of it.
         floor: what other things than gusts look like, m/s.
     """
@@ -43,8 +43,8 @@ class Turbulence:
     rms: float
     sigma: float
     evidence: float
-    whole: float
-    whole_sigma: float
+    whole: float | None = None
+    whole_sigma: float = math.nan
     floor: float = TURBULENCE_FLOOR_M_S
 
     @property
@@ -82,16 +82,13 @@ def turbulence_of(fit: Fit) -> Turbulence:
     count = sum(n for _, _, n in found) if found else 1.0
     evidence = sum(e for _, e, _ in found)
     sigma = gust / math.sqrt(2.0 * max(count, 1.0))
-    whole, its = gust, sigma
     if any(u.name == "gust_variance" for u in fit.model.unknowns):
         k = fit.model.index("gust_variance")
         variance, spread = float(fit.theta[k]), float(fit.sigma[k])
         if variance > max(SURE * spread, gust**2):
-            whole, its = math.sqrt(variance), spread / (2.0 * math.sqrt(variance))
-        else:
-            # Gusts that are too fast for the steps may be there: as large as the drag allows.
-            its = max(math.sqrt(max(variance, 0.0) + SURE * spread) - gust, sigma)
-    return Turbulence(gust, sigma, evidence, whole, its)
+            whole = math.sqrt(variance)
+            return Turbulence(gust, sigma, evidence, whole, spread / (2.0 * whole))
+    return Turbulence(gust, sigma, evidence)
 
 
 def _felt(fit: Fit) -> Turbulence:
@@ -103,7 +100,13 @@ def _felt(fit: Fit) -> Turbulence:
     data = residual, windows.piece, windows.length_s
     evidence = 2.0 * (likelihood(*data, noise) - likelihood(*data, AxisNoise(rms(residual))))
     scale = float(fit.theta[fit.model.indices(AirspeedScale.name)[0]])
-    gust = noise.force * math.sqrt(1.0 - noise.white) / max(abs(scale), 0.1)
+    coloured = rms(residual) * math.sqrt(1.0 - noise.white)
+    gust = coloured / (_kept(windows.length_s / noise.correlation_s) * max(abs(scale), 0.1))
     memory = 2.0 * (noise.correlation_s + windows.length_s)
     sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
     return Turbulence(gust, sigma, evidence, gust, sigma, SENSED_GUST_M_S)
+
+
+def _kept(x: float) -> float:
+    """Share of the RMS of a Gauss-Markov process that its means over x correlation times have."""
+    return math.sqrt(2.0 / x * (1.0 - (1.0 - math.exp(-x)) / x))

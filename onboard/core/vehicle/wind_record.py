@@ -48,7 +48,7 @@ def wind_of(m: Matched) -> WindEstimate:
         flight.mean_height,
         exponent,
         exponent_sigma,
-        m.turbulence.whole if m.turbulence.found else None,
+        m.turbulence.rms if m.turbulence.found else None,
         np.array(when),
         np.array(heights),
         np.array(series).reshape(-1, 2),
