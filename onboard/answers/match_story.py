@@ -126,7 +126,8 @@ def _profile(v: Values) -> str:
 def _gusts(v: Values) -> str:
     rms = v["rms"]
     theirs = f"has {number(rms.simulation, 2)} m/s" if rms.simulation else "is smooth"
-    return f"Gusts of {whole(rms.real, rms.sigma, 'm/s')} (RMS); the simulation's air {theirs}."
+    size = whole(rms.real, rms.sigma, "m/s")
+    return f"Gusts of {size} (RMS of a component, below 5 Hz); the simulation's air {theirs}."
 
 
 def _rotor_drag(v: Values) -> str:

@@ -200,7 +200,7 @@ def is_explained(m: Matched) -> bool:
     left = [
         rms(m.held[:, k]) / max(rms(m.fit.sensitivity[:, k]), 1e-6)
         for k, axis in enumerate(m.model.axes)
-        if axis in (0, 1)
+        if axis in FORCE
     ]
     return max(left, default=0.0) < TURBULENCE_FLOOR_M_S
 
