@@ -18,11 +18,13 @@ from benchmarks import (
     error_state,
     explain_time,
     explaining,
+    frames,
     lag,
     link,
     reading,
     robustness,
 )
+from benchmarks.matching import runner as matching
 from benchmarks.real import runner as real
 from onboard.core.filter.kernel import prefer_compiled
 
@@ -57,6 +59,11 @@ def main() -> None:
         "explaining": (
             "Concealed effects, sealed answers",
             lambda: explaining.main(["--count", str(chosen.recordings)]),
+        ),
+        "frames": ("Airframes and winds of ArduPilot's simulator", lambda: frames.main([])),
+        "matching": (
+            "Concealed airframes, sealed answers",
+            lambda: matching.main(["--count", str(chosen.recordings)]),
         ),
         "explain_time": ("Time of an explanation", lambda: explain_time.main([])),
         "real": ("Real flights, which nobody knows the truth about", lambda: real.main([])),

@@ -55,7 +55,7 @@ class FlownAgain:
     """The second flight beside the first.
 
     Attributes:
-        numbers: unknowns of the effects that were found, by ``effect.unknown``.
+        numbers: of the effects that were found, by ``effect.number``.
         mismatch: RMS between the recording and the simulator's flight, by the nominal airframe in
             still air and by what was handed back: ``x``, ``y``, ``z`` of the recorded force, m/s^2,
             and ``tilt``, degrees.
@@ -108,12 +108,13 @@ def flown_again(
 
 
 def numbers_twice(first: Match, second: Match) -> dict[str, Twice]:
-    """Unknowns of the effects that were found, from both flights."""
+    """Numbers of the effects that were found, as they are told, from both flights."""
     out: dict[str, Twice] = {}
     for effect in first.vehicle.effects:
-        for key, value in first.vehicle.numbers.items():
-            other = second.vehicle.numbers.get(key)
-            if not key.startswith(f"{effect.name}.") or other is None:
+        for name in effect.values:
+            key = f"{effect.name}.{name}"
+            value, other = first.vehicle.numbers.get(key), second.vehicle.numbers.get(key)
+            if value is None or other is None:
                 continue
             if effect.name == "wind":
                 other = replace(other, real=_at_one_height(first, second) * other.real)

@@ -15,7 +15,7 @@ from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Curve, Difference, VehicleMatch
 from onboard.report import match_charts
 from onboard.report.chart import Band, pair_bar
-from onboard.report.page import PAGE, render
+from onboard.report.page import HEAD, PAGE, render
 
 TEMPLATE = "match.html.j2"
 MOST_PLACES = 3
@@ -31,6 +31,10 @@ OF_EFFECT = {
     "drag": ("drag",),
 }
 """Curves that show an effect."""
+
+FRAME_BY = {PAGE: "--frame-out", HEAD: "frame_file()"}
+SETTINGS_BY = {PAGE: "--param", HEAD: "param()"}
+"""How who reads it writes the files: a page comes of the command, a head of the library."""
 
 
 def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAGE) -> str:
@@ -59,7 +63,9 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         headline=headline(match),
         differs=[story.sentence(d) for d in match.effects] or [_nothing(match)],
         sure=story.how_sure(match),
-        hand_back=_hand_back(match),
+        hand_back=_hand_back(match, FRAME_BY[base]),
+        frame_by=FRAME_BY[base],
+        settings_by=SETTINGS_BY[base],
         note=v.note,
         effects=[_card(d, v) for d in match.effects],
         forces=_forces(v),
@@ -102,14 +108,14 @@ def _nothing(match: Match) -> str:
     return "The forces differ, and no effect that is known here explains how."
 
 
-def _hand_back(match: Match) -> str:
+def _hand_back(match: Match, frame_by: str) -> str:
     if not match.settings and not match.effects:
         return "Nothing."
     count = len(match.settings)
     if not count:
-        return "Load the frame file of this match (--frame-out) into the simulator."
+        return f"Load the frame file of this match ({frame_by}) into the simulator."
     many = f"the {count} parameters" if count > 1 else "the parameter"
-    return f"Set {many} below in the simulator, and load the frame file (--frame-out)."
+    return f"Set {many} below in the simulator, and load the frame file ({frame_by})."
 
 
 def _card(d: Difference, v: VehicleMatch) -> dict[str, Any]:

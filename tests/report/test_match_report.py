@@ -15,6 +15,7 @@ from onboard.answers.match_document import match_document
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch, WindEstimate
 from onboard.report.match import match_html
+from onboard.report.page import HEAD
 from tests.report.html_page import Page
 from tests.report.matches_by_hand import ROTORS, WIND, by_hand
 
@@ -50,6 +51,16 @@ def test_it_asks_for_nothing_outside_itself():
     for _, attributes in tags:
         assert not {"src", "href", "onload", "onclick"} & set(attributes)
     assert not re.search(r"https?:|url\(|@import", html)
+
+
+def test_files_are_written_by_what_the_reader_has_in_hand():
+    whole, head = page().words, Page.of(match_html(by_hand(), base=HEAD)).words
+    assert "--frame-out" in whole
+    assert "--param" in whole
+    assert "frame_file()" in head
+    assert "param()" in head
+    assert "--frame-out" not in head
+    assert "--param" not in head
 
 
 def test_names_of_files_and_numbers_of_others_are_escaped():
