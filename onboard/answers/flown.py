@@ -46,6 +46,9 @@ LEAST_FORCE: Final = 0.002
 """Sigma of the force that no calibration goes below, m/s^2: numbers of 16 bits for 16 g either way
 are in steps of 0.005, which are rounded by 0.0014 RMS [physics]."""
 
+NO_SENSORS: Final = Sensors(np.ones(3), np.zeros(3), np.full(3, LEAST_FORCE))
+"""Of a recording whose force is the slope of its velocity: nothing can be wrong with it alone."""
+
 S = TypeVar("S", Outputs, Battery, AirData)
 
 
@@ -160,6 +163,11 @@ class FlownRecording:
         return self.source.recordings[0].path.name
 
     @property
+    def derived(self) -> bool:
+        """Whether its force is the slope of its velocity, and no accelerometer measured it."""
+        return any(r.derived for r in self.source.recordings)
+
+    @property
     def autopilot(self) -> str:
         """The kind of autopilot."""
         return self.source.autopilot
@@ -185,11 +193,12 @@ def flown(
     else:
         diagnosis = unanswered(source.vehicle.unanswered(wanted)).diagnosis
         batches = ()
+    derived = any(r.derived for r in source.recordings)
     return FlownRecording(
         source,
         diagnosis,
         collected.signals(),
-        sensors_of(diagnosis),
+        NO_SENSORS if derived else sensors_of(diagnosis),
         batches,
         tuple(collected.grounded),
         collected.ground,

@@ -117,7 +117,9 @@ def match(
         other = flown(simulation, progress=progress)
         simulated = vehicle_level(other, frame or {})
     sensors = sensor_differences(recording.diagnosis, other.diagnosis if other else None)
-    if any(r.kind == "table" for r in recording.source.recordings):
+    if recording.derived:
+        sensors = ()
+    elif any(r.kind == "table" for r in recording.source.recordings):
         # Its velocity is not a receiver's: it has no latency to compare with the simulator's.
         sensors = tuple(d for d in sensors if d.name not in TIMING_NAMES)
     effects = vehicle.effects
@@ -293,8 +295,9 @@ def settings_of(
             value = named["gps_lever_arm"].values[axis]
             name = f"SIM_GPS1_POS_{axis.upper()}"
             out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
-    for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
-        out.append(Setting(name, number, sigma, "accelerometer"))
+    if not recording.derived:
+        for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
+            out.append(Setting(name, number, sigma, "accelerometer"))
     return tuple(out)
 
 

@@ -23,7 +23,8 @@ class Recording:
     ``px4`` or ``unknown``; ``duration_s`` counts the autopilot's clock over the inertial samples,
     restarts excluded; ``counts`` has the number of messages that are read, by their name in the
     file; ``damage`` says in plain words what was skipped and ``notes`` what was chosen;
-    ``airborne``: whether all of it is flight, so that no ground is to be looked for.
+    ``airborne``: whether all of it is flight, so that no ground is to be looked for; ``derived``:
+    whether its force is the slope of its velocity, so that it has no accelerometer to calibrate.
     """
 
     path: Path
@@ -35,6 +36,7 @@ class Recording:
     damage: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     airborne: bool = False
+    derived: bool = False
 
     def samples(self) -> Iterator[Sample]:
         """Every sample in the order of the file; each call starts from the beginning."""

@@ -83,6 +83,7 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
         lambda: iter(samples()),
         notes=(f"columns as {Path(columns).name} says",),
         airborne=chosen.airborne,
+        derived=chosen.derived,
     )
 
 

@@ -45,7 +45,7 @@ OF_TABLE = {"vehicle", "world", "body", "airborne", "fix_rate", "origin"}
 OF_QUANTITY = {"columns", "column", "unit"}
 OWN_KEYS = {
     "attitude": {"quaternion", "euler", "conjugate", "unit"},
-    "force": OF_QUANTITY | {"kind", "frame", "low_pass"},
+    "force": OF_QUANTITY | {"kind", "frame", "low_pass", "derived"},
     "rates": OF_QUANTITY | {"low_pass"},
     "motors": OF_QUANTITY | {"range"},
 }
@@ -72,6 +72,7 @@ class TableMap:
         conjugate: whether the attitude turns the world to the body, not the body to the world.
         kinematic: whether the force is acceleration, without gravity's reaction.
         force_in_world: whether it is along the world's axes.
+        derived: whether it is the slope of the velocity, so that there is no accelerometer.
         low_pass: cut-off (Hz) of the second-order filters that force and rates went through; 0 is
             none.
         motor_range: what the motors are at idle and at full; None: as the unit says.
@@ -88,6 +89,7 @@ class TableMap:
     conjugate: bool = False
     kinematic: bool = False
     force_in_world: bool = False
+    derived: bool = False
     low_pass: tuple[float, float] = (0.0, 0.0)
     motor_range: tuple[float, float] | None = None
     vehicle: str = ""
@@ -141,6 +143,7 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
         conjugate=_flag(attitude, "conjugate", "attitude."),
         kinematic=_word(force, "kind", KINDS, "force.") == "acceleration",
         force_in_world=_word(force, "frame", ("body", "world"), "force.") == "world",
+        derived=_flag(force, "derived", "force."),
         low_pass=(
             _number(force, "low_pass", 0.0, "force."),
             _number(_table(found, "rates"), "low_pass", 0.0, "rates.") if "rates" in found else 0.0,

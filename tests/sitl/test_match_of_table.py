@@ -62,6 +62,15 @@ def test_a_table_gives_the_answer_of_the_telemetry(flight):
             assert abs(value["real"] - other["real"]) < 3.0 * sigma, (name, key)
 
 
+def test_a_force_that_no_accelerometer_measured_has_no_sensor_to_blame(flight):
+    derived = (flight / "map.toml").read_text().replace("[force]", "[force]\nderived = true")
+    (flight / "derived.toml").write_text(derived)
+    table = asked(flight, flight / "flight.csv", "--columns", flight / "derived.toml")
+    assert {e["name"] for e in table["effects"]} == {"wind", "rotor_drag"}
+    assert {e["level"] for e in table["effects"]} == {"vehicle"}
+    assert not [name for name in table["settings"] if name.startswith("SIM_ACC")]
+
+
 def test_a_table_without_a_map_is_refused(flight, capsys):
     assert run(["match", str(flight / "flight.csv")]) == 2
     assert "needs --columns" in capsys.readouterr().err
