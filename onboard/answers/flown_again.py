@@ -59,7 +59,8 @@ class FlownAgain:
         mismatch: RMS between the recording and the simulator's flight, by the nominal airframe in
             still air and by what was handed back: ``x``, ``y``, ``z`` of the recorded force, m/s^2,
             and ``tilt``, degrees.
-        left: effects of the airframe by which the second flight still differs from the frame.
+        left: effects of the airframe that the second flight has and the first had not, or not
+            of this size.
         simulator: which one flew.
     """
 
@@ -100,10 +101,14 @@ def flown_again(
     """
     course = courses(real)
     before, after = (beside(course, courses(path)) for path in (nominal, found))
+    numbers = numbers_twice(first, second)
+    told = {key.partition(".")[0] for key in numbers}
+    apart = {key.partition(".")[0] for key, n in numbers.items() if not n.agrees}
+    same = {*AIR, *(told - apart)}
     return FlownAgain(
-        numbers_twice(first, second),
+        numbers,
         {key: AxisMismatch(before[key], after[key]) for key in before},
-        tuple(d.name for d in second.vehicle.effects if d.name not in AIR),
+        tuple(d.name for d in second.vehicle.effects if d.name not in same),
     )
 
 
@@ -116,6 +121,9 @@ def numbers_twice(first: Match, second: Match) -> dict[str, Twice]:
             value, other = first.vehicle.numbers.get(key), second.vehicle.numbers.get(key)
             if value is None or other is None:
                 continue
+            if effect.name == "thrust_scale" and first.vehicle.vehicle == "copter":
+                # Of the frame that was handed back, which has the first flight's thrust.
+                other = replace(other, real=value.real * other.real, sigma=value.real * other.sigma)
             if effect.name == "wind":
                 other = replace(other, real=_at_one_height(first, second) * other.real)
             sigma = math.hypot(value.sigma, other.sigma)

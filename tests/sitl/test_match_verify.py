@@ -13,7 +13,7 @@ import pytest
 from onboard.answers.flown_again import Courses, beside, flown_again, numbers_twice
 from onboard.cli.main import run
 from onboard.cli.match_verify import air_of, craft_of
-from onboard.core.vehicle.records import Compared
+from onboard.core.vehicle.records import Compared, Difference
 from onboard.report.match import match_html
 from sitl.builtin.airframe.air import Air
 from sitl.builtin.airframe.aircraft import Aircraft
@@ -51,6 +51,20 @@ def test_numbers_agree_within_5_per_cent_or_3_sigma():
     for again, agrees in ((0.52, True), (0.56, False)):
         second = with_numbers(rotor_drag__mcoef=Compared(0.5, again, 0.001, "1/s"))
         (twice,) = numbers_twice(first, second).values()
+        assert twice.agrees is agrees
+
+
+def test_thrust_is_compared_with_the_first_flights_and_not_with_the_frame_that_has_it():
+    found = Compared(1.0, 0.78, 0.004, "1")
+    effect = Difference("thrust_scale", "vehicle", {"ratio": found})
+    first = by_hand(effects=(effect,))
+    for again, agrees in ((1.002, True), (1.1, False)):
+        pair = (
+            replace(first, vehicle=replace(first.vehicle, numbers={"thrust_scale.ratio": value}))
+            for value in (found, replace(found, real=again))
+        )
+        (twice,) = numbers_twice(*pair).values()
+        assert twice.again == pytest.approx(0.78 * again)
         assert twice.agrees is agrees
 
 
@@ -102,7 +116,8 @@ def test_the_page_shows_what_was_flown_again(monkeypatch):
     match = with_numbers(rotor_drag__mcoef=Compared(0.25, 0.5, 0.001, "1/s"))
     flights = iter([course(), course(force=(0.4, 0.0, -9.8)), course(force=(0.01, 0.0, -9.8))])
     monkeypatch.setattr("onboard.answers.flown_again.courses", lambda _: next(flights))
-    second = replace(match, real=SimpleNamespace(name="again"))
+    other = with_numbers(rotor_drag__mcoef=Compared(0.5, 0.9, 0.001, "1/s"))
+    second = replace(other, real=SimpleNamespace(name="again"))
     record = flown_again(match, second, "a", "b", "c")
     said = Page.of(match_html(match, record)).words
     assert "Flown again with what was found" in said
