@@ -97,6 +97,7 @@ class Connection:
         self.failures = 0
         self.outage = Outage(limits.STABLE_S)
         self._dropped = 0
+        self._refused = 0
         self.last_received: float | None = None
         self._receive = receive
         self._changed = changed
@@ -116,6 +117,12 @@ class Connection:
     def dropped(self) -> int:
         """Frames that could not be sent: no connection, no peer yet, or a stalled line."""
         return self._dropped + (self._transport.dropped if self._transport is not None else 0)
+
+    @property
+    def refused(self) -> int:
+        """Reads that were not looked at: beyond a sender's queue or ration, or without room."""
+        waiting = self._transport.refused if self._transport is not None else 0
+        return self.peers.refused + self._refused + waiting
 
     def statistics(self) -> Iterator[CodecStatistics]:
         """What was counted, of what was sent and of each peer."""
@@ -230,6 +237,7 @@ class Connection:
     def _drop_transport(self) -> None:
         if self._transport is not None:
             self._dropped += self._transport.dropped
+            self._refused += self._transport.refused
             self._transport.close()
             self._transport = None
 

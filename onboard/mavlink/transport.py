@@ -32,9 +32,16 @@ First = Callable[[Address | None], bool]
 
 
 class Transport(Protocol):
-    """What the link needs of a connection; ``dropped`` counts writes that could not be sent."""
+    """What the link needs of a connection.
+
+    ``dropped`` counts writes that could not be sent, ``refused`` reads that had nowhere to wait.
+    """
 
     dropped: int
+
+    @property
+    def refused(self) -> int:
+        """Reads that had nowhere to wait: a flood's, or a crowd's."""
 
     def write(self, data: bytes, to: Sequence[Address] = ()) -> None:
         """Send without waiting; drops and counts when the line does not take it.
@@ -178,6 +185,11 @@ class DatagramTransport:
         self._pace = Pace(sock.fileno(), partial(self._drain, sock), linger)
 
     @property
+    def refused(self) -> int:
+        """Datagrams for which there was no room in their sender's queue."""
+        return self.waiting.refused
+
+    @property
     def port(self) -> int:
         """The local port, of interest where the system chose it."""
         return int(self._socket.getsockname()[1])
@@ -289,6 +301,11 @@ class StreamTransport:
         self._waiting = bytearray()
         self._closed = False
         self._pace = Pace(self._descriptor, self._drain, linger)
+
+    @property
+    def refused(self) -> int:
+        """None: what a stream brings waits in the system until it is read."""
+        return 0
 
     def write(self, data: bytes, to: Sequence[Address] = ()) -> None:  # noqa: ARG002 - one other end
         """Send; what the line does not take at once waits, up to a limit."""

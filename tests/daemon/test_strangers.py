@@ -6,6 +6,7 @@ import contextlib
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from onboard.mavlink.limits import BYTES_PER_TURN, SENDERS_WAITING
 from tests.daemon.daemons import SIX, WANTED, convinced, in_force, until
 from tests.daemon.standing_vehicle import Vehicle
 from tests.daemon.strangers import Stranger
@@ -220,6 +221,22 @@ async def test_what_is_for_the_vehicle_goes_to_the_vehicle_alone(document, daemo
         kinds = {message.get_type() for message in stranger.heard()}
         assert "HEARTBEAT" in kinds
         assert not kinds & {"PARAM_SET", "PARAM_REQUEST_READ", "COMMAND_LONG"}
+
+
+async def test_what_a_crowd_sends_beyond_its_queues_is_counted_and_shown(
+    document, daemon, port
+):
+    async with daemon(document) as service, Vehicle(port):
+        await until(lambda: service.parts.parameters.complete)
+        transport = service.link.connections[0]._transport
+        with contextlib.ExitStack() as stack:
+            crowd = [stack.enter_context(Stranger(port)) for _ in range(SENDERS_WAITING + 8)]
+            for one in crowd:
+                one.raw(b"x" * BYTES_PER_TURN)
+            await until(lambda: transport.refused >= 8)
+            await asyncio.sleep(1.0)
+        assert service.snapshot().link.counters["rationed"] >= 8
+        assert service.snapshot().link.state == "present"
 
 
 async def test_samples_of_a_stranger_are_not_the_vehicles(document, daemon, port, stranger):

@@ -57,7 +57,7 @@ class FakeTransport:
         self.endpoint = endpoint
         self.receive = receive
         self.lost = lost
-        self.dropped = 0
+        self.dropped = self.refused = 0
         self.closed = False
         self.codec = Codec(system=1, component=1)
         listening = endpoint.kind is EndpointKind.UDP_IN

@@ -100,6 +100,18 @@ class TestConnection:
             assert link.connections[0].last_error == "closed by the other side"
 
     @virtual_time
+    async def test_what_was_refused_is_counted_beyond_a_reconnection(self, air):
+        async with running(UDP) as link:
+            connection = link.connections[0]
+            air.transports[0].refused = 5
+            connection.peers.refused = 2
+            assert connection.refused == 7
+            air.transports[0].lost("gone")
+            await asyncio.sleep(BACKOFF_CAP_S)
+            air.transports[1].refused = 1
+            assert connection.refused == 8
+
+    @virtual_time
     async def test_a_line_gone_dead_is_opened_anew_but_udp_is_left_alone(self, air):
         async with running(TCP, UDP):
             await asyncio.sleep(SILENCE_S + 5.0)

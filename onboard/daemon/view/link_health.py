@@ -34,7 +34,7 @@ def link_view(
             for source in statistics.sources.values():
                 for name in ("lost", "late", "duplicated"):
                     counters[name] = counters.get(name, 0) + getattr(source, name)
-        counters["rationed"] = counters.get("rationed", 0) + connection.peers.refused
+        counters["rationed"] = counters.get("rationed", 0) + connection.refused
         for name in ("dropped", "connects", "failures"):
             counters[name] = counters.get(name, 0) + getattr(connection, name)
     return LinkView(
