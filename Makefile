@@ -1,11 +1,11 @@
-# make setup | demo | test | simulate | landings | fuzz | check | bench | clean.   Needs Python 3.11+, pip and make.
+# make setup | demo | test | simulate | landings | fuzz | check | bench | wheels | clean.   Needs Python 3.11+, pip and make.
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 PIP    := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: setup demo test simulate landings fuzz check bench format clean
+.PHONY: setup demo test simulate landings fuzz check bench wheels format clean
 
 setup: $(STAMP)
 
@@ -44,6 +44,14 @@ check: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks $(ARGS)
+
+# A folder to carry to a computer without network (systemd/README.md); for one of another kind
+# ARGS="--platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --python-version 3.11".
+wheels: $(STAMP)
+	rm -rf dist/wheels
+	$(BIN)/python -m hatchling build -t wheel -d dist/wheels
+	$(PIP) download --require-hashes --only-binary :all: -r requirements-service.lock -d dist/wheels $(ARGS)
+	cp requirements-service.lock dist/wheels
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

@@ -53,7 +53,7 @@ class Line:
     """The daemon's end of the line (:class:`onboard.mavlink.transport.Transport`)."""
 
     def __init__(self, receive: Receive, send: Callable[[bytes], None]) -> None:
-        self.dropped = 0
+        self.dropped = self.refused = 0
         self.receive: Receive | None = receive
         self._send = send
 

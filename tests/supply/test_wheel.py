@@ -1,4 +1,4 @@
-"""The wheel: the same bytes from the same source, nothing beside the package, and it runs offline."""
+"""The wheel: the same bytes from the same source, one package in it, and it runs offline."""
 
 import os
 import shutil
@@ -31,7 +31,7 @@ def copied(folder):
 def wheel_of(source, into):
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(into)]
     environment = {k: v for k, v in os.environ.items() if k != "SOURCE_DATE_EPOCH"}
-    subprocess.run(command, cwd=source, env=environment, check=True, capture_output=True)
+    subprocess.run(command, cwd=source, env=environment, check=True, capture_output=True)  # noqa: S603 - this Python
     (wheel,) = into.glob("*.whl")
     return wheel
 
