@@ -31,6 +31,7 @@ from onboard.mavlink.link import Link
 from onboard.mavlink.parameter_messages import to_float32
 
 A_SECOND = 50_000
+ASKED_A_SECOND = 3_000
 RUBBISH_BYTES_S = 1.2e6
 BURST = 0.002
 QUIET_S = 5.0
@@ -128,6 +129,17 @@ def many(port: int) -> None:
     paced(lambda n: senders[n % 400].sendto(beat, ("127.0.0.1", port)), A_SECOND)
 
 
+def asking(port: int) -> None:
+    """Ground stations' requests, as many as a ration of bytes allows: reads and approvals."""
+    codec = Codec(system=255, component=190)
+    read = mavlink.MAVLink_param_request_read_message(1, 191, b"OBC_STATE", -1)
+    approve = mavlink.MAVLink_param_set_message(1, 191, b"OBC_APPROVE", 1.0, 9)
+    packets = [codec.encode(message) for message in (read, approve)]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        paced(lambda n: sender.send(packets[n % 2]), ASKED_A_SECOND)
+
+
 def paced(send: Callable[[int], object], rate: float) -> None:
     """Have it done so often a second, in bursts of some milliseconds; what fails is left."""
     began, sent = time.monotonic(), 0
@@ -198,6 +210,7 @@ async def watched(
                     "RAW_IMU/s before": f"{quiet:.1f}",
                     **row,
                     "PARAM_SET": sent["PARAM_SET"],
+                    "PARAM_VALUE": sent["PARAM_VALUE"],
                 }
             finally:
                 for other in others:
@@ -281,6 +294,7 @@ ROWS: dict[str, tuple[Callable[[int], None], Callable[[int], None], bool]] = {
     "50,000/s disarmed, simulated copter": (disarmed, fly, False),
     "50,000/s disarmed, first": (disarmed, stand, True),
     "50,000/s from 400 ports": (many, stand, False),
+    "3,000/s requests of a ground station, standing": (asking, stand, False),
     "1.2 MB/s of 0xFD, standing": (rubbish, stand, False),
     "1.2 MB/s of 0xFD, first": (rubbish, stand, True),
     "40 ports with a byte a second, first": (crowd, stand, True),

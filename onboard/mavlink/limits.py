@@ -177,6 +177,9 @@ LIST_HZ: Final = 50.0
 """1/s; PARAM_VALUE is 37 bytes on the wire, so that a list takes 1.9 kB/s for its second [data]."""
 ANNOUNCE_HZ: Final = 5.0
 """1/s; changes take 0.2 kB/s [data]."""
+ASKED_HZ: Final = 20.0
+"""1/s; requests of ground stations that are answered at once, and so many in a burst: 0.7 kB/s.  A
+station waits for each answer before it asks again [data]."""
 BURST_S: Final = 0.2
 """s; sending that was not possible for longer than this is not made up for [tuned]."""
 

@@ -11,7 +11,9 @@ It rests on four rules:
    write was denied, as ArduPilot does; PARAM_ERROR says why to those that know it.
 4. The number of parameters and their order never change while it runs.
 
-Sending is paced: lists and announcements share a telemetry line with the autopilot.
+Sending is paced: lists, announcements and answers share a telemetry line with the autopilot, and
+whoever can send us a request could fill it.  Beyond ``ASKED_HZ`` a read waits for the list's pace,
+once for each name, and a write is left: stations repeat what was not answered.
 """
 
 from __future__ import annotations
@@ -104,6 +106,9 @@ class ParameterServer:
         self._denied = denied
         self._list = _Pace(list_hz)
         self._changes = _Pace(announce_hz)
+        self._requests = _Pace(limits.ASKED_HZ, burst_s=1.0)
+        self._asked: dict[str, None] = {}
+        self._reads_turn = False
         self._next = 0
         self._remaining = 0
         self._changed: dict[str, None] = {}
@@ -142,20 +147,21 @@ class ParameterServer:
             case "PARAM_REQUEST_LIST":
                 return self._asked_list(now)
             case "PARAM_REQUEST_READ":
-                return self._asked_read(message)
-            case "PARAM_SET":
+                return self._asked_read(message, at_once=self._requests.one(now))
+            case "PARAM_SET" if self._requests.one(now):
                 return self._asked_set(message)
+        self.counters["parameter_requests_left"] += 1
         return ()
 
     def poll(self, now: float) -> Sequence[Message]:
-        """What is due of a list and of changes."""
+        """What is due of reads that wait, of a list and of changes."""
         due: list[Message] = []
-        if self._remaining:
-            for _ in range(min(self._remaining, self._list.take(now))):
-                due.append(self._value(self._order[self._next]))
-                self._next = (self._next + 1) % len(self._order)
-                self._remaining -= 1
-        elif self._changed:
+        if self._asked or self._remaining:
+            for _ in range(self._list.take(now)):
+                if (name := self._next_due()) is None:
+                    break
+                due.append(self._value(name))
+        if self._changed and not self._remaining:
             count = min(len(self._changed), self._changes.take(now))
             due += [self._value(self._most_urgent()) for _ in range(count)]
         return due
@@ -170,12 +176,17 @@ class ParameterServer:
         self._remaining = len(self._order)
         return ()
 
-    def _asked_read(self, message: Message) -> Sequence[Message]:
+    def _asked_read(self, message: Message, *, at_once: bool) -> Sequence[Message]:
         index = int(message.param_index)
         if index >= 0:
             name = self._order[index] if index < len(self._order) else None
         else:
             name = message.param_id if message.param_id in self._index else None
+        if not at_once:
+            self.counters["parameter_requests_left"] += name is None
+            if name is not None:
+                self._asked[name] = None
+            return ()
         if name is None:
             return self._error(message, ParameterErrorCode.DOES_NOT_EXIST)
         self.counters["parameter_reads"] += 1
@@ -219,6 +230,18 @@ class ParameterServer:
             ),
         )
 
+    def _next_due(self) -> str | None:
+        """Reads that wait and the list by turns: neither keeps the other from its end."""
+        self._reads_turn = not self._reads_turn
+        if self._asked and (self._reads_turn or not self._remaining):
+            return next(iter(self._asked))
+        if not self._remaining:
+            return None
+        name = self._order[self._next]
+        self._next = (self._next + 1) % len(self._order)
+        self._remaining -= 1
+        return name
+
     def _most_urgent(self) -> str:
         name = next((n for n in self._changed if n in self._writable), next(iter(self._changed)))
         del self._changed[name]
@@ -227,6 +250,7 @@ class ParameterServer:
     def _value(self, name: str) -> Message:
         # What stations hear of, for whatever reason, need not be announced to them again.
         self._changed.pop(name, None)
+        self._asked.pop(name, None)
         return mavlink.MAVLink_param_value_message(
             name.encode(),
             self._values[name],
@@ -237,11 +261,11 @@ class ParameterServer:
 
 
 class _Pace:
-    """How many messages are due: ``rate`` a second, without bursts."""
+    """How many messages are due: ``rate`` a second, with bursts of ``burst_s`` at most."""
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float, burst_s: float = limits.BURST_S) -> None:
         self._rate = rate
-        self._burst = max(1.0, rate * limits.BURST_S)
+        self._burst = max(1.0, rate * burst_s)
         self._credit = 0.0
         self._at: float | None = None
 
@@ -252,11 +276,22 @@ class _Pace:
     def take(self, now: float) -> int:
         """What may be sent now."""
         elapsed = now - self._at if self._at is not None else 1.0 / self._rate
-        self._at = now
-        self._credit = min(self._burst, self._credit + max(0.0, elapsed) * self._rate)
+        self._accrue(elapsed, now)
         whole = int(self._credit + 1e-9)
         self._credit -= whole
         return whole
+
+    def one(self, now: float) -> bool:
+        """Whether one more may be sent now; at first a whole burst of them."""
+        self._accrue(now - self._at if self._at is not None else math.inf, now)
+        if self._credit < 1.0:
+            return False
+        self._credit -= 1.0
+        return True
+
+    def _accrue(self, elapsed: float, now: float) -> None:
+        self._at = now
+        self._credit = min(self._burst, self._credit + max(0.0, elapsed) * self._rate)
 
 
 def _meant(message: Message) -> float:

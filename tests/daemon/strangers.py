@@ -46,6 +46,10 @@ class Stranger:
         message = mavlink.MAVLink_param_set_message(*target, name.encode(), value, 9)
         self.say(message, system, component)
 
+    def read(self, name, *, system=255, component=190, target=(1, 191)):
+        message = mavlink.MAVLink_param_request_read_message(*target, name.encode(), -1)
+        self.say(message, system, component)
+
     def heard(self):
         """Every message that has come here."""
         found = []

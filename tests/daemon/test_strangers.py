@@ -6,7 +6,7 @@ import contextlib
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.mavlink.limits import BYTES_PER_TURN, SENDERS_WAITING
+from onboard.mavlink.limits import ASKED_HZ, BYTES_PER_TURN, LIST_HZ, SENDERS_WAITING
 from tests.daemon.daemons import SIX, WANTED, convinced, in_force, until
 from tests.daemon.standing_vehicle import Vehicle
 from tests.daemon.strangers import Stranger
@@ -223,9 +223,7 @@ async def test_what_is_for_the_vehicle_goes_to_the_vehicle_alone(document, daemo
         assert not kinds & {"PARAM_SET", "PARAM_REQUEST_READ", "COMMAND_LONG"}
 
 
-async def test_what_a_crowd_sends_beyond_its_queues_is_counted_and_shown(
-    document, daemon, port
-):
+async def test_what_a_crowd_sends_beyond_its_queues_is_counted_and_shown(document, daemon, port):
     async with daemon(document) as service, Vehicle(port):
         await until(lambda: service.parts.parameters.complete)
         transport = service.link.connections[0]._transport
@@ -237,6 +235,26 @@ async def test_what_a_crowd_sends_beyond_its_queues_is_counted_and_shown(
             await asyncio.sleep(1.0)
         assert service.snapshot().link.counters["rationed"] >= 8
         assert service.snapshot().link.state == "present"
+
+
+async def test_requests_of_a_stranger_take_little_of_the_vehicles_line(
+    document, daemon, port, stranger
+):
+    """Values are for everybody, and so go to the vehicle too: over a radio, it may be."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.parts.parameters.complete)
+        vehicle.heard.clear()
+
+        def ask():
+            for _ in range(100):
+                stranger.read("OBC_STATE")
+                stranger.set("OBC_APPROVE", 1.0)
+
+        async with repeated(ask, 0.1):
+            await asyncio.sleep(10.0)
+        values = vehicle.heard.count("PARAM_VALUE")
+        assert 0 < values <= (ASKED_HZ + LIST_HZ) * 11.0
+        assert service.snapshot().counters["parameter_requests_left"] > 100
 
 
 async def test_samples_of_a_stranger_are_not_the_vehicles(document, daemon, port, stranger):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from onboard.errors import RefusedError
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import mavlink
+from onboard.mavlink.limits import ASKED_HZ, LIST_HZ
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.mavlink.parameter_server import ParameterServer, Writable
 from tests.gcs.stations import COMPONENT, SYSTEM, Line, Station
@@ -143,6 +144,59 @@ def test_a_list_keeps_its_pace():
     # After a pause in which nothing could be sent there is no burst.
     ask(desk, mavlink.MAVLink_param_request_list_message(SYSTEM, COMPONENT), now=now)
     assert len(desk.server.poll(now + 100.0)) <= 4
+
+
+def flooded(desk, message, *, seconds, a_second=200):
+    """Messages that leave while this one comes so often; a station's list is asked for, too."""
+    ask(desk, mavlink.MAVLink_param_request_list_message(SYSTEM, COMPONENT))
+    sent = []
+    for tick in range(round(seconds / STEP)):
+        now = tick * STEP
+        for n in range(round(a_second * STEP)):
+            sent += ask(desk, message(n), now=now)
+        sent += desk.server.poll(now)
+    return sent
+
+
+def reads(names):
+    def read(n):
+        name = names[n % len(names)].encode()
+        return mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name, -1)
+
+    return read
+
+
+@pytest.mark.parametrize("names", [["OBC_PUSH"], list(VALUES), ["NOT_THERE"]])
+def test_a_flood_of_reads_is_answered_at_a_pace_and_a_list_goes_on(names):
+    desk = Desk()
+    seconds = 3.0
+    sent = flooded(desk, reads(names), seconds=seconds)
+    at_once = ASKED_HZ * (seconds + 1.0)
+    assert len(sent) <= at_once + LIST_HZ * seconds + 1
+    told = {m.param_id for m in sent if m.get_type() == "PARAM_VALUE"}
+    assert told == set(VALUES)
+    if names == ["NOT_THERE"]:
+        assert desk.server.counters["parameter_requests_left"] >= 200 * seconds - at_once
+
+
+def test_a_read_beyond_the_pace_is_answered_later_and_once():
+    desk = Desk()
+    answered = sum(len(ask(desk, reads(["OBC_PUSH"])(0))) for _ in range(100))
+    assert answered == ASKED_HZ
+    later = [m for tick in range(1, 20) for m in desk.server.poll(tick * STEP)]
+    assert [m.param_id for m in later] == ["OBC_PUSH"]
+
+
+def test_a_flood_of_writes_is_mostly_left_and_who_repeats_gets_through():
+    desk = Desk()
+    seconds = 3.0
+    flooded(desk, lambda n: set_message("OBC_PUSH", float(n % 2)), seconds=seconds)
+    assert len(desk.set) <= ASKED_HZ * (seconds + 1.0)
+    for tick in range(20):
+        answers = ask(desk, set_message("OBC_PUSH", 2.0), now=seconds + tick * STEP)
+        if any(m.get_type() == "PARAM_VALUE" for m in answers):
+            break
+    assert desk.server.values["OBC_PUSH"] == desk.set[-1] == 2.0
 
 
 def test_values_are_floats_with_their_index():

@@ -159,6 +159,8 @@ class Outlets:
         now = self._service.snapshot().push.policy
         if POLICIES.index(name) > POLICIES.index(now) and not self._may_loosen:
             raise RefusedError(f"{now} stays (allow_loosening)")
+        if name == now:
+            return
         self._service.set_policy(Mode(name))
         self._notices.post("parameter_done", f"push policy is now {name.replace('_', ' ')}")
 
