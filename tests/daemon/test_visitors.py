@@ -6,6 +6,8 @@ import asyncio
 import errno
 import resource
 import socket
+import tracemalloc
+import zlib
 from collections import Counter
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -209,4 +211,24 @@ async def test_a_hostile_body_is_400(caplog, body):
         head += b"Connection: close\r\nContent-Length: %d\r\n\r\n" % len(body)
         answer = await said(address, head + body)
         assert answer.split(b" ")[1] == b"400"
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("coding", ["gzip", "deflate"])
+async def test_a_body_that_unfolds_without_end_is_not_unfolded(caplog, coding):
+    wide = 31 if coding == "gzip" else zlib.MAX_WBITS
+    folding = zlib.compressobj(9, zlib.DEFLATED, wide)
+    body = b"".join(folding.compress(bytes(1 << 20)) for _ in range(64)) + folding.flush()
+    async with serving() as (address, _, _):
+        head = b"POST /api/reset HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+        head += b"Content-Encoding: %s\r\n" % coding.encode()
+        head += b"Connection: close\r\nContent-Length: %d\r\n\r\n" % len(body)
+        tracemalloc.start()
+        try:
+            answer = await said(address, head + body)
+            _, peak = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+    assert answer.split(b" ")[1] == b"413"
+    assert peak < 8 << 20  # of 64 MB that it would be
     assert not caplog.records

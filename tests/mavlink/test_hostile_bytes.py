@@ -146,8 +146,9 @@ async def test_a_flood_over_tcp_is_taken_in_turns(linger):
         peer, _ = server.accept()
         with peer:
             peer.settimeout(20.0)
+            counting = asyncio.create_task(turns.until(50_000))
             await asyncio.to_thread(peer.sendall, b"\xfd" * 50_000)
-            await turns.until(50_000)
+            await counting
     transport.close()
     assert max(turns.sizes) <= limits.BYTES_PER_TURN
     assert len(set(turns.loop_turns)) == len(turns.sizes)
