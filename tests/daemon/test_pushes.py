@@ -171,3 +171,28 @@ async def test_a_flight_that_was_worse_takes_the_push_back(document, daemon, por
         assert (judged.verdict, judged.held_out_before_push) == ("worse", 4.0)
         assert judged.held_out_after_push == 9.0
         await until(lambda: "refused" in held_back(service))
+
+
+@pytest.mark.parametrize("set_to", [0.0, 4_000_000_000.0])
+async def test_a_clock_that_is_set_in_the_middle_of_a_push_changes_nothing(
+    document, daemon, port, monkeypatch, set_to
+):
+    """As on a computer without a battery for its clock, when it first hears of the time."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        taken = vehicle._set
+
+        def set_and_jump(message):
+            taken(message)
+            if len(vehicle.sets) == 3:
+                monkeypatch.setattr("tests.daemon.daemons.EPOCH", set_to)
+
+        vehicle._set = set_and_jump
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.last_outcome is not None)
+        assert service.snapshot().time == pytest.approx(set_to, abs=1000.0)
+        assert pushed(vehicle)
+        assert len(vehicle.sets) == 6
+    async with daemon(document) as service, Vehicle(port, parameters=vehicle.parameters):
+        await until(lambda: service.parts.parameters.complete)
+        assert service.snapshot().push.can_roll_back == (1,)
+        assert service.parts.journal.damaged == 0

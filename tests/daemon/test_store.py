@@ -1,8 +1,11 @@
 """The sums on disk: whole or not at all."""
 
+import os
+
 import msgspec
 import pytest
 
+from onboard.daemon.learning import limits
 from onboard.daemon.learning.store import Store
 from onboard.errors import StateError
 
@@ -78,3 +81,27 @@ def test_a_directory_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StateError, match="file"):
         Store(tmp_path / "file" / "below")
+
+
+def test_boards_that_are_made_up_take_a_bounded_place_and_drive_out_none_that_has_flown(tmp_path):
+    store = Store(tmp_path)
+    flown, empty = bytes(3 * limits.NOTHING_LEARNED), b"nothing"
+    options = {"version": "1", "saved_at": 0.0}
+    for number in range(3):
+        store.save(1, flown, board=f"aa{number:02x}", **options)
+    for number in range(3 * limits.BOARDS_KEPT):
+        store.save(1, empty, board=f"bb{number:04x}", **options)
+        assert len(list(tmp_path.glob("sums-*"))) <= limits.BOARDS_KEPT
+    assert all(store.load(1, f"aa{number:02x}").sums == flown for number in range(3))
+    # And the board that is there now is always saved.
+    assert store.load(1, f"bb{3 * limits.BOARDS_KEPT - 1:04x}").sums == empty
+
+
+def test_of_boards_that_have_flown_the_oldest_gives_way(tmp_path):
+    store = Store(tmp_path)
+    flown = bytes(3 * limits.NOTHING_LEARNED)
+    for number in range(limits.BOARDS_KEPT + 2):
+        store.save(1, flown, version="1", saved_at=0.0, board=f"{number:04x}")
+        os.utime(store.path(1, f"{number:04x}"), (number, number))
+    gone = [n for n in range(limits.BOARDS_KEPT + 2) if store.load(1, f"{n:04x}") is None]
+    assert gone == [0, 1]

@@ -31,3 +31,9 @@ SOLVING_SHARE: Final = 0.005
 """Of a core: after a solution that took 0.1 s, the next one is due 20 s later [cost]."""
 IN_FLIGHT_SHARE: Final = 0.02
 """Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later [cost]."""
+BOARDS_KEPT: Final = 64
+"""Boards whose sums are kept on the disk: more than one companion ever sees; at some hundred
+kilobytes each a small part of its disk [cost]."""
+NOTHING_LEARNED: Final = 4096
+"""bytes; a file of sums that is no larger is of a board that has not flown: a block of the disk
+[data: 150 bytes without a flight, 100 kB and more with one]."""

@@ -3,7 +3,8 @@
 With them goes what was found of the last flight: the flight itself is not kept.
 
 One file per board of a vehicle (system id and the unique id that the board tells, if it does),
-replaced whole: temporary file, fsync, rename, fsync of the directory.  A file that is damaged or of
+replaced whole: temporary file, fsync, rename, fsync of the directory.  A bounded number of them: a
+board is easily made up, and the disk is the journal's too.  A file that is damaged or of
 another version is set aside with the reason, never half used.  Whether sums are of the sensors that
 are there now, a flight has to confirm (:mod:`onboard.core.estimate.agreement`).
 """
@@ -17,6 +18,7 @@ from zlib import crc32
 
 import msgspec
 
+from onboard.daemon.learning import limits
 from onboard.errors import StateError
 
 SCHEMA = 2
@@ -109,6 +111,8 @@ class Store:
         )
         temporary = path.with_suffix(".new")
         try:
+            if not path.exists():
+                self._make_room()
             with temporary.open("wb") as file:
                 file.write(msgspec.msgpack.encode(saved))
                 file.flush()
@@ -121,6 +125,13 @@ class Store:
                 os.close(directory)
         except OSError as error:
             raise StateError(f"{path}: {error.strerror}") from None
+
+    def _make_room(self) -> None:
+        """One more board: those of which nothing was learned give way first, then the oldest."""
+        files = [(path, path.stat()) for path in self.directory.glob("sums-*.bin")]
+        files.sort(key=lambda file: (file[1].st_size > limits.NOTHING_LEARNED, file[1].st_mtime))
+        for path, _ in files[: max(0, len(files) + 1 - limits.BOARDS_KEPT)]:
+            path.unlink(missing_ok=True)
 
     def set_aside(self, system_id: int, board: str = "") -> str:
         """Rename the file so that it is not read again but can be looked at; its new name."""
