@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import multiprocessing
 import os
 import resource
@@ -18,11 +19,13 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from typing import Any
 
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
@@ -90,13 +93,13 @@ def frames(path: Path) -> Iterator[tuple[float, bytes]]:
             yield 1e-6 * (stamp - first), head[8:] + flags + rest
 
 
-def play(port: int, path: str) -> None:
-    """In a process of its own: the flight in real time, a datagram per message."""
+def play(port: int, path: str, speed: float) -> None:
+    """In a process of its own: the flight, so many times as fast, a datagram per message."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(("127.0.0.1", port))
         began = time.monotonic()
         for t, frame in frames(Path(path)):
-            wait = began + t - time.monotonic()
+            wait = began + t / speed - time.monotonic()
             if wait > 0.0:
                 time.sleep(wait)
             sender.send(frame)
@@ -116,16 +119,22 @@ def cpu_and_memory(pid: int) -> tuple[float, float]:
     return (int(fields[11]) + int(fields[12])) / TICKS, pages * PAGE_MB
 
 
-def live(seconds: float) -> tuple[float, float]:
-    """CPU share and memory (MB) of ``onboard run`` under the load, after warming up."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def live(seconds: float, speed: float = 1.0) -> tuple[float, float, dict[str, Any]]:
+    """CPU share and memory (MB) of ``onboard run`` under the load, after warming up; its snapshot.
+
+    ``speed``: times as fast as it was flown, which is as many times the messages.
+    """
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+        socket.create_server(("127.0.0.1", 0)) as page,
+    ):
         probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+        port, page_port = probe.getsockname()[1], page.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "daemon.toml"
         config.write_text(
             f'[link]\nendpoints = ["udpin:127.0.0.1:{port}"]\nheartbeat_limit_s = 120\n'
-            f'[state]\ndirectory = "{folder}/state"\n[http]\nport = 0\n'
+            f'[state]\ndirectory = "{folder}/state"\n[http]\nport = {page_port}\n'
         )
         daemon = subprocess.Popen(  # noqa: S603 - our own program
             [sys.executable, "-c", EXECUTE, "run", "--config", str(config)],
@@ -134,8 +143,8 @@ def live(seconds: float) -> tuple[float, float]:
             env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         )
         flight = str(Path(folder) / "flight.tlog")
-        in_a_process(record, flight, seconds + WARM_UP_S + 10.0, RATES).join()
-        autopilot = in_a_process(play, port, flight)
+        in_a_process(record, flight, speed * (seconds + WARM_UP_S + 10.0), RATES).join()
+        autopilot = in_a_process(play, port, flight, speed)
         try:
             for line in daemon.stderr or ():
                 if "ardupilot" in line:
@@ -145,12 +154,14 @@ def live(seconds: float) -> tuple[float, float]:
             time.sleep(seconds)
             after, memory = cpu_and_memory(daemon.pid)
             share = (after - before) / (time.monotonic() - began)
+            with urllib.request.urlopen(f"http://127.0.0.1:{page_port}/api/snapshot") as answer:
+                snapshot = json.load(answer)
         finally:
             autopilot.kill()
             daemon.terminate()
             daemon.communicate()
             autopilot.join()
-    return share, memory
+    return share, memory, snapshot
 
 
 def later(message: Message, seconds: float) -> None:
@@ -227,7 +238,7 @@ def simulated_day(hours: float) -> Day:
 
 def run(live_s: float = LIVE_S, day_h: float = DAY_H) -> list[tuple[str, float, str]]:
     """The figures, as (name, value, unit)."""
-    share, memory = live(live_s)
+    share, memory, _ = live(live_s)
     out = [
         ("daemon: live at 200 + 50 + 10 Hz", 100.0 * share, "% of a core"),
         ("daemon: memory, live", memory, "MB"),
@@ -249,6 +260,12 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--live", type=float, default=LIVE_S, metavar="S", help="seconds live")
     parser.add_argument("--day", type=float, default=DAY_H, metavar="H", help="simulated hours")
+    parser.add_argument("--speed", type=float, help="live alone, so many times as fast")
     chosen = parser.parse_args()
+    if chosen.speed is not None:
+        used, resident, told = live(chosen.live, chosen.speed)
+        print(f"{100.0 * used:.1f} % of a core, {resident:.1f} MB")
+        print(told["link"]["counters"], told["counters"], told["trust"], sep="\n")
+        sys.exit()
     for name, value, unit in run(chosen.live, chosen.day):
         print(f"{name:48} {value:8.2f} {unit}")
