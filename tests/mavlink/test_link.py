@@ -100,16 +100,23 @@ class TestConnection:
             assert link.connections[0].last_error == "closed by the other side"
 
     @virtual_time
-    async def test_what_was_refused_is_counted_beyond_a_reconnection(self, air):
+    async def test_what_was_refused_or_not_sent_is_counted_beyond_a_reconnection(self, air):
         async with running(UDP) as link:
             connection = link.connections[0]
-            air.transports[0].refused = 5
+            air.transports[0].refused, air.transports[0].dropped = 5, 3
             connection.peers.refused = 2
-            assert connection.refused == 7
+            assert (connection.refused, connection.dropped) == (7, 3)
+            air.failures = [ConnectionRefusedError(111, "Connection refused")] * 20
             air.transports[0].lost("gone")
-            await asyncio.sleep(BACKOFF_CAP_S)
-            air.transports[1].refused = 1
+            await asyncio.sleep(0.01)
+            assert (connection.refused, connection.dropped) == (7, 3)
+            connection.write(b"to nobody")
+            assert connection.dropped == 4
+            air.failures = []
+            await asyncio.sleep(2.0 * BACKOFF_CAP_S)
+            air.transports[1].refused = air.transports[1].dropped = 1
             assert connection.refused == 8
+            assert connection.dropped >= 5  # and our own HEARTBEATs meanwhile
 
     @virtual_time
     async def test_a_line_gone_dead_is_opened_anew_but_udp_is_left_alone(self, air):
