@@ -1,17 +1,20 @@
 """The control API over real sockets on loopback."""
 
 import asyncio
+import socket
 from contextlib import asynccontextmanager
 
 import aiohttp
 import pytest
 
+from onboard.daemon.outlets import limits
 from onboard.daemon.outlets.control import ControlServer
 from onboard.daemon.outlets.door import Door, bound
 from onboard.daemon.outlets.limits import VIEWERS_MAX
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import ConfigurationError, RefusedError
 from tests.daemon.blank_snapshot import blank_snapshot
+from tests.daemon.daemons import until
 
 TOKEN = "open"
 CHANGES = ("approve", "reject", "rollback", "reset")
@@ -213,6 +216,31 @@ async def test_viewers_are_bounded_and_leaving_makes_room():
             while (viewer := await _viewer(client)) is None:
                 pass
         await viewer.close()
+
+
+async def test_a_viewer_that_reads_nothing_is_let_go_and_keeps_nobody_waiting(monkeypatch):
+    monkeypatch.setattr(limits, "SEND_LIMIT_S", 0.3)
+    document = b'"' + bytes(48 + n % 75 for n in range(300_000)).replace(b"\\", b"/") + b'"'
+    async with serving() as (server, _, client):
+        other = await client.ws_connect("/api/live")
+        await other.receive_str()
+        with socket.socket() as stalled:
+            stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            stalled.connect((client._base_url.host, client._base_url.port))
+            stalled.sendall(
+                b"GET /api/live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
+                b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+            )
+            await until(lambda: server.live.viewers == 2)
+            for _ in range(40):
+                server.live.publish(document)
+                async with asyncio.timeout(20.0):
+                    assert len(await other.receive_str()) == len(document)
+            await until(lambda: server.live.viewers == 1, limit=20.0)
+            server.live.publish(b'"still there"')
+            assert await other.receive_str() == '"still there"'
+        await other.close()
 
 
 async def _viewer(client):

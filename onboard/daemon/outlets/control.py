@@ -196,7 +196,7 @@ class ControlServer:
         if self._acceptor is not None:
             self._acceptor.asked(request.transport, stays=True)
         self.live.viewers += 1
-        sender = asyncio.create_task(self._feed(viewer), name="live viewer")
+        sender = asyncio.create_task(self._feed(viewer, request.transport), name="live viewer")
         try:
             async for message in viewer:  # only to notice that the viewer has gone
                 if message.type == WSMsgType.ERROR:
@@ -207,14 +207,18 @@ class ControlServer:
             await asyncio.gather(sender, return_exceptions=True)
         return viewer
 
-    async def _feed(self, viewer: web.WebSocketResponse) -> None:
+    async def _feed(
+        self, viewer: web.WebSocketResponse, transport: asyncio.Transport | None
+    ) -> None:
         try:
             await _send(viewer, self._actions.snapshot().to_json())
             async for document in self.live.follow():
                 await _send(viewer, document)
             await viewer.close(code=WSCloseCode.GOING_AWAY, message=b"service stops")
         except (TimeoutError, ConnectionError):
-            await viewer.close()
+            # Who takes nothing does not take a farewell either: it would wait behind all the rest.
+            if transport is not None:
+                transport.abort()
 
 
 async def _send(viewer: web.WebSocketResponse, document: bytes) -> None:
