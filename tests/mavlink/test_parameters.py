@@ -10,6 +10,7 @@ from onboard.mavlink.parameter_messages import (
     ParameterErrorCode,
     SendParamRead,
     SendParamSet,
+    TextReceived,
     ValueReceived,
     to_float32,
 )
@@ -144,6 +145,17 @@ class TestSet:
         w.run()
         assert results(w, SetFailed) == [SetFailed(NAME, Failure.DENIED, 1.0)]
         assert w.autopilot.history == []
+
+    def test_a_denial_of_another_parameter_is_none_of_this_one(self):
+        client = ParameterClient()
+        out = list(client.set(NAME, 1.1, 0.0))
+        for tenth in range(50):
+            if any(isinstance(o, SetFailed) for o in out):
+                break
+            out += client.feed(TextReceived("Param write denied (INS_ACCSCAL_Z)"), 0.1 * tenth)
+            out += client.feed(ValueReceived(NAME, 1.0), 0.1 * tenth)
+            out += client.tick(0.1 * tenth)
+        assert out[-1] == SetFailed(NAME, Failure.NOT_TAKEN, 1.0)
 
     def test_denied_whose_text_was_lost_still_fails(self):
         client = ParameterClient()

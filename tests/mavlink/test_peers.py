@@ -1,7 +1,9 @@
 """Addresses on a listening socket: by merit, with a ration each."""
 
+import pytest
+
 from onboard.mavlink.codec import Codec
-from onboard.mavlink.limits import PEER_BYTES_S, PEER_LIMIT, PEERS_KNOWN
+from onboard.mavlink.limits import PEER_BYTES_S, PEER_LIMIT, PEER_SILENCE_S, PEERS_KNOWN
 from onboard.mavlink.peers import Merit, Peers
 from onboard.mavlink.twins import Twins
 from tests.mavlink.mavlink_peer import attitude, heartbeat
@@ -21,6 +23,19 @@ def test_rubbish_gives_way_to_whoever_speaks_mavlink():
     _, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 2.0)
     assert len(frames) == 1
     assert peers.answered(2.0) == [("vehicle", 1)]
+    assert len(list(peers)) == PEERS_KNOWN
+
+
+@pytest.mark.parametrize("data", [b"x", SENDER.encode(attitude(1))])
+def test_who_is_no_better_comes_in_only_when_somebody_has_fallen_silent(data):
+    peers = table()
+    first = [("first", number) for number in range(PEERS_KNOWN)]
+    for address in first:
+        peers.feed(address, data, 1.0)
+    peers.feed(("late", 1), data, 2.0)
+    assert [peer.address for peer in peers] == first
+    peers.feed(("late", 1), data, 3.0 + PEER_SILENCE_S)
+    assert peers.get(("late", 1)) is not None
     assert len(list(peers)) == PEERS_KNOWN
 
 

@@ -266,3 +266,20 @@ async def test_closing_twice_is_harmless():
     transport.close()
     transport.write(b"gone")
     assert transport.dropped == 1
+
+
+async def test_a_closed_transport_is_not_read_any_more(linger):
+    """Or the next socket with its number would wake whoever read the old one."""
+    inbox = Inbox()
+    transport = await open_transport(
+        Endpoint.parse("udpin:127.0.0.1:0"), inbox.receive, inbox.lost, linger=linger
+    )
+    descriptor = transport._socket.fileno()
+    with udp_socket() as peer:
+        peer.sendto(b"hello", ("127.0.0.1", transport.port))
+        await inbox.until(lambda i: len(i.data) == 5)
+        peer.sendto(b"again", ("127.0.0.1", transport.port))
+        transport.close()
+        assert not asyncio.get_running_loop().remove_reader(descriptor)
+        await asyncio.sleep(3.0 * linger)
+    assert bytes(inbox.data) == b"hello"
