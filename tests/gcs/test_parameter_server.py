@@ -139,12 +139,24 @@ def test_a_list_keeps_its_pace():
     for tick in range(1, 100):
         now = tick * STEP
         sent.append(len(desk.server.poll(now)))
-        assert sum(sent) <= 20.0 * now + 1.0
-        desk.server.update({"OBC_P_3": float(tick % 2)})  # announced when the list is done
-    assert len(VALUES) <= sum(sent) <= len(VALUES) + 5.0 * now
+        assert sum(sent) <= 20.0 * now + 1e-6
+    assert sum(sent) == len(VALUES)
     # After a pause in which nothing could be sent there is no burst.
     ask(desk, mavlink.MAVLink_param_request_list_message(SYSTEM, COMPONENT), now=now)
     assert len(desk.server.poll(now + 100.0)) <= 4
+
+
+def test_changes_wait_until_a_list_is_done():
+    desk = Desk(list_hz=20.0)
+    ask(desk, mavlink.MAVLink_param_request_list_message(SYSTEM, COMPONENT))
+    sent = 0
+    for tick in range(1, 21):  # 2 s of the 2.1 s that it takes
+        desk.server.update({"OBC_P_3": float(tick % 2)})
+        sent += len(desk.server.poll(tick * STEP))
+        assert sent <= 20.0 * tick * STEP + 1e-6
+    later = [m for tick in range(21, 40) for m in desk.server.poll(tick * STEP)]
+    assert later[-1].param_id == "OBC_P_3"
+    assert later[-1].param_value == 0.0
 
 
 def flooded(desk, message, *, seconds, a_second=200):

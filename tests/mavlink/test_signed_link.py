@@ -215,6 +215,7 @@ async def test_a_clock_that_is_behind_follows_the_vehicles(air):
 async def test_no_time_at_all_still_gives_stamps_that_grow(air):
     """A computer without a clock, at 1970: every stamp is greater than that before."""
     signing = Signing(KEY, lambda: 0.0)
+    assert (signing.behind_s, signing.ahead_s) == (0.0, 0.0)  # nothing was heard, nothing is told
     first = [signing.next_timestamp() for _ in range(3)]
     again = Signing(KEY, lambda: 0.0, record=signing.kept(margin_s=10.0))
     assert first == sorted(set(first))
