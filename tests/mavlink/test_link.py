@@ -27,7 +27,13 @@ from onboard.mavlink.connection import (
 )
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.endpoint import Endpoint, EndpointError
-from onboard.mavlink.limits import BACKOFF_CAP_S, HEARTBEAT_TIMEOUT_S, SILENCE_S
+from onboard.mavlink.limits import (
+    BACKOFF_BASE_S,
+    BACKOFF_CAP_S,
+    HEARTBEAT_TIMEOUT_S,
+    SILENCE_S,
+    STABLE_S,
+)
 from onboard.mavlink.link import Link
 from onboard.mavlink.streams import StreamRequest, Streams
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
@@ -48,7 +54,8 @@ def air(monkeypatch):
 async def running(*endpoints, **kwargs):
     """A link under way, with the events it emitted; stopped at the end."""
     clock = asyncio.get_running_loop().time
-    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, rng=random.Random(1), **kwargs)
+    kwargs = {"rng": random.Random(1), **kwargs}
+    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, **kwargs)
     link.events = []
     link.subscribe_events(lambda now, event: link.events.append(event))
     task = asyncio.create_task(link.run())
@@ -83,6 +90,26 @@ class TestConnection:
             assert all(wait <= BACKOFF_CAP_S + 1e-6 for wait in waits)
             assert waits[0] <= 0.5 + 1e-6
             assert max(waits) > 5.0
+
+    @virtual_time
+    async def test_after_a_connection_that_lasted_the_waits_begin_anew(self, air):
+        refused = ConnectionRefusedError(111, "Connection refused")
+        for lasted, most in ((STABLE_S + 1.0, BACKOFF_BASE_S), (0.1, BACKOFF_CAP_S)):
+            waits = []
+            for seed in range(20):
+                air.failures, air.transports[:], air.opened_at[:] = [refused] * 10, [], []
+                loop = asyncio.get_running_loop()
+                async with running(TCP, rng=random.Random(seed)):
+                    while not air.transports:
+                        await asyncio.sleep(0.1)
+                    await asyncio.sleep(lasted)
+                    air.transports[0].lost("gone")
+                    lost_at, tries = loop.time(), len(air.opened_at)
+                    while len(air.opened_at) == tries:
+                        await asyncio.sleep(0.01)
+                    waits.append(air.opened_at[-1] - lost_at)
+            assert max(waits) <= most
+            assert max(waits) > 0.5 * most
 
     @virtual_time
     async def test_a_broken_connection_comes_back_and_hears_again(self, air):

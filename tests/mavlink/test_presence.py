@@ -8,11 +8,13 @@ from onboard.mavlink.autopilot import (
     AutopilotState,
     RivalHeard,
 )
+from onboard.mavlink.claims import Claims
 from onboard.mavlink.limits import (
     CLAIMS_KNOWN,
     FAILOVER_S,
     GIVEN_UP_S,
     HEARTBEAT_TIMEOUT_S,
+    PEER_SILENCE_S,
     PROOF_S,
 )
 from onboard.mavlink.presence import Presence, Whose
@@ -132,6 +134,19 @@ def test_who_only_beats_gives_way_to_who_has_a_stream_unless_something_was_learn
         assert wire.presence.source == (system, 1)
 
 
+@pytest.mark.parametrize(("committed", "system"), [(False, 2), (True, 1)])
+def test_another_vehicle_takes_the_place_of_a_lost_one_of_which_nothing_was_learned(
+    committed, system
+):
+    wire = Wire(committed=committed)
+    wire.second(HERE)
+    wire.hear(THERE, (2, 1), BEAT)
+    assert wire.presence.source == VEHICLE
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    wire.hear(THERE, (2, 1), BEAT)
+    assert wire.presence.source == (system, 1)
+
+
 def test_among_those_that_only_beat_each_has_its_turn():
     wire = Wire()
     tried = set()
@@ -180,3 +195,18 @@ def test_any_number_of_claims_takes_a_bounded_place_and_never_the_vehicles():
     assert len(list(wire.presence._claims)) <= CLAIMS_KNOWN + 1
     assert wire.hear(HERE, message=BEAT) is Whose.VEHICLE
     assert wire.presence.way == HERE
+
+
+def test_of_the_claims_those_that_are_silent_give_way_first_whatever_they_proved():
+    claims = Claims()
+    proven = claims.make(VEHICLE, HERE, BEAT, 0.0)
+    for stamp in range(5):
+        proven.note_stamp(float(stamp), float(stamp))
+    now = 5.0 + PEER_SILENCE_S + 1.0
+    for number in range(CLAIMS_KNOWN - 1):
+        claims.make((2, 1), (0, ("x", number)), BEAT, now)
+    assert proven.proven
+    claims.make((3, 1), THERE, BEAT, now)
+    assert claims.get(VEHICLE, HERE) is None
+    assert len(list(claims)) == CLAIMS_KNOWN
+    assert claims.get((2, 1), (0, ("x", 0))) is not None

@@ -1,5 +1,7 @@
 """Who floods a socket is in nobody's way but its own."""
 
+import gc
+import os
 import socket
 
 import pytest
@@ -94,6 +96,14 @@ def test_what_others_send_takes_no_room_from_the_one_with_a_line_of_its_own():
             vehicle.sendto(b"alive", port.getsockname())
             assert drained(line) == [b"alive"]
             assert set(drained(port)) == {b"flood"}
+
+
+def test_where_it_cannot_be_had_no_socket_stays_behind():
+    before = len(os.listdir("/proc/self/fd"))
+    with udp() as port:
+        assert line_of_its_own(port, ("255.255.255.255", 9)) is None  # broadcast is not allowed
+    assert len(os.listdir("/proc/self/fd")) == before
+    gc.collect()  # one that was only forgotten is told by a warning
 
 
 @pytest.mark.parametrize("option", [0, socket.SO_REUSEADDR, socket.SO_REUSEPORT])
