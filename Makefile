@@ -1,11 +1,12 @@
-# make setup | demo | test | simulate | landings | fuzz | check | bench | wheels | clean.   Needs Python 3.11+, pip and make.
+# Needs Python 3.11+, pip and make.
+# make setup | demo | test | docs | commands | simulate | landings | fuzz | check | bench | wheels | clean
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 PIP    := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: setup demo test simulate landings fuzz check bench wheels format clean
+.PHONY: setup demo test docs commands simulate landings fuzz check bench wheels format clean
 
 setup: $(STAMP)
 
@@ -36,6 +37,22 @@ landings: $(STAMP)
 fuzz: $(STAMP)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.fuzz $(ARGS)
 
+# The manuals and the API's reference as one searchable site in build/site, by tools of its own.
+SITE      := .venv-site
+SITESTAMP := $(SITE)/.installed
+
+$(SITESTAMP): docs/site/requirements.lock
+	test -x $(SITE)/bin/python || $(PYTHON) -m venv $(SITE)
+	$(SITE)/bin/python -m pip --quiet --disable-pip-version-check install --require-hashes --requirement $<
+	touch $@
+
+docs: $(SITESTAMP)
+	NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --strict $(ARGS)
+
+# docs/commands.md, the man page and the completions, from what the commands say of themselves.
+commands: $(STAMP)
+	$(BIN)/python deploy/commands.py
+
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -58,4 +75,4 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(SITE) build .pytest_cache .mypy_cache .ruff_cache .hypothesis
