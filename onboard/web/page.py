@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from onboard import __version__
 from onboard.answers.words import DISTRUST
 from onboard.core.physics.catalogue import kinds
 
@@ -25,6 +26,20 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
+
+
+BLUEOS = {
+    "name": "onboard",
+    "description": "In-flight calibration of the autopilot's accelerometers",
+    "icon": "mdi-axis-arrow",
+    "company": "onboard",
+    "version": __version__,
+    "new_page": True,
+    "webpage": "",
+    "api": "/api/snapshot",
+}
+"""What BlueOS asks of every port, at ``/register_service``, for the entry in its menu: in a tab
+of its own, because no other page may have this one in a frame."""
 
 
 def look() -> str:
@@ -50,6 +65,9 @@ def status_page(application: web.Application) -> None:
     async def words(_request: web.Request) -> web.StreamResponse:
         return web.json_response(vocabulary())
 
+    async def blueos(_request: web.Request) -> web.StreamResponse:
+        return web.json_response(BLUEOS)
+
     async def complete(_request: web.Request, response: web.StreamResponse) -> None:
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
@@ -58,5 +76,6 @@ def status_page(application: web.Application) -> None:
 
     application.router.add_get("/", index)
     application.router.add_get("/words.json", words)
+    application.router.add_get("/register_service", blueos)
     application.router.add_static("/static/", STATIC)
     application.on_response_prepare.append(complete)
