@@ -157,19 +157,20 @@ def line_chart(
     x0, x1 = x_range or (float(xs.min()), float(xs.max()))
     sheet = _Sheet(x0, x1 if x1 > x0 else x0 + 1.0, *(y_range or _range(ys, symmetric=symmetric)))
     shapes = [sheet.band(band) for band in bands]
-    x_marks, x_labels, x_unit = sheet.time_axis(x_unit)
+    x_marks, x_labels, x_unit, size = sheet.time_axis(x_unit)
     y_marks, y_labels = sheet.value_axis()
     shapes += [*x_marks, *y_marks]
     shapes += [sheet.ribbon(ribbon) for ribbon in ribbons]
     shapes += [sheet.dots(p) for p in points]
-    shapes += [sheet.curve(x, y, line.kind) for x, y, line in drawn]
+    shapes += [sheet.curve(x, y, line.kind, line.label) for x, y, line in drawn]
     return Markup(
         "<figure><figcaption>{}{}</figcaption>"
-        '<div class="plot"><svg viewBox="0 0 {:.0f} {:.0f}" preserveAspectRatio="none" role="img" '
-        'aria-label="{}">{}</svg>{}<span class="along">{}</span></div></figure>'
+        '<div class="plot"{}><svg viewBox="0 0 {:.0f} {:.0f}" preserveAspectRatio="none" '
+        'role="img" aria-label="{}">{}</svg>{}<span class="along">{}</span></div></figure>'
     ).format(
         title,
         Markup(' <span class="muted">({})</span>').format(unit) if unit else "",
+        sheet.ranges(x_unit, size),
         WIDTH,
         HEIGHT,
         f"{title}: {summary}" if summary else title,
@@ -194,14 +195,24 @@ class _Sheet:
     def py(self, y: float) -> float:
         return HEIGHT * (self.y1 - min(max(y, self.y0), self.y1)) / (self.y1 - self.y0)
 
-    def time_axis(self, unit: str) -> tuple[list[str], list[str], str]:
-        """Marks, their labels and their unit, which becomes minutes or hours if it is seconds."""
+    def ranges(self, unit: str, size: float) -> Markup:
+        """What the page's script needs to read values off: both ranges, the horizontal unit."""
+        told = Markup(
+            ' data-x="{:.9g} {:.9g}" data-y="{:.9g} {:.9g}" data-unit="{}" data-size="{:g}"'
+        )
+        return told.format(self.x0, self.x1, self.y0, self.y1, unit, size)
+
+    def time_axis(self, unit: str) -> tuple[list[str], list[str], str, float]:
+        """Marks, their labels and their unit, which becomes minutes or hours if it is seconds.
+
+        Last is the size of that unit in the units of the data.
+        """
         marks, unit_s = ticks(self.x0, self.x1), 1.0
         if unit == "s":
             marks, unit_s, unit = time_ticks(self.x0, self.x1)
-        grid = [f'<path class="grid" d="M{self.px(v):.1f} 0V{HEIGHT:.0f}"/>' for v in marks]
+        grid = [f'<path class="grid upright" d="M{self.px(v):.1f} 0V{HEIGHT:.0f}"/>' for v in marks]
         labels = [_label("x", "left", self.px(v) / WIDTH, v / unit_s) for v in marks]
-        return grid, labels, unit
+        return grid, labels, unit, unit_s
 
     def value_axis(self) -> tuple[list[str], list[str]]:
         """Marks and their labels; the one at zero stands out."""
@@ -250,9 +261,9 @@ class _Sheet:
         bars = "".join(f"M{a}L{b}" for a, b in zip(low, high, strict=True))
         return f'<path class="spread {kind}" d="{bars}"/>{out}'
 
-    def curve(self, x: Array, y: Array, kind: str) -> str:
+    def curve(self, x: Array, y: Array, kind: str, label: str) -> str:
         d = _path([self.px(float(v)) for v in x], [self.py(float(v)) for v in y], x)
-        return f'<path class="line {escape(kind)}" d="{d}"/>'
+        return f'<path class="line {escape(kind)}" d="{d}" data-label="{escape(label)}"/>'
 
 
 def pair_bar(before: float, after: float, longest: float, title: str) -> Markup:

@@ -16,11 +16,14 @@ from onboard.web.page import look
 
 PAGE: Final = "page.html.j2"
 HEAD: Final = "head.html.j2"
+SCRIPT: Final = "report.js"
 STYLES: Final = {PAGE: "report.css", HEAD: "head.css"}
 
 
 def render(template: str, base: str = PAGE, **shown: object) -> str:
-    """A page in UTF-8 without script and without references to anything outside itself.
+    """A page in UTF-8 without references to anything outside itself.
+
+    A document has a script of ours, with which charts can be read off; it says the same without.
 
     Args:
         template: a file of this package, which extends ``base``.
@@ -37,6 +40,11 @@ def render(template: str, base: str = PAGE, **shown: object) -> str:
     layout = resources.files("onboard.report").joinpath(STYLES[base]).read_text(encoding="utf-8")
     common = look() if base == PAGE else ""  # it is for a document of its own
     style = Markup(common + layout)  # noqa: S704  files of ours
+    script = resources.files("onboard.report").joinpath(SCRIPT).read_text(encoding="utf-8")
     return environment.get_template(template).render(
-        base=base, brief=base == HEAD, style=style, **shown
+        base=base,
+        brief=base == HEAD,
+        style=style,
+        script=Markup(script),  # noqa: S704  a file of ours
+        **shown,
     )

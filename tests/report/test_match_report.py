@@ -47,7 +47,7 @@ def test_every_part_of_the_story_is_there():
 def test_it_asks_for_nothing_outside_itself():
     html = match_html(by_hand())
     tags = Page.of(html).tags
-    assert not {"script", "link", "img", "iframe", "object"} & {tag for tag, _ in tags}
+    assert not {"link", "img", "iframe", "object"} & {tag for tag, _ in tags}
     for _, attributes in tags:
         assert not {"src", "href", "onload", "onclick"} & set(attributes)
     assert not re.search(r"https?:|url\(|@import", html)
@@ -65,7 +65,8 @@ def test_files_are_written_by_what_the_reader_has_in_hand():
 
 def test_names_of_files_and_numbers_of_others_are_escaped():
     html = match_html(by_hand(name="<script>alert(1)</script>.BIN", note="a < b & c"))
-    assert "<script>" not in html
+    assert html.count("<script") == 1  # ours
+    assert "&lt;script&gt;alert" in html
     assert "&lt;script&gt;" in html
     assert "a &lt; b &amp; c" in html
 

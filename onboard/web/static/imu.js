@@ -149,7 +149,7 @@ export class Imus {
         h("div", { class: "scroll" }, h(
           "table",
           { class: "compare" },
-          h("thead", {}, h("tr", {}, h("th", { scope: "col", text: `IMU ${view.imu}` }), h("th", { scope: "col", text: "in force" }), h("th", { scope: "col", text: "estimate" }), h("th", { class: "bars" }, h("span", { class: "soft", text: "" })))),
+          h("thead", {}, h("tr", {}, h("th", { scope: "col", text: `IMU ${view.imu}` }), h("th", { scope: "col", text: "in force" }), h("th", { scope: "col", text: "estimate" }), h("td", { class: "bars" }))),
           h("tbody", {}, ...rows.map((row, at) => residualRow(row, shown[at]))),
         )),
         h("p", { class: "soft", text: "Both of what has been flown so far. In force: what the autopilot uses now. Estimate: what is known now." }),
