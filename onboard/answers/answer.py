@@ -216,4 +216,4 @@ def _cured(effects: Sequence[Finding]) -> str:
     ]
     todo = "; ".join(dict.fromkeys(c for c in cures if c))
     found = ", ".join(phrase_of(e) for e in effects)
-    return f"{found}: {todo}; then fly again" if todo else found
+    return f"{found}; first {todo}, then fly again" if todo else found

@@ -18,7 +18,10 @@ from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.physics.catalogue import is_excluded, is_named, size_of, title_of
 from onboard.core.physics.finding import Finding
 from onboard.push import diagnosed
+from onboard.push.policy import PHYSICS_MISSING, Objection
 
+LACKING = "something is missing from the model"
+"""Why a flight that shows the numbers well may be no calibration all the same."""
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 """For terminals, by severity."""
 MOST_NAMED = 2
@@ -44,7 +47,7 @@ def headline(diagnosis: Diagnosis) -> str:
         return "Nothing is missing" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if is_named(e.name)]
     if not named:
-        return "Something is missing, and nothing known explains it"
+        return "Something is missing, and no known effect explains it"
     titles = [title_of(e.name) for e in named[:MOST_NAMED]]
     # A name that begins with capitals keeps them in the middle of a sentence.
     found = [t if t[:2].isupper() or not k else t[:1].lower() + t[1:] for k, t in enumerate(titles)]
@@ -98,7 +101,7 @@ def proof(diagnosis: Diagnosis) -> str:
     """How sure: the residual on data that were not fitted, before and after."""
     m = diagnosis.mismatch
     if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return "Not at all: no effect was accepted or ruled out."
+        return "Nothing could be tested: no effect was accepted or ruled out."
     before, after = m.held_out_velocity_before, m.held_out_velocity_after
     noise = m.held_out_after
     if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
@@ -153,8 +156,15 @@ def about_six(advice: Advice) -> str:
     """Whether to set the six, in a sentence."""
     if advice.settable:
         return "Set the calibration parameters."
-    reasons = "; ".join(advice.reasons)
-    return f"Leave the calibration parameters as they are: {reasons}."
+    # One reason is enough where the other only follows from it.
+    lacking = any(r.objection is Objection.PHYSICS_MISSING for r in advice.refusals)
+    follows = {r.sentence for r in advice.refusals if r.objection is Objection.NOT_CALIBRATED}
+    told = [
+        sentence.removeprefix(PHYSICS_MISSING)
+        for sentence in advice.reasons
+        if not (lacking and sentence in follows)
+    ]
+    return f"Leave the calibration parameters as they are: {'; '.join(told)}."
 
 
 def _without_cure(diagnosis: Diagnosis) -> list[str]:

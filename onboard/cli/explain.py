@@ -17,17 +17,20 @@ from onboard.answers.explain import explain as explain_recordings
 from onboard.answers.knowledge import seen
 from onboard.answers.words import fixed, percent
 from onboard.cli.progress import reading
-from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.cli.replay import STANDARD_OUTPUT, write_bytes, write_json, write_text
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.finding import Finding
+from onboard.report.mcap import mcap
 from onboard.report.parameters import explanation_text
+from onboard.report.tracks import of_diagnosis
 
 MOST_SPANS = 3
 EXAMPLES = """\
 \b
 onboard explain flight.BIN
 onboard explain flight.tlog --report flight.html --param cure.param
+onboard explain flight.BIN --mcap flight.mcap       # for Foxglove
 onboard explain flight.BIN --json - | jq '.effects[].name'
 """
 
@@ -43,6 +46,12 @@ onboard explain flight.BIN --json - | jq '.effects[].name'
     help="Write parameters for a ground station; QGroundControl's format if FILE ends in .params.",
 )
 @click.option(
+    "--mcap",
+    "mcap_file",
+    metavar="FILE",
+    help="Write what there is over time, for Foxglove and other viewers of logs.",
+)
+@click.option(
     "--imu",
     type=click.IntRange(1, 5),
     metavar="N",
@@ -53,6 +62,7 @@ def explain(
     json_file: str | None,
     report_file: str | None,
     param_file: str | None,
+    mcap_file: str | None,
     imu: int | None,
 ) -> None:
     """Find the physics that a recording has and the model lacks.
@@ -71,7 +81,9 @@ def explain(
         write_text(explanation_html(result), report_file)
     if param_file is not None:
         write_text(explanation_text(result, param_file), param_file)
-    if STANDARD_OUTPUT not in (json_file, report_file, param_file):
+    if mcap_file is not None:
+        write_bytes(mcap(of_diagnosis(result.diagnosis)), mcap_file)
+    if STANDARD_OUTPUT not in (json_file, report_file, param_file, mcap_file):
         console = Console(highlight=False)
         for part in summary(result):
             console.print(part)

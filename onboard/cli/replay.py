@@ -20,6 +20,7 @@ EXAMPLES = """\
 onboard replay flight.BIN
 onboard replay monday.tlog tuesday.tlog --imu 2
 onboard replay flight.BIN --report flight.html --param new.param
+onboard replay flight.BIN --mcap flight.mcap        # for Foxglove
 onboard replay flight.BIN --json - | jq '.imus[0].calibration'
 """
 
@@ -40,6 +41,12 @@ onboard replay flight.BIN --json - | jq '.imus[0].calibration'
     help="Write parameters for a ground station; QGroundControl's format if FILE ends in .params.",
 )
 @click.option(
+    "--mcap",
+    "mcap_file",
+    metavar="FILE",
+    help="Write what there is over time, for Foxglove and other viewers of logs.",
+)
+@click.option(
     "--imu", type=click.IntRange(1, 5), metavar="N", help="This accelerometer only, 1 to 5."
 )
 def replay(
@@ -47,6 +54,7 @@ def replay(
     json_file: str | None,
     report_file: str | None,
     param_file: str | None,
+    mcap_file: str | None,
     imu: int | None,
 ) -> None:
     """Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
@@ -57,7 +65,8 @@ def replay(
     Nothing is written to any autopilot; the table says which parameters to set.
     """
     with reading(logs, then="comparing models") as progress:
-        made = calibrated(logs, imu=imu, watched=report_file is not None, progress=progress)
+        watched = report_file is not None or mcap_file is not None
+        made = calibrated(logs, imu=imu, watched=watched, progress=progress)
     result, drawn = made.replay, made.chronicle
     if report_file is not None and drawn is not None:
         # jinja2 only when it is wanted.
@@ -68,9 +77,14 @@ def replay(
         from onboard.report.parameters import replay_text
 
         write_text(replay_text(result, param_file), param_file)
+    if mcap_file is not None and drawn is not None:
+        from onboard.report.mcap import mcap
+        from onboard.report.tracks import of_replay
+
+        write_bytes(mcap(of_replay(result, drawn)), mcap_file)
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
-    if STANDARD_OUTPUT not in (json_file, report_file, param_file):
+    if STANDARD_OUTPUT not in (json_file, report_file, param_file, mcap_file):
         console = Console(highlight=False)
         for part in replay_report(result):
             console.print(part)
@@ -83,6 +97,15 @@ def write_json(document: bytes, file: str) -> None:
         UsageError: the file cannot be written.
     """
     _write(document, file)
+
+
+def write_bytes(content: bytes, file: str) -> None:
+    """Write what is no text to a file, or to standard output for ``-``.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    _write(content, file)
 
 
 def write_text(text: str, file: str) -> None:

@@ -11,9 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from onboard.answers.advice import Advice
+from onboard.answers.answer import Answer
 from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
 from onboard.answers.replay import Replay
-from onboard.answers.verdict import about_six
+from onboard.answers.verdict import LACKING, about_six
 from onboard.cli.flights_table import flights
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
@@ -36,7 +37,7 @@ def replay_report(result: Replay) -> Iterator[RenderableType]:
     for answer, advice in zip(result.answers, result.advice, strict=True):
         calibration = answer.calibration
         yield Text()
-        yield _headline(calibration)
+        yield _headline(answer)
         yield _six(calibration, result.autopilot, advice)
         if answer.flights:
             yield from flights(answer.flights)
@@ -64,8 +65,11 @@ def _recordings(result: Replay) -> RenderableType:
     return _sentences(rows)
 
 
-def _headline(calibration: Calibration) -> Text:
+def _headline(answer: Answer) -> Text:
+    calibration = answer.calibration
     words, style = STATUS_WORDS[calibration.status]
+    if calibration.status is Status.INSUFFICIENT and answer.missing:
+        words = LACKING
     return Text.assemble(f"Accelerometer {calibration.imu}: ", (words, style))
 
 
@@ -134,7 +138,7 @@ def _about(
     if not c.parameters_known and autopilot != "px4":
         yield (
             "parameters",
-            "not in the recording: scale 1 and offset 0 are taken for those in force",
+            "not in the recording; scale 1 and offset 0 are assumed to be in force",
         )
     if timing := "; ".join(_timing(c.timing)):
         yield "timing", timing

@@ -15,12 +15,14 @@ from onboard.core.physics.effect import Bearing
 
 HEADLINES = {
     "clean": "Nothing is missing beyond the six numbers and the timing.",
-    "explained": "Physics is missing from the model, and it was found.",
-    "partly_explained": "Physics is missing from the model; a part of it was found.",
-    "unexplained": "Something is missing, and nothing known explains it.",
-    "insufficient": "This flight cannot tell.",
+    "explained": "Something was missing from the model; it has been found.",
+    "partly_explained": "Something is missing from the model; a part of it has been found.",
+    "unexplained": "Something is missing from the model, and no known effect explains it.",
+    "insufficient": "This flight cannot tell whether anything is missing.",
 }
-KNOWN_ALREADY = "Nothing is missing: what was found is in every calibration, and worth knowing."
+KNOWN_ALREADY = (
+    "Nothing is missing. What was found is worth knowing; every calibration includes it."
+)
 
 
 def severity_of_effect(name: str) -> str:

@@ -51,6 +51,10 @@ class Mode(Enum):
     IN_FLIGHT = "in_flight"
 
 
+PHYSICS_MISSING = "physics missing: "
+"""How the sentence of that objection begins."""
+
+
 class Objection(Enum):
     """Names of the reasons to refuse."""
 
@@ -223,7 +227,7 @@ def objections(
     """
     found: list[Refusal] = []
     if missing:
-        found.append(_no(Objection.PHYSICS_MISSING, f"physics missing: {missing}"))
+        found.append(_no(Objection.PHYSICS_MISSING, f"{PHYSICS_MISSING}{missing}"))
     found += _estimate(plan, calibration, settings)
     for change in plan.changes:
         found += _number(change, settings)

@@ -1,4 +1,4 @@
-"""A diagnosis as one self-contained page: no script, no network, charts inline."""
+"""A diagnosis as one self-contained page: no network, charts inline."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from onboard.answers.knowledge import seen
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
-from onboard.core.physics.finding import Finding, Where
+from onboard.core.physics.finding import Confounder, Finding, Where
+from onboard.push.diagnosed import severity_of_effect
 from onboard.report import residual_charts
 from onboard.report.chart import pair_bar
 from onboard.report.page import PAGE, render
@@ -21,6 +22,9 @@ from onboard.report.parameters import changes
 
 TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
+MOST_RIVALS = 3
+LEVELS = {"info": "worth knowing", "warning": "matters"}
+"""How much an effect matters, in words: whether it forbids to set the calibration."""
 
 
 def explain_html(
@@ -180,6 +184,7 @@ def _where(w: Where) -> str:
 def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any]:
     before, after = e.held_out_velocity_before, e.held_out_velocity_after
     known = math.isfinite(before) and math.isfinite(after)
+    rivals = sorted(e.confounders, key=lambda r: r.delta_bic)
     return {
         "title": verdict.sized(e),
         "name": e.name,
@@ -193,7 +198,9 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
         "charts": residual_charts.of_effect(e),
-        "rivals": [(title_of(r.name), words.number(r.delta_bic)) for r in e.confounders],
+        "level": LEVELS[severity_of_effect(e.name)],
+        "rivals": [(title_of(r.name), words.number(r.delta_bic)) for r in rivals[:MOST_RIVALS]],
+        "others": _others(rivals[MOST_RIVALS:]),
         "cure": e.cure,
         "parameters": []
         if advice is None
@@ -206,6 +213,13 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         "more": max(len(e.intervals) - MOST_SPANS, 0),
         "where": [] if e.intervals else [_where(w) for w in e.where[:3]],
     }
+
+
+def _others(rivals: Sequence[Confounder]) -> str:
+    """Rivals that are further away than those that are named."""
+    if not rivals:
+        return ""
+    return f"{len(rivals)} more (worse by {words.number(rivals[0].delta_bic)} or more)"
 
 
 def _intervals(e: Finding) -> list[str]:

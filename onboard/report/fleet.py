@@ -13,6 +13,7 @@ from onboard.answers.fleet.severity import (
     UNITS,
     Severity,
     day,
+    known,
     sentences,
     severity_of,
     shared_sentence,
@@ -116,7 +117,7 @@ def _accelerometer(a: Accelerometer) -> dict[str, Any]:
 def _number(n: Number) -> dict[str, Any]:
     c, s = n.course, n.series
     name, unit = NAMES.get(n.name, n.name), UNITS[n.unit]
-    latest = sized(Sized(*n.latest, 1.0), "")
+    latest = known(Sized(*n.latest, 1.0))
     notes = []
     if c.steps:
         notes.append(f"{len(c.steps)} step{'s' if len(c.steps) > 1 else ''}")

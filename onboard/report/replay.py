@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from onboard.answers import words
 from onboard.answers.advice import Advice
+from onboard.answers.answer import Answer
 from onboard.answers.chronicle import FREE_S, Course, Curve, Figures, Span
 from onboard.answers.compared import common_cause
 from onboard.answers.knowledge import ALL_SIX, determined, knowledge, seen
 from onboard.answers.replay import Replay
-from onboard.answers.verdict import about_six
+from onboard.answers.verdict import LACKING, about_six
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
@@ -61,6 +62,14 @@ HEADLINES = {
 }
 
 
+def _headline(answer: Answer) -> str:
+    """The status in words; numbers that the flight shows may be spoiled all the same."""
+    status = answer.calibration.status
+    if status is Status.INSUFFICIENT and answer.missing:
+        return words.capital(LACKING)
+    return HEADLINES[status]
+
+
 def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
     """The page of one replay.
 
@@ -79,7 +88,8 @@ def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
     if len(statuses) > 1 and 0 < done < len(statuses):
         headline = f"{done} of {len(statuses)} accelerometers calibrated"
     else:
-        headline = HEADLINES[worst]
+        of_worst = {_headline(a) for a in result.answers if a.calibration.status is worst}
+        headline = of_worst.pop() if len(of_worst) == 1 else HEADLINES[worst]
     return render(
         TEMPLATE,
         base,
@@ -94,7 +104,7 @@ def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
         trust_chart=_trust_chart(chronicle),
         trust=_trust(chronicle),
         imus=[
-            _imu(a.calibration, chronicle.figures(a.imu), result.autopilot, chronicle, advice)
+            _imu(a, chronicle.figures(a.imu), result.autopilot, chronicle, advice)
             | {"flights": flight_rows(a.flights)}
             for a, advice in zip(result.answers, result.advice, strict=True)
         ],
@@ -143,13 +153,14 @@ def _joint(result: Replay) -> list[dict[str, Any]]:
 
 
 def _imu(
-    c: Calibration, f: Figures, autopilot: str, chronicle: Drawn, advice: Advice | None
+    answer: Answer, f: Figures, autopilot: str, chronicle: Drawn, advice: Advice | None
 ) -> dict[str, Any]:
+    c = answer.calibration
     what, sure, do = _sentences(c, f, advice)
     return {
         "imu": c.imu,
         "status": c.status.value,
-        "headline": HEADLINES[c.status],
+        "headline": _headline(answer),
         "what": what,
         "sure": sure,
         "do": do,
@@ -174,8 +185,8 @@ def _imu(
     }
 
 
-def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, str, str]:
-    """What was found, how sure, what to do: three short paragraphs."""
+def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, str, list[str]]:
+    """What was found, how sure, what to do: two short paragraphs and a list."""
     if c.status is Status.CALIBRATED:
         what = f"{words.capital(knowledge(c))}."
         if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
@@ -195,7 +206,7 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
             f"noise (with the parameters in force {c.held_out_before:.2f}; 1 is ideal)."
         )
     fly = c.coverage.advice or (f.seen.weak[0].advice if f.seen is not None and f.seen.weak else "")
-    return what, sure, " ".join(_to_do(c, fly, advice))
+    return what, sure, list(_to_do(c, fly, advice))
 
 
 def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
@@ -213,13 +224,13 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
         )
     else:
         yield about_six(advice)
-        yield from (f"{name}: {said}." for name, said in advice.conditions.items())
+        yield from (f"{name} holds {said}." for name, said in advice.conditions.items())
     if not calibrated:
         if "onboard explain" in c.note:
-            yield "Ask onboard explain what is missing."
+            yield "Run onboard explain on the recording: it says what is missing."
         yield f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
     elif not whole and fly:
-        yield f"For the others: {fly}."
+        yield f"To learn the others: {fly}."
 
 
 def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from onboard.daemon.mqtt.payloads import (
     event_message,
     read_command,
 )
+from onboard.daemon.mqtt.summary import summary_message
 from tests.mqtt.published import imu_view, journal_line, snapshot
 
 PUBLISHED = json.loads(schema.FILE.read_text(encoding="utf-8"))
@@ -38,6 +39,7 @@ def test_every_document_fits():
     full = snapshot(imus=[imu_view(1), imu_view(2)], journal=[journal_line(1)], diagnosis=diagnosis)
     validate("state", full.to_json())
     validate("state", snapshot(imus=[], system_id=None).to_json())
+    validate("summary", summary_message(full))
     validate("calibration", calibration_message(full))
     validate("diagnosis", document(diagnosis))
     validate("event", event_message(journal_line(1)))

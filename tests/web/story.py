@@ -228,7 +228,7 @@ def holding(held_back, *, approvable=False):
 DIAGNOSIS = {
     "schema": "onboard.explain/1",
     "verdict": "partly_explained",
-    "headline": "Physics is missing from the model; a part of it was found.",
+    "headline": "Something is missing from the model; a part of it has been found.",
     "severity": "warning",
     "recording": {"imu": 1},
     "mismatch": {

@@ -86,6 +86,11 @@ def sized(x: Sized, unit: str) -> str:
     return f"{_rounded(x.size, x.sigma, signed=True)} ± {_rounded(x.sigma, x.sigma)}{unit}"
 
 
+def known(x: Sized) -> str:
+    """A value and its sigma: ``0.9983 ± 0.0013``."""
+    return f"{_rounded(x.size, x.sigma)} ± {_rounded(x.sigma, x.sigma)}"
+
+
 def day(flight: Flight) -> str:
     """``2025-03-08``; empty where the recording does not say."""
     began = flight.record.provenance.began_unix_s
@@ -133,4 +138,5 @@ def _rounded(value: float, sigma: float, *, signed: bool = False) -> str:
     places = 3
     if math.isfinite(sigma) and sigma > 0.0:
         places = min(9, max(0, 1 - math.floor(math.log10(sigma))))
+    value = round(value, places) + 0.0  # no minus before zero
     return f"{value:+.{places}f}" if signed else f"{value:.{places}f}"

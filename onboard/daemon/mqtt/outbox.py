@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class Parcel(NamedTuple):
-    """One publication; ``topic`` is below the prefix."""
+    """One publication; ``topic`` is below the prefix, or a whole one after a stroke."""
 
     topic: str
     payload: bytes

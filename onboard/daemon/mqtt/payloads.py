@@ -4,6 +4,7 @@
 topic under prefix   retained  document
 ===================  ========  ==========================================================
 ``state``            yes       the snapshot (:class:`onboard.daemon.view.snapshot.Snapshot`)
+``summary``          yes       :class:`onboard.daemon.mqtt.summary.SummaryMessage`
 ``calibration``      yes       :class:`CalibrationMessage`
 ``diagnosis``        yes       what ``onboard explain --json`` writes
 ``event``            no        :class:`EventMessage`, one per journal entry

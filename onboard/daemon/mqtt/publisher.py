@@ -19,8 +19,10 @@ import aiomqtt
 
 from onboard.daemon.mqtt import limits
 from onboard.daemon.mqtt.commands import Commands
+from onboard.daemon.mqtt.home_assistant import discovery_message, discovery_topic
 from onboard.daemon.mqtt.outbox import Outbox, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
+from onboard.daemon.mqtt.summary import summary_message
 from onboard.daemon.mqtt.tls import tls_context
 from onboard.daemon.setup.configuration import MqttSettings
 from onboard.daemon.setup.secret_files import read_secret
@@ -114,6 +116,10 @@ class Publisher:
         if now >= self._next_state or self._closing.is_set():
             self._next_state = now + self._settings.state_interval_s
             self._outbox.retain("state", snapshot.to_json())
+            self._outbox.retain("summary", summary_message(snapshot))
+        if self._settings.discovery is not None and self._prefix:
+            there = discovery_topic(self._settings.discovery, self._prefix)
+            self._outbox.retain(f"/{there}", discovery_message(self._prefix, snapshot))
         self._outbox.retain("calibration", calibration_message(snapshot))
         if snapshot.diagnosis is not None:
             self._diagnosed = True
@@ -276,6 +282,9 @@ class Publisher:
         return f"{self._settings.host}:{self._settings.port}"
 
     def _topic(self, name: str) -> str:
+        """Below the prefix; what begins with a stroke is a whole topic."""
+        if name.startswith("/"):
+            return name[1:]
         return f"{self._prefix}/{name}"
 
     def _lost(self, reason: str) -> bool:

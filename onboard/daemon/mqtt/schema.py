@@ -22,12 +22,14 @@ from onboard.daemon.mqtt.payloads import (
     EventMessage,
     ReplyMessage,
 )
+from onboard.daemon.mqtt.summary import SUMMARY_SCHEMA, SummaryMessage
 from onboard.daemon.view.snapshot import SCHEMA, Snapshot
 
 FILE = Path(__file__).with_name("schema.json")
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 DOCUMENTS: dict[str, tuple[type[msgspec.Struct], str | None]] = {
     "state": (Snapshot, SCHEMA),
+    "summary": (SummaryMessage, SUMMARY_SCHEMA),
     "calibration": (CalibrationMessage, CALIBRATION_SCHEMA),
     "event": (EventMessage, EVENT_SCHEMA),
     "command": (CommandMessage, None),

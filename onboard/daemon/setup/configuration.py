@@ -193,7 +193,8 @@ class MqttSettings(Section, frozen=True, kw_only=True):
     """Broker to publish to; off by default.
 
     ``prefix`` is ``onboard/<system id>`` where none is given; ``state_interval_s`` is the time
-    between two publications of the whole state.
+    between two publications of the whole state.  ``discovery`` is the prefix of Home Assistant's
+    discovery (``homeassistant``); without it nothing is published there.
     """
 
     enabled: bool = False
@@ -201,6 +202,7 @@ class MqttSettings(Section, frozen=True, kw_only=True):
     port: Port = 1883
     prefix: Text | None = None
     commands: bool = False
+    discovery: Text | None = None
     state_interval_s: Annotated[float, Meta(ge=0.1, le=LARGEST)] = 2.0
     client_id: Text | None = None
     username: Text | None = None
@@ -220,6 +222,8 @@ class MqttSettings(Section, frozen=True, kw_only=True):
             raise ValueError("password_file needs a username")
         if self.prefix is not None and any(c in self.prefix for c in "+#\0"):
             raise ValueError("prefix must not contain + or #")
+        if self.discovery is not None and any(c in self.discovery for c in "+#\0"):
+            raise ValueError("discovery must not contain + or #")
 
 
 class Configuration(Section, frozen=True, kw_only=True):
