@@ -20,7 +20,7 @@ python3 -m venv "$work/tools"
 "$work/tools/bin/pip" --quiet --disable-pip-version-check install --no-compile --target "$home" .
 mkdir -p "$root/usr/share/zsh/vendor-completions" "$root/usr/share/doc/$name" "$root/usr/bin" \
     "$root/lib/systemd/system" "$root/etc/onboard" "$root/DEBIAN"
-mv "$home/share/man" "$home/share/bash-completion" "$home/share/fish" "$root/usr/share/"
+mv "$home/share/man" "$home/share/bash-completion" "$home/share/fish" "$home/share/onboard" "$root/usr/share/"
 mv "$home/share/zsh/site-functions/_onboard" "$root/usr/share/zsh/vendor-completions/"
 rm -rf "$home/share" "$home/bin"
 gzip -9n "$root/usr/share/man/man1/onboard.1"
