@@ -17,7 +17,7 @@ HEADLINES = {
     "clean": "Nothing is missing beyond the six numbers and the timing.",
     "explained": "Something was missing from the model; it has been found.",
     "partly_explained": "Something is missing from the model; a part of it has been found.",
-    "unexplained": "Something is missing from the model, and no known effect explains it.",
+    "unexplained": "Something is missing, and no known effect explains it.",
     "insufficient": "This flight cannot tell whether anything is missing.",
 }
 KNOWN_ALREADY = (

@@ -52,7 +52,7 @@ def test_what_is_not_known_is_not_made_up():
     assert "nan" not in text
     assert "inf" not in text.replace("information", "")
     assert "does not show enough" in text
-    assert "scale 1 and offset 0 are taken" in " ".join(text.split())
+    assert "scale 1 and offset 0 are assumed" in " ".join(text.split())
 
 
 def test_px4_gets_advice_without_parameters():

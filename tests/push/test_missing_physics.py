@@ -69,7 +69,7 @@ def test_a_clean_flight_forbids_nothing():
 def test_a_lever_arm_that_moves_a_number_past_its_claim_is_said_and_its_model_offered():
     found = judged(diagnosis(ARM, without=plain(3.8)))
     assert "antenna is 0.6 m away" in found.missing
-    assert "set GPS1_POS_X 0.6;" in found.missing
+    assert "first set GPS1_POS_X 0.6, then fly again" in found.missing
     assert "x scale by +0.0038, 3.8 sigma" in found.missing
     assert found.modelled
     assert found.calibration.status is Status.CALIBRATED

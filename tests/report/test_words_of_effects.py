@@ -72,7 +72,7 @@ def test_the_headline_names_what_was_found():
 def test_a_formula_without_a_name_is_no_finding():
     unnamed = effect("empirical", formula="throttle * w_z")
     d = diagnosis(verdict=Verdict.UNEXPLAINED, effects=(unnamed,))
-    assert "nothing known" in headline(d)
+    assert "no known effect" in headline(d)
     assert "throttle * w_z" in missing(d)[0]
 
 
