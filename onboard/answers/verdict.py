@@ -172,7 +172,7 @@ def _without_cure(diagnosis: Diagnosis) -> list[str]:
         return ["No parameter cures what was found."]
     if diagnosis.verdict is Verdict.CLEAN:
         return ["Nothing beyond the calibration itself."]
-    return ["Look at where the residual lives for a cause."]
+    return ["Look for a cause where the residual is largest."]
 
 
 def _named(effect: Finding, advice: Advice) -> str:

@@ -31,7 +31,7 @@ BEFORE: Final = "#a0560a"
 AFTER: Final = "#0a58a8"
 SHADES: Final = {"located": "#b45309", "interval": "#be123c", "onset": "#ac2018"}
 MEANINGS: Final = {
-    "located": "where the mismatch lives",
+    "located": "where the mismatch is largest",
     "interval": "time of an effect",
     "onset": "moment of a jump",
 }

@@ -116,8 +116,8 @@ def fleet(
 
     Each recording is replayed by itself.  A line says how far it shows each accelerometer, the
     largest change of an observed scale (%) and offset (m/s^2), and the velocity residual (m/s)
-    with the parameters in force and with the estimate.  A recording that cannot be read is told
-    of and the rest goes on; the exit status is then 2.
+    with the parameters in force and with the estimate.  A recording that cannot be read is
+    reported, and the others are done all the same; the exit status is then 2.
 
     Recordings of one vehicle, known by the serial number of its board, are then put together: what
     drifts, what has stepped between two flights, and which flights contradict the others.

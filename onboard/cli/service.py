@@ -41,15 +41,15 @@ def show(what: str) -> None:
 
 
 @service.command()
-@click.option("--root", default="/", metavar="DIR", help="Below another root, as of an image.")
+@click.option("--root", default="/", metavar="DIR", help="Write below this folder, for an image.")
 @click.option(
     "--token", is_flag=True, help="Make a secret for the status page, /etc/onboard/token."
 )
-@click.option("--force", is_flag=True, help="Write over a unit that was changed.")
+@click.option("--force", is_flag=True, help="Replace a unit that was changed.")
 def install(root: str, *, token: bool, force: bool) -> None:
-    """Write the unit and, where there is none, the configuration; then says how to go on.
+    """Write the unit and, if there is none, the configuration, and say what to do next.
 
-    Nothing is started.  A configuration or secret that is there stays as it is.
+    Nothing is started.  An existing configuration or secret stays as it is.
     """
     try:
         written = _install(Path(root), token=token, force=force)
@@ -74,7 +74,7 @@ def _install(root: Path, *, token: bool, force: bool) -> list[Path]:
     unit = _text(UNIT).replace(PROGRAM, _program())
     place = root / UNIT_PLACE
     if place.exists() and place.read_text(encoding="utf-8") != unit and not force:
-        raise UsageError(f"{place} is another one; --force writes over it")
+        raise UsageError(f"{place} exists and differs; --force replaces it")
     written = [_write(place, unit, 0o644)]
     if not (root / SAMPLE_PLACE).exists():
         written.append(_write(root / SAMPLE_PLACE, _text(SAMPLE), 0o644))

@@ -89,7 +89,7 @@ def test_an_effect_is_drawn_over_the_data_that_it_explains():
 def test_where_nothing_was_found_nothing_is_shaded(verdict):
     html, parsed = page(diagnosis(verdict=verdict, effects=()))
     assert "band located" not in html
-    assert "Where the mismatch lives" not in parsed.words
+    assert "Where the mismatch is largest" not in parsed.words
 
 
 def test_charts_say_in_words_what_they_show():
