@@ -2,7 +2,7 @@
    horizontal axis by dragging.  Without this script the page shows the same charts, still. */
 "use strict";
 (() => {
-  const WIDTH = 1000, HEIGHT = 300, LEAST_SHARE = 0.01, LEAST_DRAG_PX = 6, STEPS_PER_SPAN = 5;
+  const WIDTH = 1000, HEIGHT = 300, LEAST_SHARE = 0.01, LEAST_DRAG_PX = 6, STEPS_PER_SPAN = 5, GAP_STEPS = 4;
   const short = (value) => String(Number(value.toPrecision(4))).replace("-", "\u2212");
   const made = (parent, kind) => {
     const element = document.createElement("span");
@@ -21,7 +21,7 @@
     return out;
   };
 
-  /* Corners of a curve as they were drawn; gaps do not matter to whoever asks for the nearest. */
+  /* Corners of a curve as they were drawn. */
   const corners = (path) => path.getAttribute("d").split(/[ML]/).slice(1).map((c) => c.split(" ").map(Number));
   const nearest = (points, px) => {
     let low = 0, high = points.length - 1;
@@ -29,7 +29,10 @@
       const middle = (low + high) >> 1;
       if (points[middle][0] < px) low = middle; else high = middle;
     }
-    return px - points[low][0] < points[high][0] - px ? points[low] : points[high];
+    const found = px - points[low][0] < points[high][0] - px ? points[low] : points[high];
+    /* Further away than a few usual steps there is a gap, and nothing to read. */
+    const step = (points.at(-1)[0] - points[0][0]) / (points.length - 1);
+    return Math.abs(found[0] - px) <= GAP_STEPS * step ? found : null;
   };
 
   class Chart {
@@ -66,8 +69,8 @@
       this.at = share;
       const x = this.value(share), px = WIDTH * (x - this.x0) / (this.x1 - this.x0);
       const told = this.lines().map(([label, points]) => {
-        const y = this.y1 - nearest(points, px)[1] / HEIGHT * (this.y1 - this.y0);
-        return `${label} ${short(y)}`;
+        const found = nearest(points, px);
+        return `${label} ${found ? short(this.y1 - found[1] / HEIGHT * (this.y1 - this.y0)) : "\u2013"}`;
       });
       this.readout.textContent = [`${short(x / this.unitSize)} ${this.plot.dataset.unit}`, ...told].join(" \u00b7 ");
       this.cursor.style.left = `${100 * share}%`;

@@ -17,7 +17,12 @@ SLOPE = T / 100.0 - 3.0
 @pytest.fixture
 def charts(browser, tmp_path, monkeypatch):
     """Two charts of one time and one of something else, in a page of the reports' look."""
-    lines = [Line(T, SLOPE, "before", "before"), Line(T, 0.0 * T + 1.0, "after", "after")]
+    torn = np.where((T > 270.0) & (T < 330.0), np.nan, 2.0)
+    lines = [
+        Line(T, SLOPE, "before", "before"),
+        Line(T, 0.0 * T + 1.0, "after", "after"),
+        Line(T, torn, "bound", "torn"),
+    ]
     drawn = [line_chart(title, "m/s", lines) for title in ("North", "East")]
     x = np.linspace(20.0, 50.0, 31)
     drawn.append(
@@ -61,10 +66,18 @@ def marks(plot):
 @pytest.mark.parametrize("share", [0.1, 0.37, 0.9])
 def test_the_cursor_reads_what_was_drawn(browser, charts, share):
     point(browser, charts[0], share)
-    minutes, before, after = told(charts[0])
+    minutes, before, after, torn = told(charts[0])
     assert minutes == pytest.approx(share * 10.0, abs=0.05)  # a pixel or two of some 1100
     assert before == pytest.approx(minutes * 0.6 - 3.0, abs=0.03)
     assert after == pytest.approx(1.0, abs=0.03)
+    assert torn == pytest.approx(2.0, abs=0.03)
+
+
+@pytest.mark.slow
+def test_in_a_gap_there_is_nothing_to_read(browser, charts):
+    point(browser, charts[0], 0.5)
+    assert charts[0].find_element("css selector", ".readout").text.endswith("torn \u2013")
+    assert len(told(charts[0])) == 3
 
 
 @pytest.mark.slow
@@ -104,6 +117,6 @@ def test_the_hint_is_there_only_where_the_script_runs(browser, charts):
     try:
         browser.driver.refresh()
         assert not browser.element("#reading").is_displayed()
-        assert len(browser.elements(".plot path.line")) == 5
+        assert len(browser.elements(".plot path.line")) == 7
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
