@@ -35,7 +35,8 @@ class Candidate:
 
     def score(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """How surprising by chance what ``after``, the fit with the effect in, explains more."""
-        return surprise(fitter.gain(before, after), len(self.index), self.places)
+        gain = fitter.gain_by(self.index, before, after)
+        return surprise(gain.fall, len(self.index), self.places, gain.variance, gain.freedom)
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:

@@ -31,12 +31,11 @@ from onboard.core.diagnosis.records import (
 from onboard.core.diagnosis.regimes import (
     regime_residuals,
 )
-from onboard.core.diagnosis.score import least
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fit
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
-from onboard.core.maths.chi_square import survival
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
 from onboard.core.physics.effect import Effect, Origin
@@ -121,14 +120,13 @@ class Judge:
         self, before: Fit, after: Fit, effects: Sequence[Finding], ladder: Sequence[Rung]
     ) -> Mismatch:
         fitter = self.final.fitter
-        gain = fitter.gain(before, after)
-        added = (
-            len(timing_unknowns())
-            + len(constant_unknowns())
-            + len(self.engine.indices_of(self.final.families))
-        )
+        names = [*timing_unknowns(), *constant_unknowns()]
+        added = [self.final.index[n] for n in names]
+        added += self.engine.indices_of(self.final.families)
+        gain = fitter.gain_by(added, before, after)
         series = self.final.series(before.theta, after.theta)
-        p_value = survival(max(gain, 0.0), added)
+        score = surprise(gain.fall, len(added), variance=gain.variance, freedom=gain.freedom)
+        p_value = float(np.exp(-0.5 * score))
         return Mismatch(
             detected=p_value < FALSE_ALARM,
             whitened_rms_before=fitter.rms(before),
@@ -211,7 +209,7 @@ class Judge:
             index = list(c.index)
             rest = [i for i in self.choice.free if i not in index]
             fit = self.choice.fitter.fit([*rest, *index], held_out=False)
-            sigma = np.sqrt(np.diag(fit.covariance)[c.sizes])
+            sigma = np.sqrt(np.diag(self.choice.fitter.covariance(fit))[c.sizes])
             if np.all(sigma * np.sqrt(least()) > np.array(c.plausible)):
                 out.append(
                     NotTestable(

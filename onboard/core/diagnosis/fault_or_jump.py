@@ -11,7 +11,8 @@ import numpy as np
 
 from onboard.core.diagnosis.examination import VELOCITY, Examination
 from onboard.core.diagnosis.jumps import jump_near
-from onboard.core.diagnosis.limits import CLEARLY, FORGOTTEN_S, JUMP_SHARE
+from onboard.core.diagnosis.limits import CLEARLY, JUMP_SHARE
+from onboard.core.diagnosis.selection import settled_from
 from onboard.core.filter.refused import Refused
 from onboard.core.physics.finding import Finding
 
@@ -29,7 +30,7 @@ def refused_beside_a_jump(full: Examination, fault: Finding, t0: float) -> Refus
         the flight is not clearly likelier.
     """
     start = fault.intervals[0][0] + t0
-    if start < full.blocks[0].start + FORGOTTEN_S:
+    if start < settled_from(full.blocks):
         return None
     inside = [(stamp, VELOCITY[0]) for stamp in _stamps(full, fault, t0)]
     faulty = Refused([*inside, *full.refused_velocities().items()])

@@ -54,9 +54,7 @@ class FinalModel:
         self.clock = fix_clock(parameters, engine.batches)
         self.epochs = Epochs.of(engine.traces, engine.all_blocks, engine.model.size)
         self.solution = engine.found()
-        self.fitter = Fitter(
-            engine.all_blocks, engine.model, self.solution.variance_inflation, engine.absent
-        )
+        self.fitter = Fitter(engine.all_blocks, engine.model, engine.absent)
         self.index = engine.model.index
         self.all = list(range(engine.model.size))
         self._axes = self._body_axes()

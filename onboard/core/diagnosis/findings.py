@@ -123,7 +123,8 @@ class Findings:
         without, with_it = final.without(index, held)
         rest = [i for i in final.all if i not in index]
         theta = final.solution.theta
-        bic = final.fitter.gain(without, with_it) - len(index) * np.log(max(final.fitter.rows, 2.0))
+        gain = final.fitter.gain_by(index, without, with_it)
+        bic = gain.weakened - len(index) * final.fitter.log_rows
         return Finding(
             name=name,
             unknowns=quantities,

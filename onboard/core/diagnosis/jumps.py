@@ -22,7 +22,7 @@ from onboard.core.diagnosis.limits import (
     SPACINGS_S,
 )
 from onboard.core.diagnosis.score import least, surprise
-from onboard.core.diagnosis.selection import OFFSETS, Fitter
+from onboard.core.diagnosis.selection import OFFSETS, Fitter, settled_from
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
@@ -67,7 +67,7 @@ def jumps_at_blocks(full: Examination) -> list[tuple[float, float]]:
     over.  So each is gone through, some neighbours at once.  Not while an EKF that has just begun
     converges: its attitude jumps then.
     """
-    settled = full.blocks[0].start + FORGOTTEN_S
+    settled = settled_from(full.blocks)
     moments = [float(b.start) for b in full.blocks[1:] if b.start >= settled]
     jump = BiasStep(Origin(full.point.skew_from))
     out: list[tuple[float, float]] = []
@@ -130,7 +130,7 @@ def _best(
 ) -> BiasStep:
     jump = BiasStep(Origin(full.point.skew_from))
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
-    times = np.maximum(times, float(full.blocks[0].start) + FORGOTTEN_S)
+    times = np.maximum(times, settled_from(full.blocks))
     times = np.unique(times)
     jumps = [jump.at(float(t)) for t in times]
     return jumps[int(np.argmax(_gains(full, chosen, jumps)))]
@@ -160,7 +160,7 @@ def _gains(
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter([*far, *made.blocks], made.model, 1.0, absent)
+    fitter = Fitter([*far, *made.blocks], made.model, absent)
     slices = made.model.slices
     stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
     free = [i for i in range(made.model.size) if i not in stepped]

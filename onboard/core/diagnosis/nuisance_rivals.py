@@ -49,14 +49,13 @@ def _large(choice: Choice, full: Examination, calibrator: Calibrator, imu: int) 
     """Effects that are in every model, as large as they are in the model that was chosen."""
     fitter = choice.fitter
     fit = fitter.fit(choice.free, held_out=False)
-    solution = Solution(
-        fit.theta, fit.covariance, fitter.sums.N, fitter.variance_inflation, 1.0, 1.0
-    )
+    covariance = fitter.covariance(fit)
+    solution = Solution(fit.theta, covariance, fitter.sums.N, 1.0, 1.0, 1.0)
     return nuisance_effects(
         NuisanceFit(
             timing=timing_of(full, solution),
             theta=fit.theta,
-            sigma=np.sqrt(np.diag(fit.covariance)),
+            sigma=np.sqrt(np.diag(covariance)),
             index=fitter.model.index,
             point=full.point,
             parameters=calibrator.parameters,

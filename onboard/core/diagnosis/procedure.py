@@ -30,7 +30,6 @@ from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
-from onboard.core.estimate.solution import solve
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -145,16 +144,7 @@ def _chosen(
     kept: Sequence[Effect] = (),
 ) -> Choice:
     """Selection on the sums of the whole catalogue; ``kept`` are in it to begin with."""
-    solution = full.found()
-    fitter = Fitter(full.all_blocks, full.model, solution.variance_inflation, full.absent)
-    located = any(c.onset is not None for c in testable)
-    jumps = [] if located else fitter.jumps(list(range(full.model.size)))
-    if jumps and len(fitter.blocks) >= FEWEST_BLOCKS:
-        # Blocks that contradict each other because of a jump are no reason to doubt the jump.
-        wide = fitter.stepped(max(jumps, key=lambda x: x[1])[0])
-        fitter.variance_inflation = min(
-            fitter.variance_inflation, solve(wide.blocks, wide.model).variance_inflation
-        )
+    fitter = Fitter(full.all_blocks, full.model, full.absent)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
     candidates = [candidate_of(full, c) for c in testable]

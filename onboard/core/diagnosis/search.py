@@ -21,15 +21,12 @@ from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.empirical import products
 
 
-def searched(
-    final: Examination, families: Sequence[Effect], variance_inflation: float
-) -> list[Effect]:
+def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
     """The families, with a product added or put in the place of an impostor.
 
     Args:
         final: the model that was chosen.
         families: its physics.
-        variance_inflation: factor by which evidence is weakened.
     """
     named = [f for f in families if f.onset is None]
     contradicting = final.found().variance_inflation > by_chance(np.array(len(final.all_blocks)))
@@ -38,7 +35,7 @@ def searched(
     terms = products(final.batches, Origin(final.point.skew_from))
     made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
     made.once()
-    fitter = Fitter(made.all_blocks, made.model, variance_inflation, made.absent)
+    fitter = Fitter(made.all_blocks, made.model, made.absent)
     ours = set(made.indices_of([*families, *terms]))
     base = [i for i in range(made.model.size) if i not in ours]
     offered = [

@@ -2,21 +2,32 @@
 
 Every question is answered by algebra on the sums of the blocks of a flight, in which all
 columns were carried at once: gain in log-likelihood, gain on held-out blocks, size against
-sigma, plausibility.  Whitened rows have unit variance by the noise found *with every column in the
-model*; coloured residuals weaken all gains by a common factor.
+sigma, plausibility.  Whitened rows have unit variance by the noise found *with every column in
+the model*.  Where blocks contradict each other, a gain is weakened by how much they do along the
+columns that made it, with these in the model.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.limits import FORGOTTEN_S
-from onboard.core.estimate.limits import FOLDS
-from onboard.core.estimate.solution import solve, total
+from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
+from onboard.core.estimate.scatter import (
+    Pool,
+    Scatter,
+    Weighing,
+    directions_of,
+    scores_of,
+    stacked,
+)
+from onboard.core.estimate.solution import total
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -29,25 +40,40 @@ OFFSETS = (3, 4, 5)
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A fit of some columns: unknowns (m,) with zeros for the rest, misfit, held-out misfit."""
+    """A fit of the columns ``free``: all unknowns (m,), misfit, held-out misfit."""
 
     theta: Array
-    covariance: Array
+    free: tuple[int, ...]
     chi2: float
     held_out: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Fall of chi-square, and what a unit of it is worth.
+
+    Attributes:
+        fall: of chi-square.
+        variance: over what the sums say, along the columns that made it.
+        freedom: degrees of freedom with which it is known; infinite where all the flight is judged
+            by one.
+    """
+
+    fall: float
+    variance: float = 1.0
+    freedom: float = math.inf
+
+    @property
+    def weakened(self) -> float:
+        """In units of the variance there is, no less than what the sums say."""
+        return self.fall / max(self.variance, 1.0)
 
 
 class Fitter:
     """Fits subsets of columns of one set of blocks."""
 
-    def __init__(
-        self,
-        blocks: Sequence[Block],
-        model: Model,
-        variance_inflation: float,
-        absent: Array | None = None,
-    ) -> None:
-        """Take the blocks and the factor by which their information is weakened.
+    def __init__(self, blocks: Sequence[Block], model: Model, absent: Array | None = None) -> None:
+        """Take the blocks.
 
         ``absent`` (m,) are the values that mean *not in the model*: zero, but for what the
         linearisation has taken in already.
@@ -55,7 +81,6 @@ class Fitter:
         self.absent = np.zeros(model.size) if absent is None else absent
         self.blocks = list(blocks)
         self.model = model
-        self.variance_inflation = variance_inflation
         self.sums = total(self.blocks)
         self._prior = 1.0 / model.prior_sigma**2
         folds = np.array_split(np.arange(len(self.blocks)), min(FOLDS, len(self.blocks)))
@@ -73,16 +98,14 @@ class Fitter:
         Without ``held_out`` its held-out misfit is not a number: eight times cheaper.
         """
         at = (self.absent if held is None else held).copy()
-        theta, A = self._solve(self.sums, free, at)
+        theta = self._solve(self.sums, free, at)
         chi2 = self._penalised(self.sums, theta, free)
         out = 0.0 if held_out else float("nan")
         if held_out and len(self._folds) > 1:
             for fold in self._folds:
-                other, _ = self._solve(self.sums - fold, free, at)
+                other = self._solve(self.sums - fold, free, at)
                 out += fold.residual(other)
-        covariance = np.zeros_like(self.sums.N)
-        covariance[np.ix_(free, free)] = np.linalg.inv(A) * self.variance_inflation
-        return Fit(theta, covariance, chi2, out)
+        return Fit(theta, tuple(free), chi2, out)
 
     def held_fits(
         self, free: Sequence[int], held: Array | None = None
@@ -90,42 +113,83 @@ class Fitter:
         """Blocks of each fold, and the unknowns (m,) of a fit that has not seen them."""
         at = (self.absent if held is None else held).copy()
         pairs = zip(self._members, self._folds, strict=True) if len(self._folds) > 1 else ()
-        return [(members, self._solve(self.sums - fold, free, at)[0]) for members, fold in pairs]
+        return [(members, self._solve(self.sums - fold, free, at)) for members, fold in pairs]
 
-    def _solve(self, sums: NormalSums, free: Sequence[int], at: Array) -> tuple[Array, Array]:
+    def _solve(self, sums: NormalSums, free: Sequence[int], at: Array) -> Array:
         index = list(free)
         theta = at.copy()
         theta[index] = 0.0
-        A = (sums.N - sums.G)[np.ix_(index, index)] + np.diag(self._prior[index])
+        A = self._information(sums, index) + np.diag(self._prior[index])
         c = sums.b[index] - sums.N[index] @ theta + self._prior[index] * self.model.prior[index]
         theta[index] = np.linalg.solve(A, c)
-        return theta, A
+        return theta
+
+    @staticmethod
+    def _information(sums: NormalSums, index: list[int]) -> Array:
+        out: Array = (sums.N - sums.G)[np.ix_(index, index)]
+        return out
 
     def _penalised(self, sums: NormalSums, theta: Array, free: Sequence[int]) -> float:
         index = list(free)
         off = theta[index] - self.model.prior[index]
         return float(sums.residual(theta) + off @ (self._prior[index] * off))
 
-    def gain(self, before: Fit, after: Fit) -> float:
-        """Fall of chi-square, weakened."""
-        return (before.chi2 - after.chi2) / self.variance_inflation
+    @staticmethod
+    def gain(before: Fit, after: Fit) -> float:
+        """Fall of chi-square."""
+        return before.chi2 - after.chi2
 
-    def variance_inflation_of(self, free: Sequence[int]) -> float:
-        """How much blocks contradict each other in a model of ``free``, whole families each."""
-        within, slices = set(free), self.model.slices
-        columns = {
-            f.name: range(*slices[f.name].indices(self.model.size)) for f in self.model.families
-        }
-        families = [f for f in self.model.families if within.issuperset(columns[f.name])]
-        index = [i for f in families for i in columns[f.name]]
-        at = self.absent.copy()
-        at[index] = 0.0
-        blocks = [Block(p.start, p.end, p.sums.shifted(at).subset(index)) for p in self.blocks]
-        return solve(blocks, Model(families)).variance_inflation
+    def gain_by(self, columns: Sequence[int], before: Fit, after: Fit) -> Gain:
+        """The same by ``columns``, which ``after`` has, with the variance there is along them."""
+        return Gain(self.gain(before, after), *self._variance_of(after, columns))
 
-    def held_gain(self, before: Fit, after: Fit) -> float:
-        """Fall of held-out chi-square, weakened."""
-        return (before.held_out - after.held_out) / self.variance_inflation
+    @staticmethod
+    def held_gain(before: Fit, after: Fit) -> float:
+        """Fall of held-out chi-square."""
+        return before.held_out - after.held_out
+
+    def covariance(self, fit: Fit) -> Array:
+        """Covariance (m, m) of a fit, as blocks confirm it; zeros for what is not free."""
+        index = list(fit.free)
+        X, strength = directions_of(self._information(self.sums, index), self._prior[index])
+        V = self._scatter(fit).noise(X, strength, self.pool)
+        out = np.zeros_like(self.sums.N)
+        out[np.ix_(index, index)] = Weighing(X, strength, V).covariance()
+        return out
+
+    @cached_property
+    def pool(self) -> Pool:
+        """What variance the unknowns of this flight have, with every column in the model."""
+        everything = self.fit(range(self.model.size), held_out=False)
+        least = max(1.0, self.sums.residual(everything.theta) / max(self.rows, 1.0))
+        if len(self.blocks) < FEWEST_BLOCKS:
+            return Pool(least)
+        return self._scatter(everything).pool(self._prior, least)
+
+    @cached_property
+    def _stacked(self) -> tuple[Array, Array, Array]:
+        return stacked(self.blocks)
+
+    def _scatter(self, fit: Fit) -> Scatter:
+        """Scores of the blocks about a fit, in its own columns."""
+        index = list(fit.free)
+        N, b, gram = self._stacked
+        A = self._information(self.sums, index) + np.diag(self._prior[index])
+        scores = scores_of(N, b, gram, fit.theta)[:, index]
+        inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
+        return Scatter(N[:, index][:, :, index], scores, inverse)
+
+    def _variance_of(self, fit: Fit, columns: Sequence[int]) -> tuple[float, float]:
+        """Variance over what the sums say along some columns of a fit, and its freedom."""
+        if np.isinf(self.pool.freedom):
+            return self.pool.variance, self.pool.freedom
+        scatter = self._scatter(fit)
+        place = {column: k for k, column in enumerate(fit.free)}
+        back = scatter.inverse[:, [place[c] for c in columns]]
+        own = back[[place[c] for c in columns]]
+        # Directions in which the columns' own estimates are independent.
+        X = np.linalg.solve(np.linalg.cholesky(own), back.T).T
+        return self.pool.moderated(*scatter.within(X))
 
     def rms(self, fit: Fit) -> float:
         """Whitened root mean square of a fit."""
@@ -161,9 +225,7 @@ class Fitter:
             else:
                 sums.N[:m, :m], sums.b[:m] = p.sums.N, p.sums.b
             blocks.append(Block(p.start, p.end, sums))
-        return Fitter(
-            blocks, model, self.variance_inflation, np.concatenate([self.absent, np.zeros(3)])
-        )
+        return Fitter(blocks, model, np.concatenate([self.absent, np.zeros(3)]))
 
     def jumps(self, free: Sequence[int]) -> list[tuple[int, float]]:
         """Blocks at whose start a jump of the offsets would help: (block, gain).
@@ -178,7 +240,7 @@ class Fitter:
         at[index] = 0.0
         base = self.fit(index, held_out=False)
         shifted, after = self.sums.shifted(at), None
-        settled = self.blocks[0].start + FORGOTTEN_S
+        settled = settled_from(self.blocks)
         out = []
         for i in range(len(self.blocks) - 1, 0, -1):
             p = self.blocks[i].sums.shifted(at)
@@ -199,8 +261,16 @@ class Fitter:
             off = theta - mean
             N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
             chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
-            out.append((i, float(base.chi2 - chi2) / self.variance_inflation))
+            out.append((i, float(base.chi2 - chi2)))
         return out
+
+
+def settled_from(blocks: Sequence[Block]) -> float:
+    """When jumps may begin, s on the boot clock: when there is flight before them.
+
+    Not while an EKF that has begun with the autopilot converges: its attitude jumps then.
+    """
+    return max(blocks[0].end, FORGOTTEN_S)
 
 
 class _Jump(Family):

@@ -30,8 +30,7 @@ def settled(
         final = _again(full, families, final).with_rows()
     # A jump may have passed for something slower, or the other way round.
     final, families = _pruned(full, families, final)
-    inflation = choice.fitter.variance_inflation
-    wider = families if named_only else searched(final, families, inflation)
+    wider = families if named_only else searched(final, families)
     if wider != families:
         final = _again(full, wider, final).with_noise()
         final, families = _pruned(full, wider, final)
@@ -80,7 +79,8 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
     mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
     theirs = [model.index[final.model.unknowns[i].name] for i in mine]
     theta[mine] = fit.theta[theirs]
-    covariance[np.ix_(mine, mine)] = fit.covariance[np.ix_(theirs, theirs)]
+    known = choice.fitter.covariance(fit)
+    covariance[np.ix_(mine, mine)] = known[np.ix_(theirs, theirs)]
     return final.with_rows(theta, covariance)
 
 
@@ -97,13 +97,11 @@ def _again(full: Examination, families: Sequence[Effect], final: Examination) ->
 
 def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
     """Families that still count as found when all of them are in one model."""
-    fitter = Fitter(made.all_blocks, made.model, made.found().variance_inflation, made.absent)
+    fitter = Fitter(made.all_blocks, made.model, made.absent)
     kept = list(families)
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
     while kept:
         free = base + made.indices_of(kept)
-        # What a needless jump makes of the offsets must not weaken what is said for the others.
-        fitter.variance_inflation = fitter.variance_inflation_of(free)
         with_all = fitter.fit(free, held_out=False)
         worst, lowest = None, np.inf
         for family in kept:

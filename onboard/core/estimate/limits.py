@@ -81,6 +81,9 @@ GRAM_DOUBT: Final = 0.5
 [cost]."""
 FEWEST_BLOCKS: Final = 6
 """Fewer blocks do not tell a cluster's scatter [cost]."""
+FEWEST_FREEDOM: Final = 3.0
+"""Degrees of freedom below which the variance of Student's t is not told any more: at two it is
+infinite, at three three times the scale's [bound]."""
 ONE_IN_A_THOUSAND: Final = 3.09
 """Standard normal deviate that is exceeded once in a thousand times [probability]."""
 MOST_NOISE: Final = 0.9

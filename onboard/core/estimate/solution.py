@@ -1,9 +1,9 @@
 """From sums to numbers: estimate, honest covariance, held-out residuals.
 
 Whitened innovations are independent only as far as the noise model is right.  Residuals of real
-flights are correlated, so the inverse of the sums alone is optimistic.  The scatter of the score
-(``b_i - N_i theta``) over blocks of the flight says by how much (cluster-robust variance, Huber
-1967, White 1980; clustered by time), and the variance of the data is inflated by that factor.
+flights are correlated, so the inverse of the sums alone is optimistic.  By how much is told by how
+blocks of the flight contradict each other, and it differs from direction to direction
+(:mod:`~onboard.core.estimate.scatter`): the data weigh less along those that contradict themselves.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from onboard.core.estimate.limits import (
     MOST_NOISE,
     ONE_IN_A_THOUSAND,
 )
+from onboard.core.estimate.scatter import Scatter, Weighing, directions_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -34,8 +35,9 @@ class Solution:
     Attributes:
         theta: (m,) estimate with the prior.
         covariance: (m, m) of it, inflated for correlated residuals.
-        information: (m, m) of the data alone, divided by the same factor.
-        variance_inflation: factor on the variance of the data, at least 1.
+        information: (m, m) of the data alone, inflated likewise.
+        variance_inflation: factor on the variance of the six, or of the sum of them that blocks
+            contradict each other about most, at least 1.
         nis: mean normalised innovation squared at ``theta``; 1 if the noise model is right.
         rows: number of whitened innovations behind it.
     """
@@ -69,67 +71,47 @@ def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
 def solve(blocks: Sequence[Block], model: Model) -> Solution:
     """Maximum a posteriori estimate with a covariance that the residuals confirm."""
     sums = total(blocks)
-    prior = np.diag(1.0 / model.prior_sigma**2)
+    prior_information = 1.0 / model.prior_sigma**2
+    prior = np.diag(prior_information)
     G = _limited_gram(sums, prior)
-    share = np.divide(
-        np.diag(G), np.diag(sums.G), out=np.zeros(sums.size), where=np.diag(sums.G) > 0
-    )
     D = sums.N - G
-    theta = np.linalg.solve(D + prior, sums.b + prior @ model.prior)
+    inverse = np.asarray(np.linalg.inv(D + prior), dtype=np.float64)
+    theta = inverse @ (sums.b + prior_information * model.prior)
     nis = sums.residual(theta) / max(sums.rows, 1.0)
-    variance_inflation = max(1.0, nis, _cluster_factor(blocks, share, theta, D + prior, model))
-    A = D / variance_inflation + prior
-    theta = np.linalg.solve(A, sums.b / variance_inflation + prior @ model.prior)
-    inverse = np.linalg.inv(A)
+    X, strength = directions_of(D, prior_information)
+    V = np.eye(model.size) * max(1.0, nis)
+    if len(blocks) >= FEWEST_BLOCKS:
+        share = np.divide(
+            np.diag(G), np.diag(sums.G), out=np.zeros(sums.size), where=np.diag(sums.G) > 0
+        )
+        scatter = Scatter.of(blocks, theta, inverse, share)
+        V = scatter.noise(X, strength, scatter.pool(prior_information, max(1.0, nis)))
+    weighing = Weighing(X, strength, V)
+    posterior, weights = weighing.posterior, weighing.weights
+    theta = model.prior + X @ posterior @ weights @ X.T @ (sums.b - D @ model.prior)
     # Sandwich: the innovations carry D + G of information, of which G is not signal.
-    doubt = (GRAM_DOUBT * G) / variance_inflation
-    spread = (D + G) / variance_inflation + prior + doubt @ np.diag(theta**2) @ doubt
-    covariance = inverse @ spread @ inverse
-    middle = np.linalg.pinv(spread - prior, hermitian=True)
-    information = (D / variance_inflation) @ middle @ (D / variance_inflation)
+    half, doubt = weighing.halves @ X.T, weights @ X.T @ (GRAM_DOUBT * G * theta)
+    data = half @ (D + G) @ half.T + doubt @ doubt.T
+    covariance = X @ posterior @ (data + np.eye(model.size)) @ posterior @ X.T
+    back = weighing.information @ (X.T * prior_information)  # of X, its inverse
+    information = back.T @ np.linalg.pinv(data, hermitian=True) @ back
     return Solution(
         theta,
         (covariance + covariance.T) / 2,
         (information + information.T) / 2,
-        variance_inflation,
+        _inflation(model, weighing, strength),
         nis,
         sums.rows,
     )
 
 
-def _cluster_factor(
-    blocks: Sequence[Block], share: Array, theta: Array, A: Array, model: Model
-) -> float:
-    """How much wider the scatter of the blocks' scores is than the sums say.
-
-    It is the ratio of clustered to expected variance of each calibration parameter: their mean
-    while all could be one noise, else the largest, for an offset that changes half-way shows in
-    that offset alone.  What is expected of a block is less than its information, because the fit
-    has followed it.  A number that the data hardly move is as uncertain as the prior whatever they
-    say of it: its ratio counts for the share of its variance that comes from the data.  1 while
-    there are fewer than :data:`~onboard.core.estimate.limits.FEWEST_BLOCKS`.
-    """
-    if len(blocks) < FEWEST_BLOCKS or "six" not in model.slices:
-        return 1.0
-    six = model.slices["six"]
-    back = np.linalg.inv(A)[six]
-    found, expected = np.zeros((2, len(blocks), len(back)))
-    for i, p in enumerate(blocks):
-        N = p.sums.N
-        score = p.sums.b - (N - np.diag(share * np.diag(p.sums.G))) @ theta
-        found[i] = (back @ score) ** 2
-        followed = N - N @ np.linalg.solve(A, N)
-        expected[i] = np.einsum("ij,jk,ik->i", back, followed, back)
-    expected = np.maximum(expected, 0.0)
-    sum_expected = np.maximum(expected.sum(axis=0), 1e-30)
-    ratio = found.sum(axis=0) / sum_expected
-    # Blocks that say nothing of a number do not count for it (Satterthwaite 1946).
-    blocks_that_count = sum_expected**2 / np.maximum((expected**2).sum(axis=0), 1e-60)
-    beyond = ratio > by_chance(blocks_that_count)
-    if not beyond.any():
-        return float(ratio.mean())
-    from_data = np.minimum(sum_expected / np.diag(back[:, six]), 1.0)
-    return float((1.0 + (ratio - 1.0) * from_data)[beyond].max())
+def _inflation(model: Model, weighing: Weighing, strength: Array) -> float:
+    """By how much the variance of the six, or of any sum of them, is inflated at the most."""
+    six = weighing.X[model.slices.get("six", slice(None))]
+    plain = (six / (np.maximum(strength, 0.0) + 1.0)) @ six.T
+    inflated = six @ weighing.posterior @ six.T
+    root = np.linalg.inv(np.linalg.cholesky(plain))
+    return float(np.linalg.eigvalsh(root @ inflated @ root.T).max())
 
 
 def by_chance(n: Array) -> Array:

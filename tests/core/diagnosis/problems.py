@@ -45,9 +45,9 @@ class Problem:
             out.append(Block(BLOCK_S * i, BLOCK_S * (i + 1), sums))
         return out
 
-    def fitter(self, inflation: float = 1.0, absent: np.ndarray | None = None) -> Fitter:
+    def fitter(self, absent: np.ndarray | None = None) -> Fitter:
         """What is tested."""
-        return Fitter(self.blocks, self.model, inflation, absent)
+        return Fitter(self.blocks, self.model, absent)
 
     def columns(self, name: str) -> tuple[int, ...]:
         """Places of a family's unknowns."""

@@ -10,6 +10,7 @@ from onboard.core.diagnosis.candidates import Candidate, accepted
 from onboard.core.diagnosis.hypotheses import choose, confounders_of
 from onboard.core.diagnosis.limits import MOST_EFFECTS
 from onboard.core.diagnosis.score import least, surprise
+from onboard.core.estimate.scatter import Pool
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
 
 WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}
@@ -37,8 +38,8 @@ def candidates(problem, names=WIDTHS):
     return [Candidate(n, problem.columns(n), (5.0,) * len(problem.columns(n))) for n in names]
 
 
-def chosen(problem, names=WIDTHS, inflation=1.0):
-    choice = choose(problem.fitter(inflation), list(range(6)), candidates(problem, names))
+def chosen(problem, names=WIDTHS):
+    choice = choose(problem.fitter(), list(range(6)), candidates(problem, names))
     return {c.effect for c in choice.chosen}
 
 
@@ -110,14 +111,11 @@ def test_no_more_than_the_limit_is_taken():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "inflation"), [(1.0, 1.0), (2.0, 4.0)])
-def test_of_noise_nothing_is_made(noise, inflation):
+@pytest.mark.parametrize("noise", [1.0, 2.0])
+def test_of_noise_nothing_is_made(noise):
     """Asked of six effects and seven jumps, each found as seldom as one of all the catalogue."""
     rng = np.random.default_rng(17)
-    found = sum(
-        bool(chosen(made(rng, noise=noise, blocks=8, rows=40), inflation=inflation))
-        for _ in range(DRAWS)
-    )
+    found = sum(bool(chosen(made(rng, noise=noise, blocks=8, rows=40))) for _ in range(DRAWS))
     # A thousandth of the flights may: of these, more than one are a fault.
     assert found <= 1
 
@@ -163,7 +161,7 @@ def test_a_jump_of_the_offsets_competes_and_is_placed():
     (jump,) = (c for c in choice.chosen if c.jump)
     assert {c.effect for c in choice.chosen} == {"d", jump.effect}
     fit = choice.fitter.fit(choice.free)
-    sigma = np.sqrt(np.diag(fit.covariance)[list(jump.index)])
+    sigma = np.sqrt(np.diag(choice.fitter.covariance(fit))[list(jump.index)])
     off = np.abs(fit.theta[list(jump.index)] - [0.8, -0.5, 0.6])
     assert np.all(off < 4.0 * sigma)
 
@@ -184,7 +182,8 @@ def test_a_score_that_chance_reaches_is_not_enough():
     c = candidates(problem)[0]
     for weakened in (1.0, 0.99, 1.01):
         inflation = weakened * gain_of(problem, c) / gain_at(least(), len(c.index))
-        fitter = problem.fitter(inflation)
+        fitter = problem.fitter()
+        fitter.pool = Pool(inflation)
         before, after = fitter.fit(range(6)), fitter.fit([*range(6), *c.index])
         if weakened != 1.0:
             assert accepted(fitter, before, after, c) == (weakened < 1.0)
@@ -218,6 +217,9 @@ def test_what_gains_in_one_part_of_the_flight_alone_does_not_hold():
     wild = Problem(problem.model, problem.h, y)
     fitter, (c, *_) = wild.fitter(), candidates(wild)
     before, after = fitter.fit(range(6)), fitter.fit([*range(6), *c.index])
+    # Blocks contradict each other about that column, so that it gains little.
+    assert c.score(fitter, before, after) < least()
+    fitter.pool = Pool(1.0)
     assert c.score(fitter, before, after) > least()
     # The fit that has not seen that block fits it no better, all others fit theirs worse.
     assert fitter.held_gain(before, after) < 0.0
@@ -254,7 +256,9 @@ def test_twins_confound_each_other_and_what_acts_beside_does_not():
     twins = Problem(problem.model, h, problem.y)
     target, *others = candidates(twins)
     # f has as much evidence, but it is not the same evidence.
-    (only,) = confounders_of(twins.fitter(), range(6), target, others)
+    fitter = twins.fitter()
+    fitter.pool = Pool(1.0)
+    (only,) = confounders_of(fitter, range(6), target, others)
     assert only.name == "d"
     at = np.zeros(twins.model.size)
     chi2 = [least_squares(twins, [*range(6), i], at)[1] for i in (a, d)]

@@ -5,14 +5,13 @@ import pytest
 
 from onboard.core.diagnosis.selection import FORGOTTEN_S, OFFSETS, Fitter
 from onboard.core.estimate.limits import FOLDS
-from onboard.core.estimate.solution import solve
+from onboard.core.estimate.scatter import Pool
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model, Unknown
 from onboard.core.physics.effects.bias_step import LARGEST
 from tests.core.diagnosis.problems import BLOCK_S, Columns, Problem, drawn, least_squares
 
-INFLATION = 2.5
 JUMP_SIGMA = LARGEST
 
 
@@ -35,22 +34,25 @@ SUBSETS = [range(6), [*range(6), 9], [9, 2, 5, 6, 7, 8, 0], range(12)]
 
 @pytest.mark.parametrize("free", SUBSETS)
 def test_a_subset_is_fitted_as_dense_least_squares_fits_it(problem, absent, free):
-    fit = problem.fitter(INFLATION, absent).fit(free)
+    fitter = problem.fitter(absent)
+    fit = fitter.fit(free)
     theta, chi2, covariance = least_squares(problem, free, absent)
     np.testing.assert_allclose(fit.theta, theta, rtol=1e-9, atol=1e-12)
     assert fit.chi2 == pytest.approx(chi2, rel=1e-9)
     index = list(free)
-    got = fit.covariance[np.ix_(index, index)]
-    np.testing.assert_allclose(got, INFLATION * covariance, rtol=1e-8, atol=1e-14)
+    fitter.pool = Pool(1.0)  # noise that is as the sums say
+    everything = fitter.covariance(fit)
+    got = everything[np.ix_(index, index)]
+    np.testing.assert_allclose(got, covariance, rtol=1e-8, atol=1e-14)
     rest = np.setdiff1d(np.arange(problem.model.size), index)
-    assert not fit.covariance[rest].any()
+    assert not everything[rest].any()
     np.testing.assert_array_equal(fit.theta[rest], absent[rest])
 
 
 def test_what_is_not_fitted_stays_where_it_is_held(problem, absent):
     free, held = [*range(6), 9], absent + 0.2
     theta, chi2, _ = least_squares(problem, free, held)
-    fit = problem.fitter(1.0, absent).fit(free, held)
+    fit = problem.fitter(absent).fit(free, held)
     np.testing.assert_allclose(fit.theta, theta, rtol=1e-9)
     assert fit.chi2 == pytest.approx(chi2, rel=1e-9)
 
@@ -79,7 +81,7 @@ def test_held_out_rows_are_those_of_folds_that_the_fit_has_not_seen(blocks):
 
 
 def test_one_block_holds_nothing_out(problem):
-    alone = Fitter(problem.blocks[:1], problem.model, 1.0)
+    alone = Fitter(problem.blocks[:1], problem.model)
     assert alone.fit(range(6)).held_out == 0.0
     assert alone.held_fits(range(6)) == []
     assert np.isnan(problem.fitter().fit(range(6), held_out=False).held_out)
@@ -88,7 +90,7 @@ def test_one_block_holds_nothing_out(problem):
 def test_gain_is_the_quadratic_form_of_what_the_new_columns_take_up(problem, absent):
     """Without a second fit: Frisch and Waugh's residuals of the new columns on the old ones."""
     base, new = list(range(6)), [6, 7, 8]
-    fitter = problem.fitter(INFLATION, absent)
+    fitter = problem.fitter(absent)
     gain = fitter.gain(fitter.fit(base), fitter.fit([*base, *new]))
     h, y = problem.rows
     model = problem.model
@@ -107,25 +109,23 @@ def test_gain_is_the_quadratic_form_of_what_the_new_columns_take_up(problem, abs
     D, r = left(added), left(after)
     taken = r @ D @ np.linalg.solve(D.T @ D, D.T @ r)
     expected = left(before) @ left(before) - (r @ r - taken)
-    assert gain == pytest.approx(expected / INFLATION, rel=1e-8)
+    assert gain == pytest.approx(expected, rel=1e-8)
 
 
 def test_a_column_whose_absent_value_is_its_priors_centre_never_loses(problem):
     at = problem.model.prior.copy()
-    fitter = problem.fitter(1.0, at)
+    fitter = problem.fitter(at)
     before = fitter.fit(range(6))
     gains = [fitter.gain(before, fitter.fit([*range(6), *new])) for new in ([6], [6, 7], [6, 7, 9])]
     assert 0.0 <= gains[0] <= gains[1] <= gains[2]
 
 
 def test_held_gain_and_residuals_are_in_the_units_of_whitened_rows(problem):
-    fitter = problem.fitter(INFLATION)
+    fitter = problem.fitter()
     small, large = fitter.fit(range(6)), fitter.fit(range(12))
     h, y = problem.rows
     assert fitter.rms(large) == pytest.approx(np.sqrt(np.mean((y - h @ large.theta) ** 2)))
-    assert fitter.held_gain(small, large) == pytest.approx(
-        (small.held_out - large.held_out) / INFLATION
-    )
+    assert fitter.held_gain(small, large) == pytest.approx(small.held_out - large.held_out)
     assert fitter.log_rows == pytest.approx(np.log(len(y)))
 
 
@@ -141,7 +141,7 @@ def test_known_noise_in_the_regressors_does_not_weaken_an_estimate():
     blocks = noisy.blocks
     for block in blocks:
         block.sums.G[6, 6] = h.shape[1] * sigma**2
-    kept = Fitter(blocks, clean.model, 1.0).fit(range(7)).theta[6]
+    kept = Fitter(blocks, clean.model).fit(range(7)).theta[6]
     weakened = noisy.fitter().fit(range(7)).theta[6]
     assert weakened == pytest.approx(2.0 / (1.0 + sigma**2), rel=0.03)
     assert kept == pytest.approx(2.0, rel=0.03)
@@ -161,7 +161,7 @@ def jumped(problem, boundary):
 
 @pytest.mark.parametrize("boundary", [1, 4, 9])
 def test_stepped_sums_are_those_of_regressors_that_begin_at_the_block(problem, absent, boundary):
-    stepped = problem.fitter(INFLATION, absent).stepped(boundary)
+    stepped = problem.fitter(absent).stepped(boundary)
     written = jumped(problem, boundary)
     wide = np.concatenate([absent, np.zeros(3)])
     np.testing.assert_array_equal(stepped.absent, wide)
@@ -178,14 +178,14 @@ def test_stepped_sums_are_those_of_regressors_that_begin_at_the_block(problem, a
 
 @pytest.mark.parametrize("free", [range(6), [*range(6), 6, 7, 8, 9]])
 def test_jumps_are_scored_as_if_each_had_been_fitted(problem, absent, free):
-    scored = problem.fitter(INFLATION, absent).jumps(free)
+    scored = problem.fitter(absent).jumps(free)
     settled = [i for i in range(1, len(problem.y)) if BLOCK_S * i >= FORGOTTEN_S]
     assert sorted(i for i, _ in scored) == settled
     without = least_squares(problem, free, absent)[1]
     wide = np.concatenate([absent, np.zeros(3)])
     for boundary, gain in scored:
         chi2 = least_squares(jumped(problem, boundary), [*free, 12, 13, 14], wide)[1]
-        assert gain == pytest.approx((without - chi2) / INFLATION, rel=1e-7, abs=1e-7)
+        assert gain == pytest.approx(without - chi2, rel=1e-7, abs=1e-7)
 
 
 def test_jumps_and_stepped_agree_where_regressors_are_noisy(problem):
@@ -193,7 +193,7 @@ def test_jumps_and_stepped_agree_where_regressors_are_noisy(problem):
     rng = np.random.default_rng(8)
     for block in blocks:
         block.sums.G[:3, :3] = np.diag(rng.uniform(0.5, 2.0, 3))
-    fitter = Fitter(blocks, problem.model, INFLATION)
+    fitter = Fitter(blocks, problem.model)
     free = list(range(7))
     before = fitter.fit(free)
     for boundary, gain in fitter.jumps(free):
@@ -210,44 +210,63 @@ def test_a_jump_gains_most_where_it_is(problem):
     best = max(moved.jumps(free), key=lambda x: x[1])
     assert best[0] == at
     fit = moved.stepped(at).fit([*free, 12, 13, 14])
-    sigma = np.sqrt(np.diag(fit.covariance)[12:])
+    sigma = np.sqrt(np.diag(moved.stepped(at).covariance(fit))[12:])
     assert np.all(np.abs(fit.theta[12:] - size) < 4.0 * sigma)
 
 
 # -- how much blocks contradict each other ----------------------------------------------------
 
 
-def test_contradiction_is_asked_of_whole_families_alone(problem, absent):
-    fitter = problem.fitter(1.0, absent)
-    index = [*range(6), 9]
-    at = absent.copy()
-    at[index] = 0.0
-    y = problem.y - problem.h @ at
-    alone = Problem(Model([problem.model.families[i] for i in (0, 2)]), problem.h[..., index], y)
-    expected = solve(alone.blocks, alone.model).variance_inflation
-    # Two of the three columns of a family are none of it.
-    assert fitter.variance_inflation_of([*index, 6, 7]) == pytest.approx(expected)
-
-
-def test_blocks_contradict_each_other_only_without_what_tells_them_apart():
-    rng = np.random.default_rng(3)
+def contradicting(seed=3):
+    """What the last unknown does looks like the first offset, each block with its own sign."""
+    rng = np.random.default_rng(seed)
     theta = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
     p = drawn(rng, [Columns("a", 1)], theta, blocks=12, rows=100)
     h = p.h.copy()
-    # What the last unknown does looks like the first offset, each block with its own sign.
     h[..., 6] = 0.7 * h[..., 3] * np.where(np.arange(12) % 2, 1.0, -1.0)[:, None]
-    made = Problem(p.model, h, h @ theta + rng.normal(size=p.y.shape)).fitter()
-    assert made.variance_inflation_of(range(6)) > 5.0
-    assert made.variance_inflation_of(range(7)) < 2.0
+    return Problem(p.model, h, h @ theta + rng.normal(size=p.y.shape))
+
+
+def test_blocks_contradict_each_other_only_without_what_tells_them_apart():
+    problem = contradicting()
+    told = problem.fitter()
+    assert told.pool.variance < 1.5
+    six = [Problem(Model([problem.model.families[0]]), problem.h[..., :6], problem.y)]
+    untold = six[0].fitter()
+    assert untold.pool.freedom < 20.0
+    fit = untold.fit(range(6))
+    plain = np.linalg.inv(untold.sums.N)
+    inflated = np.diag(untold.covariance(fit)) / np.diag(plain)
+    # The offset that is pulled to and fro, and no other number of the flight.
+    assert inflated[3] > 20.0
+    assert np.all(np.delete(inflated, 3) < 5.0)
+
+
+def test_a_gain_is_weakened_by_what_contradicts_it_and_not_by_what_else_does():
+    """Two effects explain as much; along one of them blocks scatter."""
+    rng = np.random.default_rng(8)
+    blocks, rows = 20, 80
+    p = drawn(rng, [Columns("a", 1), Columns("b", 1)], np.zeros(8), blocks=blocks, rows=rows)
+    wild = 0.5 * rng.normal(size=(blocks, 1))
+    y = rng.normal(size=p.y.shape) + 0.3 * p.h[..., 7] + (0.3 + wild) * p.h[..., 6]
+    fitter = Problem(p.model, p.h, y).fitter()
+    after = fitter.fit(range(8))
+    worth = [
+        fitter.gain_by([i], fitter.fit([k for k in range(8) if k != i]), after) for i in (6, 7)
+    ]
+    assert worth[0].variance > 5.0 * worth[1].variance
+    # As much as the unknown's variance between blocks makes of it: 80 rows of unit columns.
+    assert worth[0].variance == pytest.approx(1.0 + rows * 0.25, rel=0.6)
+    assert worth[1].variance < 3.0
 
 
 def test_it_takes_blocks_as_they_are(problem):
     before = [NormalSums.to_bytes(p.sums) for p in problem.blocks]
     blocks = problem.blocks
-    fitter = Fitter(blocks, problem.model, 1.0)
+    fitter = Fitter(blocks, problem.model)
     fitter.fit(range(12))
     fitter.jumps(range(6))
     fitter.stepped(3)
-    fitter.variance_inflation_of(range(6))
+    fitter.covariance(fitter.fit(range(6)))
     assert all(isinstance(p, Block) for p in blocks)
     assert [p.sums.to_bytes() for p in blocks] == before
