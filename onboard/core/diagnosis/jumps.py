@@ -19,6 +19,7 @@ from onboard.core.diagnosis.limits import (
     FORGOTTEN_S,
     FURTHEST,
     LARGEST_TURN,
+    SCAN_S,
     SPACINGS_S,
 )
 from onboard.core.diagnosis.score import least, surprise
@@ -60,15 +61,13 @@ class Shock(Family):
         return on_axes(np.repeat(inside[..., None], 3, axis=-1))
 
 
-def jumps_at_blocks(full: Examination) -> list[tuple[float, float]]:
-    """Moment (s) and gain of a jump at the start of each block, beside nothing of the catalogue.
+def jumps_anywhere(full: Examination) -> list[tuple[float, float]]:
+    """Moment (s) and gain of a jump at moments all over the flight, beside nothing else.
 
     What shows a jump forwards or sideways is the half minute after it: then the tilt has taken it
-    over.  So each is gone through, some neighbours at once.  Not while an EKF that has just begun
-    converges: its attitude jumps then.
+    over.  So each is gone through, some neighbours at once.
     """
-    settled = settled_from(full.blocks)
-    moments = [float(b.start) for b in full.blocks[1:] if b.start >= settled]
+    moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
     jump = BiasStep(Origin(full.point.skew_from))
     out: list[tuple[float, float]] = []
     for i in range(0, len(moments), AT_ONCE):

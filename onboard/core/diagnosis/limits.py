@@ -42,7 +42,10 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
-AT_ONCE: Final = 6
+SCAN_S: Final = 4.0
+"""s between the moments at which a jump is looked for: 3 s from where it is it explains half
+[physics: the time in which GPS corrects a velocity]."""
+AT_ONCE: Final = 12
 """Jumps in one pass of the search [cost: more columns against more flight around them]."""
 CONTACT_S: Final = 10.0
 """s before the end of a flight in which the ground may have been touched: bounces, and the seconds

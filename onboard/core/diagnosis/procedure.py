@@ -18,7 +18,7 @@ from onboard.core.diagnosis.jumps import (
     candidate_of,
     explains,
     jump_near,
-    jumps_at_blocks,
+    jumps_anywhere,
     shock_instead,
 )
 from onboard.core.diagnosis.limits import FURTHEST
@@ -124,7 +124,7 @@ def _jump(full: Examination, choice: Choice) -> BiasStep | None:
     """
     if len(full.blocks) < FEWEST_BLOCKS:
         return None
-    places = jumps_at_blocks(full)
+    places = jumps_anywhere(full)
     if not places:
         return None
     moment, gain = max(places, key=lambda x: x[1])
