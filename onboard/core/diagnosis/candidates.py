@@ -34,14 +34,22 @@ class Candidate:
         return list(self.index[: len(self.plausible)])
 
     def score(self, fitter: Fitter, before: Fit, after: Fit) -> float:
-        """How surprising by chance what ``after``, the fit with the effect in, explains more."""
+        """How surprising by chance what ``after``, the fit with the effect in, explains more.
+
+        Where both have been tried on flight that they were not fitted to, it is no more evidence
+        than what it explains there.  An unknown that is not needed costs as much there as it
+        brings in the fit, so twice the variance is given back for each (Akaike 1974, Stone 1977).
+        """
+        unknowns = len(self.index)
         gain = fitter.gain_by(self.index, before, after)
-        return surprise(gain.fall, len(self.index), self.places, gain.variance, gain.freedom)
+        there = fitter.held_gain(before, after) + 2.0 * unknowns * max(gain.variance, 1.0)
+        fall = gain.fall if np.isnan(there) else min(gain.fall, there)
+        return surprise(fall, unknowns, self.places, gain.variance, gain.freedom)
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
-    if c.score(fitter, before, after) < least() or fitter.held_gain(before, after) <= 0.0:
+    if c.score(fitter, before, after) < least():
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if np.any(np.abs(value) > np.array(c.plausible)):

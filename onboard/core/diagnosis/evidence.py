@@ -183,10 +183,7 @@ class Judge:
             close = [r.name for r in e.confounders if r.delta_bic < CLEARLY and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
-            if (
-                e.name in nuisance_kinds()
-                and self.final.evidence(e.name, self.final.all)[0] < least()
-            ):
+            if e.name in nuisance_kinds() and self.final.score(e.name, self.final.all) < least():
                 # It holds only with the antenna where it was told to be.
                 out += [
                     Ambiguity((e.name, k.effect), k.apart)

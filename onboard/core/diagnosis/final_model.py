@@ -122,13 +122,13 @@ class FinalModel:
         rest = [i for i in self.all if i not in index]
         return self.fitter.fit(rest, held), self.fitter.fit(self.all)
 
-    def evidence(self, name: str, among: Sequence[int]) -> tuple[float, float]:
-        """Score, and fall of held-out chi-square, of timing or a constant attitude error."""
+    def score(self, name: str, among: Sequence[int]) -> float:
+        """Of timing or a constant attitude error, beside the other columns ``among``."""
         columns = nuisance_kinds()[name].in_every_model
         target = Candidate(name, tuple(self.index[c] for c in columns), ())
         rest = [i for i in among if i not in target.index]
         absent, with_it = self.fitter.fit(rest, self.held(columns)), self.fitter.fit(among)
-        return target.score(self.fitter, absent, with_it), self.fitter.held_gain(absent, with_it)
+        return target.score(self.fitter, absent, with_it)
 
     @staticmethod
     def share(without: Fit, with_it: Fit) -> float:

@@ -60,8 +60,7 @@ class Findings:
         """
         final = self._final
         among = (final.all, final.with_configured_antenna())
-        every = (final.evidence(name, columns) for columns in among)
-        return any(score >= least() and held > 0.0 for score, held in every)
+        return any(final.score(name, columns) >= least() for columns in among)
 
     def _nuisance_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""

@@ -167,13 +167,12 @@ def _reconsider(choice: Choice) -> None:
     fitter = choice.fitter
     for c in list(choice.chosen[:-1]):
         rest = [i for i in choice.free if i not in c.index]
-        before = fitter.fit(rest, held_out=False)
-        score = c.score(fitter, before, fitter.fit([*rest, *c.index], held_out=False))
+        before = fitter.fit(rest)
+        score = c.score(fitter, before, fitter.fit([*rest, *c.index]))
         if score < least():
             choice.chosen.remove(c)
             continue
         better, most = c, score + CLEARLY
-        before = fitter.fit(rest)
         for other in choice.candidates:
             if other not in choice.chosen:
                 after = fitter.fit([*rest, *other.index])

@@ -102,12 +102,12 @@ def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]
     while kept:
         free = base + made.indices_of(kept)
-        with_all = fitter.fit(free, held_out=False)
+        with_all = fitter.fit(free)
         worst, lowest = None, np.inf
         for family in kept:
             c = candidate_of(made, family)
             rest = [i for i in free if i not in c.index]
-            score = c.score(fitter, fitter.fit(rest, held_out=False), with_all)
+            score = c.score(fitter, fitter.fit(rest), with_all)
             if score < lowest:
                 worst, lowest = family, score
         if lowest >= least():
