@@ -57,7 +57,8 @@ def said(judge: Judge) -> Said:
             numbers.setdefault(f"{effect.name}.{key}", (q.value, q.sigma))
     names = frozenset(e.name for e in diagnosis.effects)
     blind = frozenset(n.name for n in diagnosis.not_testable)
-    return Said(diagnosis.verdict.value, names, numbers, blind)
+    smallest = {f"{u.name}.{key}": x for u in diagnosis.unseen for key, x in u.smallest.items()}
+    return Said(diagnosis.verdict.value, names, numbers, blind, smallest)
 
 
 def flown(flight: RealFlight, kinds: Sequence[Kind], imu: int = 1) -> list[Outcome]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from benchmarks.real.concealed_kind import Kind
 from onboard.core.diagnosis.records import Verdict
@@ -23,12 +23,14 @@ class Said:
         names: effects that were said.
         numbers: value and sigma by name, those of effects as ``effect.unknown``.
         blind: effects that the flight is said not to show.
+        smallest: sizes from which what was not said would have been, by ``effect.unknown``.
     """
 
     verdict: str
     names: frozenset[str]
     numbers: Mapping[str, tuple[float, float]]
     blind: frozenset[str] = frozenset()
+    smallest: Mapping[str, float] = field(default_factory=dict)
 
     def values(self) -> dict[str, float]:
         """Without sigmas."""
@@ -127,6 +129,7 @@ def compared(
         old = before.numbers.get(name, (0.0, 0.0))[0]
         new, sigma = after.numbers.get(name, (0.0, 0.0))
         hidden = name.split(".")[0] in after.blind or after.verdict == SILENT
+        hidden = hidden or abs(value - old) < after.smallest.get(name, 0.0)
         changes.append(
             Change(name, value - old, new - old, sigma, name in after.numbers, hidden=hidden)
         )

@@ -124,6 +124,14 @@ class RungDocument(msgspec.Struct, frozen=True, kw_only=True):
     held_out_velocity_rms_m_s: float | None
 
 
+class UnseenDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """An effect that was looked for and not found: sizes that this flight would have shown."""
+
+    name: str
+    smallest: dict[str, float]
+    unit: str
+
+
 class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
     """What was read."""
 
@@ -154,6 +162,7 @@ class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
     not_testable: list[NotTestableDocument]
     ladder: list[RungDocument]
     unused: list[UnusedDocument]
+    not_seen: list[UnseenDocument]
     advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
     schema: str = EXPLAIN_SCHEMA
 
@@ -193,6 +202,9 @@ def explain_document(
         not_testable=not_testable_documents(diagnosis.not_testable),
         ladder=[_rung(rung) for rung in diagnosis.ladder],
         unused=[_unused(stretch) for stretch in diagnosis.unused],
+        not_seen=[
+            UnseenDocument(name=u.name, smallest=u.smallest, unit=u.unit) for u in diagnosis.unseen
+        ],
         advice=advice_document(advice, diagnosis.effects) or msgspec.UNSET,
     )
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.diagnosis.limits import MATTERS_HELD_OUT, MATTERS_OFFSET, MATTERS_SCALE
-from onboard.core.diagnosis.score import least, surprise
+from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.selection import Fit, Fitter
+from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
 
 
@@ -45,6 +46,23 @@ class Candidate:
         there = fitter.held_gain(before, after) + 2.0 * unknowns * max(gain.variance, 1.0)
         fall = gain.fall if np.isnan(there) else min(gain.fall, there)
         return surprise(fall, unknowns, self.places, gain.variance, gain.freedom)
+
+
+def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
+    """Sizes (k,) of an effect from which each, alone, would count as found beside a fit.
+
+    Expected: an effect of that size is found as often as not.
+
+    Args:
+        fitter: has the columns.
+        fit: with the effect in.
+        c: the effect.
+    """
+    variance, freedom = fitter.variance_along(fit, c.index)
+    fall = needed(len(c.index), c.places, variance, freedom)
+    known = np.diag(fitter.informed(fit, c.index))[: len(c.plausible)]
+    out: Array = np.sqrt(fall / np.maximum(known, 1e-30))
+    return out
 
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from onboard.core.diagnosis.candidates import smallest
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
@@ -25,6 +26,7 @@ from onboard.core.diagnosis.records import (
     Mismatch,
     NotTestable,
     Rung,
+    Unseen,
     Unused,
     Verdict,
 )
@@ -39,6 +41,7 @@ from onboard.core.estimate.result import Calibration
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
 from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.mount_tilt import trim_in_words
 from onboard.core.physics.finding import Finding
 
@@ -95,6 +98,7 @@ class Judge:
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
+        unseen = self._unseen(effects)
         return Diagnosis(
             imu=self.imu,
             verdict=verdict,
@@ -103,7 +107,8 @@ class Judge:
             mismatch=mismatch,
             effects=tuple(effects),
             ambiguous=self._ambiguous(effects),
-            not_testable=(*self.absent, *self._too_weak(effects)),
+            not_testable=(*self.absent, *self._too_weak(unseen)),
+            unseen=unseen,
             ladder=ladder,
             regimes=regime_residuals(
                 self.engine.traces, self.engine.batches, before.theta, after.theta
@@ -196,25 +201,38 @@ class Judge:
         ]
         return tuple(out)
 
-    def _too_weak(self, effects: list[Finding]) -> list[NotTestable]:
-        """Effects that this flight could not have shown at any plausible size."""
+    def _unseen(self, effects: Sequence[Finding]) -> tuple[Unseen, ...]:
+        """Effects that were looked for and not found, and the sizes that would have been."""
         named = {e.name for e in effects}
-        out: list[NotTestable] = []
-        for c in self.choice.candidates:
+        choice = self.choice
+        out: list[Unseen] = []
+        for c in choice.candidates:
             if c.columns is None or c.effect in named or any(n.name == c.effect for n in out):
                 continue
-            index = list(c.index)
-            rest = [i for i in self.choice.free if i not in index]
-            fit = self.choice.fitter.fit([*rest, *index], held_out=False)
-            sigma = np.sqrt(np.diag(self.choice.fitter.covariance(fit))[c.sizes])
-            if np.all(sigma * np.sqrt(least()) > np.array(c.plausible)):
-                out.append(
-                    NotTestable(
-                        c.effect,
-                        "this flight would not show it at any plausible size: " + c.columns.apart,
-                    )
-                )
-        return out
+            rest = [i for i in choice.free if i not in c.index]
+            fit = choice.fitter.fit([*rest, *c.index], held_out=False)
+            sizes = smallest(choice.fitter, fit, c)
+            keys = dict(zip(c.columns.keys, sizes.tolist(), strict=False))
+            out.append(Unseen(c.effect, keys, c.columns.unknowns[0].unit))
+        if choice.jump_from is not None and BiasStep.effect not in named:
+            keys = dict(zip("xyz", choice.jump_from.tolist(), strict=True))
+            out = [n for n in out if n.name != BiasStep.effect]
+            out.append(Unseen(BiasStep.effect, keys, "m/s^2"))
+        return tuple(out)
+
+    def _too_weak(self, unseen: Sequence[Unseen]) -> list[NotTestable]:
+        """Effects that this flight could not have shown at any plausible size."""
+        plausible = {c.effect: c for c in self.choice.candidates if c.columns is not None}
+        return [
+            NotTestable(
+                u.name,
+                "this flight would not show it at any plausible size: " + c.columns.apart,
+            )
+            for u in unseen
+            if (c := plausible.get(u.name)) is not None
+            and c.columns is not None
+            and all(s > p for s, p in zip(u.smallest.values(), c.plausible, strict=True))
+        ]
 
 
 def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:

@@ -22,12 +22,17 @@ from onboard.core.physics.finding import Confounder
 
 @dataclass(slots=True)
 class Choice:
-    """Effects that were taken, in order, and the sums in which they are columns."""
+    """Effects that were taken, in order, and the sums in which they are columns.
+
+    ``jump_from`` (3,) are sizes from which a jump would have been found at half of the moments at
+    which it was looked for; None where it was not.
+    """
 
     fitter: Fitter
     base: list[int]
     candidates: list[Candidate]
     chosen: list[Candidate]
+    jump_from: Array | None = None
 
     @property
     def free(self) -> list[int]:

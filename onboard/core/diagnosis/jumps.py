@@ -7,7 +7,7 @@ attitude a kick that dead reckoning knows nothing of; with little flight after i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,9 +22,10 @@ from onboard.core.diagnosis.limits import (
     SCAN_S,
     SPACINGS_S,
 )
-from onboard.core.diagnosis.score import least, surprise
-from onboard.core.diagnosis.selection import OFFSETS, Fitter, settled_from
+from onboard.core.diagnosis.score import least, needed, surprise
+from onboard.core.diagnosis.selection import OFFSETS, Fit, Fitter, settled_from
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.scatter import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -61,18 +62,40 @@ class Shock(Family):
         return on_axes(np.repeat(inside[..., None], 3, axis=-1))
 
 
-def jumps_anywhere(full: Examination) -> list[tuple[float, float]]:
-    """Moment (s) and gain of a jump at moments all over the flight, beside nothing else.
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """A jump at one moment (s) beside nothing else: its gain, what the sums know of it (3,)."""
+
+    moment: float
+    gain: float
+    known: Array
+
+
+def jumps_anywhere(full: Examination) -> list[Looked]:
+    """Jumps at moments all over the flight.
 
     What shows a jump forwards or sideways is the half minute after it: then the tilt has taken it
     over.  So each is gone through, some neighbours at once.
     """
     moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
     jump = BiasStep(Origin(full.point.skew_from))
-    out: list[tuple[float, float]] = []
+    out: list[Looked] = []
     for i in range(0, len(moments), AT_ONCE):
         some = moments[i : i + AT_ONCE]
-        out += zip(some, _gains(full, (), [jump.at(t) for t in some]), strict=True)
+        fitter, before, fits = _fitted(full, (), [jump.at(t) for t in some])
+        for t, (index, after) in zip(some, fits, strict=True):
+            known = np.diag(fitter.informed(after, index))
+            out.append(Looked(t, fitter.gain(before, after), known))
+    return out
+
+
+def shown_from(full: Examination, looked: Sequence[Looked], pool: Pool) -> Array | None:
+    """Sizes (3,) from which a jump would have been found at half of the moments; None: at none."""
+    if not looked:
+        return None
+    places = full.trusted_s / SPACINGS_S[0]
+    known = np.median([at.known for at in looked], axis=0)
+    out: Array = np.sqrt(needed(3, places, pool.variance, pool.freedom) / known)
     return out
 
 
@@ -138,10 +161,21 @@ def _best(
 def _gains(
     full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
 ) -> list[float]:
-    """Gain of each jump alone beside the chosen effects, from one pass with all of them.
+    """Gain of each jump alone beside the chosen effects."""
+    fitter, before, fits = _fitted(full, chosen, steps)
+    return [fitter.gain(before, after) for _, after in fits]
+
+
+def _fitted(
+    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
+) -> tuple[Fitter, Fit, list[tuple[list[int], Fit]]]:
+    """Fits without jumps, and with each of them alone; from one pass with all of them.
 
     Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
     the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.
+
+    Returns:
+        Sums with a column for each; the fit without; columns of each jump, and the fit with it.
     """
     families: tuple[Family, ...] = (*chosen, *full.carried, *steps)
     made = Engine(
@@ -160,15 +194,13 @@ def _gains(
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
     fitter = Fitter([*far, *made.blocks], made.model, absent)
-    slices = made.model.slices
-    stepped = {i for s in steps for i in range(slices[s.name].start, slices[s.name].stop)}
-    free = [i for i in range(made.model.size) if i not in stepped]
+    places = range(made.model.size)
+    columns = [list(places[made.model.slices[s.name]]) for s in steps]
+    stepped = {i for index in columns for i in index}
+    free = [i for i in places if i not in stepped]
     before = fitter.fit(free, held_out=False)
-    out = []
-    for s in steps:
-        index = [*free, *range(slices[s.name].start, slices[s.name].stop)]
-        out.append(fitter.gain(before, fitter.fit(index, held_out=False)))
-    return out
+    fits = [(index, fitter.fit([*free, *index], held_out=False)) for index in columns]
+    return fitter, before, fits
 
 
 def _with_jumps(

@@ -20,6 +20,7 @@ from onboard.core.diagnosis.jumps import (
     jump_near,
     jumps_anywhere,
     shock_instead,
+    shown_from,
 )
 from onboard.core.diagnosis.limits import FURTHEST
 from onboard.core.diagnosis.nuisance_rivals import compared
@@ -110,6 +111,7 @@ def _with_jump(
     # Which change of the offset it is must not be decided by an attitude that it has tilted.
     kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
     other = _chosen(wide.doubting(), everything, kept)
+    other.jump_from = choice.jump_from
     if _wanders(choice) or _wanders(other):
         return wide, other
     return full, choice
@@ -124,13 +126,14 @@ def _jump(full: Examination, choice: Choice) -> BiasStep | None:
     """
     if len(full.blocks) < FEWEST_BLOCKS:
         return None
-    places = jumps_anywhere(full)
-    if not places:
+    looked = jumps_anywhere(full)
+    choice.jump_from = shown_from(full, looked, choice.fitter.pool)
+    if not looked:
         return None
-    moment, gain = max(places, key=lambda x: x[1])
-    if not _wanders(choice) and surprise(gain, 3, len(places)) < least():
+    best = max(looked, key=lambda at: at.gain)
+    if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < least():
         return None
-    return jump_near(full, (), moment)
+    return jump_near(full, (), best.moment)
 
 
 def _wanders(choice: Choice) -> bool:

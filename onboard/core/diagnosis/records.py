@@ -102,6 +102,18 @@ class Unused:
 
 
 @dataclass(frozen=True, slots=True)
+class Unseen:
+    """An effect that was looked for and not found, and how large it would have had to be.
+
+    ``smallest`` are sizes by name of unknown, each alone, that this flight shows as often as not.
+    """
+
+    name: str
+    smallest: dict[str, float]
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
 class Series:
     """Time series for plots, epochs in order: velocity residual NED (m/s) before and after.
 
@@ -161,3 +173,4 @@ class Diagnosis:
     note: str
     plain: Plain | None = None
     unused: tuple[Unused, ...] = ()
+    unseen: tuple[Unseen, ...] = ()

@@ -45,6 +45,15 @@ def surprise(
     return -2.0 * (log_survival(gain, unknowns) + log(places))
 
 
+def needed(
+    unknowns: int, places: float = 1.0, variance: float = 1.0, freedom: float = inf
+) -> float:
+    """Fall of chi-square from which a hypothesis counts as found; arguments as of surprise."""
+    if freedom < inf:
+        variance /= _worth(unknowns, log(places), freedom)
+    return max(variance, 1.0) * _certain(unknowns, -0.5 * least() - log(places))
+
+
 def least() -> float:
     """Score from which a hypothesis counts as found: all are asked (Bonferroni)."""
     return -2.0 * log(FALSE_ALARM / len(kinds()))

@@ -141,12 +141,32 @@ class Fitter:
 
     def gain_by(self, columns: Sequence[int], before: Fit, after: Fit) -> Gain:
         """The same by ``columns``, which ``after`` has, with the variance there is along them."""
-        return Gain(self.gain(before, after), *self._variance_of(after, columns))
+        return Gain(self.gain(before, after), *self.variance_along(after, columns))
 
     @staticmethod
     def held_gain(before: Fit, after: Fit) -> float:
         """Fall of held-out chi-square."""
         return before.held_out - after.held_out
+
+    def informed(self, fit: Fit, columns: Sequence[int]) -> Array:
+        """(k, k) what the sums know of ``columns`` of a fit, the rest of it unknown."""
+        index = list(fit.free)
+        A = self._information(self.sums, index) + np.diag(self._prior[index])
+        place = [index.index(c) for c in columns]
+        out: Array = np.linalg.inv(np.linalg.inv(A)[np.ix_(place, place)])
+        return out
+
+    def variance_along(self, fit: Fit, columns: Sequence[int]) -> tuple[float, float]:
+        """Variance over what the sums say along some columns of a fit, and its freedom."""
+        if np.isinf(self.pool.freedom):
+            return self.pool.variance, self.pool.freedom
+        scatter = self._scatter(fit)
+        place = {column: k for k, column in enumerate(fit.free)}
+        back = scatter.inverse[:, [place[c] for c in columns]]
+        own = back[[place[c] for c in columns]]
+        # Directions in which the columns' own estimates are independent.
+        X = np.linalg.solve(np.linalg.cholesky(own), back.T).T
+        return self.pool.moderated(*scatter.within(X))
 
     def covariance(self, fit: Fit) -> Array:
         """Covariance (m, m) of a fit, as blocks confirm it; zeros for what is not free."""
@@ -178,18 +198,6 @@ class Fitter:
         scores = scores_of(N, b, gram, fit.theta)[:, index]
         inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
         return Scatter(N[:, index][:, :, index], scores, inverse)
-
-    def _variance_of(self, fit: Fit, columns: Sequence[int]) -> tuple[float, float]:
-        """Variance over what the sums say along some columns of a fit, and its freedom."""
-        if np.isinf(self.pool.freedom):
-            return self.pool.variance, self.pool.freedom
-        scatter = self._scatter(fit)
-        place = {column: k for k, column in enumerate(fit.free)}
-        back = scatter.inverse[:, [place[c] for c in columns]]
-        own = back[[place[c] for c in columns]]
-        # Directions in which the columns' own estimates are independent.
-        X = np.linalg.solve(np.linalg.cholesky(own), back.T).T
-        return self.pool.moderated(*scatter.within(X))
 
     def rms(self, fit: Fit) -> float:
         """Whitened root mean square of a fit."""
