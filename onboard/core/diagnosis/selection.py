@@ -171,10 +171,11 @@ class Fitter:
     def covariance(self, fit: Fit) -> Array:
         """Covariance (m, m) of a fit, as blocks confirm it; zeros for what is not free."""
         index = list(fit.free)
-        X, strength = directions_of(self._information(self.sums, index), self._prior[index])
-        V = self._scatter(fit).noise(X, strength, self.pool)
+        information = self._information(self.sums, index)
+        X, strength = directions_of(information, self._prior[index])
+        weighing = Weighing(X, strength, self._scatter(fit).noise(X, strength, self.pool))
         out = np.zeros_like(self.sums.N)
-        out[np.ix_(index, index)] = Weighing(X, strength, V).covariance()
+        out[np.ix_(index, index)] = weighing.covariance(weighing.noise(information))
         return out
 
     @cached_property

@@ -101,9 +101,9 @@ GYRO_CROSS_SIGMA: Final = 3.3e-3
 in one housing, taken for three sigma [data sheet]."""
 TIMING_FLOOR_S: Final = 5e-4
 """The same of a delay, s: half of the milliseconds that streams are stamped with [physics]."""
-CONTRADICTION: Final = 6.0
-"""Inflation of the variance past which blocks of one flight ask for different parameters
-[tuned]."""
+CONTRADICTION: Final = 4.0
+"""Inflation of the variance past which blocks of one flight ask for different parameters: a sigma
+is doubled, and most of it is not what the model says [bound]."""
 APART_S: Final = 10.0
 """s; put between the flights of two boots, so that no window spans both [cost: any
 number above the longest gap]."""

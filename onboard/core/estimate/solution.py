@@ -87,31 +87,29 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
         scatter = Scatter.of(blocks, theta, inverse, share)
         V = scatter.noise(X, strength, scatter.pool(prior_information, max(1.0, nis)))
     weighing = Weighing(X, strength, V)
-    posterior, weights = weighing.posterior, weighing.weights
-    theta = model.prior + X @ posterior @ weights @ X.T @ (sums.b - D @ model.prior)
+    theta = model.prior + weighing.estimate(sums.b - D @ model.prior)
     # Sandwich: the innovations carry D + G of information, of which G is not signal.
-    half, doubt = weighing.halves @ X.T, weights @ X.T @ (GRAM_DOUBT * G * theta)
-    data = half @ (D + G) @ half.T + doubt @ doubt.T
-    covariance = X @ posterior @ (data + np.eye(model.size)) @ posterior @ X.T
-    back = weighing.information @ (X.T * prior_information)  # of X, its inverse
-    information = back.T @ np.linalg.pinv(data, hermitian=True) @ back
+    doubt = weighing.weights * (X.T @ (GRAM_DOUBT * G * theta)).T
+    noise = weighing.noise(D + G) + doubt.T @ doubt
+    back = weighing.information[:, None] * (X.T * prior_information)  # of X, its inverse
+    information = back.T @ np.linalg.pinv(noise, hermitian=True) @ back
+    covariance = weighing.covariance(noise)
+    plain = (X / (np.maximum(strength, 0.0) + 1.0)) @ X.T
+    six = model.slices.get("six", slice(None))
     return Solution(
         theta,
-        (covariance + covariance.T) / 2,
+        covariance,
         (information + information.T) / 2,
-        _inflation(model, weighing, strength),
+        _largest_ratio(weighing.covariance(weighing.noise(D))[six, six], plain[six, six]),
         nis,
         sums.rows,
     )
 
 
-def _inflation(model: Model, weighing: Weighing, strength: Array) -> float:
-    """By how much the variance of the six, or of any sum of them, is inflated at the most."""
-    six = weighing.X[model.slices.get("six", slice(None))]
-    plain = (six / (np.maximum(strength, 0.0) + 1.0)) @ six.T
-    inflated = six @ weighing.posterior @ six.T
-    root = np.linalg.inv(np.linalg.cholesky(plain))
-    return float(np.linalg.eigvalsh(root @ inflated @ root.T).max())
+def _largest_ratio(a: Array, b: Array) -> float:
+    """The largest ratio of the variances of any sum by two covariances."""
+    root = np.linalg.inv(np.linalg.cholesky(b))
+    return float(np.linalg.eigvalsh(root @ a @ root.T).max())
 
 
 def by_chance(n: Array) -> Array:

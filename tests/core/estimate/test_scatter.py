@@ -78,24 +78,42 @@ def test_scores_of_blocks_are_held_against_the_hat_matrix():
         assert blocks == pytest.approx(effective, rel=1e-9)
 
 
-def test_weighing_is_least_squares_with_that_noise():
+@pytest.fixture
+def problem():
+    """Information, its directions and strengths, and a noise that is not what it claims."""
     rng = np.random.default_rng(2)
-    h, y = flight(5, 60, noise=1.0)
-    D, score = h.T @ h, h.T @ y
+    D = np.diag(rng.uniform(0.1, 30.0, M)) + 0.3
     X, strength = directions_of(D, PRIOR)
-    np.testing.assert_allclose(X.T @ D @ X, np.diag(strength), atol=1e-8 * strength.max())
-    np.testing.assert_allclose(X.T @ np.diag(PRIOR) @ X, np.eye(M), atol=1e-10)
     root = rng.normal(size=(M, M))
-    V = np.eye(M) + root @ root.T
+    return D, X, strength, np.eye(M) + root @ root.T
+
+
+def test_directions_are_independent_in_the_data_and_in_the_prior(problem):
+    D, X, strength, _ = problem
+    np.testing.assert_allclose(X.T @ D @ X, np.diag(strength), atol=1e-9 * strength.max())
+    np.testing.assert_allclose(X.T @ np.diag(PRIOR) @ X, np.eye(M), atol=1e-10)
+
+
+def test_an_estimates_covariance_is_that_of_its_errors(problem):
+    """Of the prior's and of the scores', each through the estimate as the linear map that it is."""
+    D, X, strength, V = problem
     weighing = Weighing(X, strength, V)
-    # Scores b = D theta + noise; the noise's covariance is V along X.
+    K = np.stack([weighing.estimate(e) for e in np.eye(M)], axis=1)
     half = np.linalg.inv(X).T @ np.diag(np.sqrt(strength))
-    noise = half @ V @ half.T
-    information = D @ np.linalg.inv(noise) @ D + np.diag(PRIOR)
-    np.testing.assert_allclose(weighing.covariance(), np.linalg.inv(information), rtol=1e-6)
-    expected = np.linalg.solve(information, D @ np.linalg.inv(noise) @ score)
-    got = X @ weighing.posterior @ weighing.weights @ X.T @ score
-    np.testing.assert_allclose(got, expected, rtol=1e-6)
+    of_scores = K @ (half @ V @ half.T) @ K.T
+    of_prior = (K @ D - np.eye(M)) @ np.diag(1.0 / PRIOR) @ (K @ D - np.eye(M)).T
+    got = weighing.covariance(weighing.noise(D))
+    np.testing.assert_allclose(got, of_scores + of_prior, rtol=1e-7, atol=1e-12)
+
+
+def test_with_one_variance_for_all_it_is_the_posterior(problem):
+    D, X, strength, _ = problem
+    weighing = Weighing(X, strength, 3.0 * np.eye(M))
+    A = D / 3.0 + np.diag(PRIOR)
+    score = np.arange(1.0, M + 1.0)
+    np.testing.assert_allclose(weighing.estimate(score), np.linalg.solve(A, score / 3.0), rtol=1e-8)
+    got = weighing.covariance(weighing.noise(D))
+    np.testing.assert_allclose(got, np.linalg.inv(A), rtol=1e-8)
 
 
 def test_the_tail_of_f_is_that_of_known_cases():
