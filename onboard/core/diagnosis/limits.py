@@ -10,7 +10,7 @@ from typing import Final
 
 # One score for every hypothesis (score, candidates, hypotheses, search).
 
-FALSE_ALARM: Final = 1e-3
+FALSE_ALARM: Final = 1e-2
 """Of a flight of which nothing is missing, that something is said to be [probability].
 
 Nominal.  In 96 simulated flights 4, 1 and none pass what 10, 1 and 0.1 % of flights should, gravity
@@ -42,6 +42,9 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
+SEARCHED: Final = 0.1
+"""Of a flight without a jump, that one is searched for in vain: it is decided later, with noise
+that is found with it in the model [cost]."""
 SCAN_S: Final = 4.0
 """s between the moments at which a jump is looked for: 3 s from where it is it explains half
 [physics: the time in which GPS corrects a velocity]."""

@@ -9,6 +9,7 @@ timing and residuals.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import log
 
 from onboard.core.diagnosis.cleared import cleared, since_reboot
 from onboard.core.diagnosis.evidence import Evidence, Judge
@@ -22,11 +23,11 @@ from onboard.core.diagnosis.jumps import (
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import FURTHEST
+from onboard.core.diagnosis.limits import FURTHEST, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
-from onboard.core.diagnosis.score import least, surprise
+from onboard.core.diagnosis.score import surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
 from onboard.core.estimate.calibrator import Calibrator
@@ -131,7 +132,7 @@ def _jump(full: Examination, choice: Choice) -> BiasStep | None:
     if not looked:
         return None
     best = max(looked, key=lambda at: at.gain)
-    if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < least():
+    if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < -2.0 * log(SEARCHED):
         return None
     return jump_near(full, (), best.moment)
 
