@@ -116,8 +116,8 @@ def test_of_noise_nothing_is_made(noise):
     """Asked of six effects and seven jumps, each found as seldom as one of all the catalogue."""
     rng = np.random.default_rng(17)
     found = sum(bool(chosen(made(rng, noise=noise, blocks=8, rows=40))) for _ in range(DRAWS))
-    # A thousandth of the flights may: of these, more than one are a fault.
-    assert found <= 1
+    # A third of one is expected of as many draws; three are a fault (one in two hundred).
+    assert found <= 2
 
 
 def test_a_score_is_the_probability_of_as_much_at_any_place():
