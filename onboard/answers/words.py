@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from onboard.core.physics.finding import Quantity
 from onboard.core.physics.wording import DEGREE, UNKNOWN, fixed, listed, unit_in_words
@@ -96,13 +97,25 @@ def with_sigma(value: float, sigma: float) -> str:
 
 def quantity(q: Quantity) -> str:
     """Value, sigma and unit; seconds below one in ms, angles in degrees."""
-    scale, unit = 1.0, q.unit
-    if q.unit == "s" and abs(q.value) < 1.0:
-        scale, unit = 1e3, "ms"
-    elif q.unit.startswith("rad"):
-        scale, unit = 1.0 / DEGREE, "°" + q.unit[3:]
+    scale, unit = _shown_in(q.unit, q.value)
     text = with_sigma(q.value * scale, q.sigma * scale)
     return f"{text} {unit_in_words(unit)}".rstrip(" -")
+
+
+def sizes(smallest: Mapping[str, float], unit: str) -> str:
+    """Sizes of some unknowns to two digits, one unit for all: ``x 0.39, y 0.37, z 0.06 m/s²``."""
+    scale, unit = _shown_in(unit, max(smallest.values(), default=0.0))
+    told = [f"{key.replace('_', ' ')} {number(x * scale, 2)}" for key, x in smallest.items()]
+    return f"{', '.join(told)} {unit_in_words(unit)}".rstrip(" -")
+
+
+def _shown_in(unit: str, value: float) -> tuple[float, str]:
+    """Factor and unit in which a value is told."""
+    if unit == "s" and abs(value) < 1.0:
+        return 1e3, "ms"
+    if unit.startswith("rad"):
+        return 1.0 / DEGREE, "°" + unit[3:]
+    return 1.0, unit
 
 
 def capital(sentence: str) -> str:

@@ -85,6 +85,7 @@ def explain_html(
         parameters=() if advice is None else _parameters(diagnosis, advice),
         ambiguous=[([title_of(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous],
         not_testable=[(title_of(n.name), n.why) for n in diagnosis.not_testable],
+        unseen=() if refused else _unseen(diagnosis),
     )
 
 
@@ -98,6 +99,14 @@ def explanation_html(result: Explanation, base: str = PAGE) -> str:
         advice=result.advice,
         base=base,
     )
+
+
+def _unseen(d: Diagnosis) -> list[tuple[str, str]]:
+    """Effects that could have been found and were not: from which size on they would have been."""
+    blind = {n.name for n in d.not_testable}
+    return [
+        (title_of(u.name), words.sizes(u.smallest, u.unit)) for u in d.unseen if u.name not in blind
+    ]
 
 
 def _fits(d: Diagnosis) -> list[dict[str, Any]]:
