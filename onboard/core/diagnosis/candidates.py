@@ -43,9 +43,9 @@ class Candidate:
         """
         unknowns = len(self.index)
         gain = fitter.gain_by(self.index, before, after)
-        there = fitter.held_gain(before, after) + 2.0 * unknowns * max(gain.variance, 1.0)
+        there = fitter.held_gain(before, after) + 2.0 * unknowns * gain.variance
         fall = gain.fall if np.isnan(there) else min(gain.fall, there)
-        return surprise(fall, unknowns, self.places, gain.variance, gain.freedom)
+        return surprise(fall / gain.variance, unknowns, self.places)
 
 
 def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
@@ -58,8 +58,7 @@ def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
         fit: with the effect in.
         c: the effect.
     """
-    variance, freedom = fitter.variance_along(fit, c.index)
-    fall = needed(len(c.index), c.places, variance, freedom)
+    fall = needed(len(c.index), c.places) * fitter.variance_along(fit, c.index)
     known = np.diag(fitter.informed(fit, c.index))[: len(c.plausible)]
     out: Array = np.sqrt(fall / np.maximum(known, 1e-30))
     return out
