@@ -43,9 +43,9 @@ class Candidate:
         """
         unknowns = len(self.index)
         gain = fitter.gain_by(self.index, before, after)
-        there = fitter.held_gain(before, after) + 2.0 * unknowns * gain.variance
+        there = fitter.held_gain(before, after) + 2.0 * unknowns * max(gain.variance, 1.0)
         fall = gain.fall if np.isnan(there) else min(gain.fall, there)
-        return surprise(fall / gain.variance, unknowns, self.places)
+        return surprise(fall, unknowns, self.places, gain.variance, gain.freedom)
 
 
 def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
@@ -58,7 +58,8 @@ def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
         fit: with the effect in.
         c: the effect.
     """
-    fall = needed(len(c.index), c.places) * fitter.variance_along(fit, c.index)
+    variance, freedom = fitter.variance_along(fit, c.index)
+    fall = needed(len(c.index), c.places, variance, freedom)
     known = np.diag(fitter.informed(fit, c.index))[: len(c.plausible)]
     out: Array = np.sqrt(fall / np.maximum(known, 1e-30))
     return out

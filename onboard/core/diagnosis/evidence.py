@@ -130,7 +130,7 @@ class Judge:
         added += self.engine.indices_of(self.final.families)
         gain = fitter.gain_by(added, before, after)
         series = self.final.series(before.theta, after.theta)
-        score = surprise(gain.weakened, len(added))
+        score = surprise(gain.fall, len(added), variance=gain.variance, freedom=gain.freedom)
         p_value = float(np.exp(-0.5 * score))
         return Mismatch(
             detected=p_value < FALSE_ALARM,

@@ -95,7 +95,7 @@ def shown_from(full: Examination, looked: Sequence[Looked], pool: Pool) -> Array
         return None
     places = full.trusted_s / SPACINGS_S[0]
     known = np.median([at.known for at in looked], axis=0)
-    out: Array = np.sqrt(needed(3, places) * pool.variance / known)
+    out: Array = np.sqrt(needed(3, places, pool.variance, pool.freedom) / known)
     return out
 
 

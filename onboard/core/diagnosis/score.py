@@ -5,43 +5,80 @@ product of signals.  If it is not true, the fall of chi-square by them is chi-sq
 with as many degrees of freedom (Wilks 1938), as often as it is looked for in different places.  The
 score is ``-2 ln`` of that probability; like a fall of chi-square it grows with the flight, and it
 charges some five for an unknown more.  What counts as found is one probability for a flight.
+
+Where the variance is only estimated, from so many blocks as contradict each other, a ratio of
+variances takes the place of chi-square (Fisher's F), and more is needed for the same surprise.  A
+gain is then counted as the chi-square that is as surprising as it where the decision falls.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from math import log
+from math import inf, log
 
 from onboard.core.diagnosis.limits import FALSE_ALARM
 from onboard.core.maths.chi_square import log_survival
+from onboard.core.maths.student import log_survival_f
 from onboard.core.physics.catalogue import kinds
 
 
-def surprise(gain: float, unknowns: int, places: float = 1.0) -> float:
+def surprise(
+    gain: float,
+    unknowns: int,
+    places: float = 1.0,
+    variance: float = 1.0,
+    freedom: float = inf,
+) -> float:
     """``-2 ln`` of the probability that chance explains as much at one of the places.
 
     Args:
-        gain: fall of chi-square, in units of the variance there is.
+        gain: fall of chi-square.
         unknowns: by how many (at least 1).
         places: at how many it was looked for, of which this is the best.
+        variance: of the data over what the sums say.
+        freedom: degrees of freedom with which it is known.
     """
-    return -2.0 * (log_survival(max(gain, 0.0), unknowns) + log(places))
+    if freedom < inf:
+        variance /= _worth(unknowns, log(places), freedom)
+    gain = max(gain, 0.0) / max(variance, 1.0)
+    return -2.0 * (log_survival(gain, unknowns) + log(places))
 
 
-@lru_cache(maxsize=256)
-def needed(unknowns: int, places: float = 1.0) -> float:
-    """Gain from which a hypothesis counts as found, to a thousandth; arguments as of surprise."""
-    high = 1.0
-    while surprise(high, unknowns, places) < least():
-        high *= 2.0
-    low = 0.0
-    while high - low > 1e-3 * high:
-        middle = 0.5 * (low + high)
-        found = surprise(middle, unknowns, places) >= least()
-        low, high = (low, middle) if found else (middle, high)
-    return high
+def needed(
+    unknowns: int, places: float = 1.0, variance: float = 1.0, freedom: float = inf
+) -> float:
+    """Fall of chi-square from which a hypothesis counts as found; arguments as of surprise."""
+    if freedom < inf:
+        variance /= _worth(unknowns, log(places), freedom)
+    return max(variance, 1.0) * _certain(unknowns, -0.5 * least() - log(places))
 
 
 def least() -> float:
     """Score from which a hypothesis counts as found: all are asked (Bonferroni)."""
     return -2.0 * log(FALSE_ALARM / len(kinds()))
+
+
+def _worth(unknowns: int, log_places: float, freedom: float) -> float:
+    """Of a gain over an estimated variance, as chi-square: both at the decision (0 ... 1)."""
+    at = -0.5 * least() - log_places
+    estimated = _quantile(lambda f: log_survival_f(f, unknowns, freedom), at)
+    return _certain(unknowns, at) / (unknowns * estimated)
+
+
+@lru_cache(maxsize=256)
+def _certain(unknowns: int, at: float) -> float:
+    """Chi-square that is passed with the probability whose logarithm is ``at``."""
+    return _quantile(lambda x: log_survival(x, unknowns), at)
+
+
+def _quantile(log_tail: Callable[[float], float], at: float) -> float:
+    """Where a falling logarithm of a probability is ``at``, to a thousandth."""
+    high = 1.0
+    while log_tail(high) > at:
+        high *= 2.0
+    low = 0.0
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if log_tail(middle) > at else (low, middle)
+    return 0.5 * (low + high)

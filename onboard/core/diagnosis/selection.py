@@ -9,6 +9,7 @@ columns that made it, with these in the model.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,16 +54,19 @@ class Gain:
 
     Attributes:
         fall: of chi-square.
-        variance: over what the sums say, along the columns that made it; at least 1.
+        variance: over what the sums say, along the columns that made it.
+        freedom: degrees of freedom with which it is known; infinite where all the flight is judged
+            by one.
     """
 
     fall: float
     variance: float = 1.0
+    freedom: float = math.inf
 
     @property
     def weakened(self) -> float:
-        """In units of the variance there is."""
-        return self.fall / self.variance
+        """In units of the variance there is, no less than what the sums say."""
+        return self.fall / max(self.variance, 1.0)
 
 
 class Fitter:
@@ -137,7 +141,7 @@ class Fitter:
 
     def gain_by(self, columns: Sequence[int], before: Fit, after: Fit) -> Gain:
         """The same by ``columns``, which ``after`` has, with the variance there is along them."""
-        return Gain(self.gain(before, after), self.variance_along(after, columns))
+        return Gain(self.gain(before, after), *self.variance_along(after, columns))
 
     @staticmethod
     def held_gain(before: Fit, after: Fit) -> float:
@@ -152,17 +156,17 @@ class Fitter:
         out: Array = np.linalg.inv(np.linalg.inv(A)[np.ix_(place, place)])
         return out
 
-    def variance_along(self, fit: Fit, columns: Sequence[int]) -> float:
-        """Variance over what the sums say along some columns of a fit, at least 1."""
+    def variance_along(self, fit: Fit, columns: Sequence[int]) -> tuple[float, float]:
+        """Variance over what the sums say along some columns of a fit, and its freedom."""
         if np.isinf(self.pool.freedom):
-            return max(self.pool.variance, 1.0)
+            return self.pool.variance, self.pool.freedom
         scatter = self._scatter(fit)
         place = {column: k for k, column in enumerate(fit.free)}
         back = scatter.inverse[:, [place[c] for c in columns]]
         own = back[[place[c] for c in columns]]
         # Directions in which the columns' own estimates are independent.
         X = np.linalg.solve(np.linalg.cholesky(own), back.T).T
-        return max(self.pool.moderated(*scatter.within(X)), 1.0)
+        return self.pool.moderated(*scatter.within(X))
 
     def covariance(self, fit: Fit) -> Array:
         """Covariance (m, m) of a fit, as blocks confirm it; zeros for what is not free."""

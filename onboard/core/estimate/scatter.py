@@ -58,16 +58,12 @@ class Pool:
         i, j = np.unravel_index(int(np.argmax(chances)), (len(FREEDOMS), CENTRES))
         return cls(float(centres[j]), FREEDOMS[i])
 
-    def moderated(self, ratio: float, count: float) -> float:
-        """A variance shrunk towards the centre by its own uncertainty: the mean of what it may be.
-
-        It is that of Student's t, wider for what is known with few degrees of freedom.
-        """
+    def moderated(self, ratio: float, count: float) -> tuple[float, float]:
+        """A variance shrunk towards the centre by its own uncertainty, and its freedom."""
         if math.isinf(self.freedom):
-            return self.variance
+            return self.variance, self.freedom
         total = self.freedom + count
-        widened = 1.0 / (max(total, FEWEST_FREEDOM) - 2.0)
-        return (self.freedom * self.variance + count * ratio) * widened
+        return (self.freedom * self.variance + count * ratio) / total, total
 
 
 FREEDOMS = (math.inf, 64.0, 32.0, 16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0, 1.4)

@@ -1,4 +1,4 @@
-"""Student's t distribution: tail and quantile, for any number of degrees of freedom.
+"""Student's t and Fisher's F: what is chance where the variance is only estimated.
 
 Sources: NIST Digital Library of Mathematical Functions, 8.17.5 and 8.17.22 (the continued fraction
 of the incomplete beta function), evaluated as Lentz does.
@@ -35,6 +35,27 @@ def quantile(probability: float, dof: float) -> float:
         else:
             high = middle
     return 0.5 * (low + high)
+
+
+def log_survival_f(f: float, dof: float, freedom: float) -> float:
+    """Natural logarithm of the probability that F with ``dof`` and ``freedom`` is past ``f``.
+
+    Args:
+        f: a mean of ``dof`` squares over a variance that was estimated.
+        dof: degrees of freedom of the mean (above 0).
+        freedom: those of the estimate (above 0, finite).
+    """
+    if not f > 0.0:
+        return 0.0
+    a, b = 0.5 * freedom, 0.5 * dof
+    ratio = dof * f / freedom
+    x = 1.0 / (1.0 + ratio)
+    if x > (a + 1.0) / (a + b + 2.0):
+        return math.log1p(-regularised_beta(ratio * x, b, a))
+    front = math.lgamma(a + b) - math.lgamma(a) - math.lgamma(b)
+    # The power as a logarithm: far out it is smaller than any number.
+    front += a * math.log(x) + b * (math.log(ratio) + math.log(x))
+    return front + math.log(_fraction(x, a, b) / a)
 
 
 def regularised_beta(x: float, a: float, b: float) -> float:

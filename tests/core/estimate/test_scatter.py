@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.scatter import Pool, Scatter, Weighing, directions_of
+from onboard.core.maths.student import log_survival_f, two_sided
 from tests.core.estimate.test_solution import MODEL, M, blocks_of, flight
 
 PRIOR = 1.0 / MODEL.prior_sigma**2
@@ -49,7 +51,7 @@ def test_moderated_variances_are_nearer_to_the_true_ones_than_their_own_or_one_f
         true = 1.5 * 4.0 / rng.chisquare(4.0, len(count))
         own = true * rng.chisquare(count) / count
         pool = Pool.of(own, count, 1.0)
-        shrunk = [pool.moderated(float(r), float(n)) for r, n in zip(own, count, strict=True)]
+        shrunk = [pool.moderated(float(r), float(n))[0] for r, n in zip(own, count, strict=True)]
         errors.append([np.mean(np.log(x / true) ** 2) for x in (shrunk, own, own.mean())])
     mine, alone, common = np.mean(errors, axis=0)
     assert mine < 0.8 * alone
@@ -112,3 +114,28 @@ def test_with_one_variance_for_all_it_is_the_posterior(problem):
     np.testing.assert_allclose(weighing.estimate(score), np.linalg.solve(A, score / 3.0), rtol=1e-8)
     got = weighing.covariance(weighing.noise(D))
     np.testing.assert_allclose(got, np.linalg.inv(A), rtol=1e-8)
+
+
+def test_the_tail_of_f_is_that_of_known_cases():
+    for freedom in (2.0, 5.5, 40.0):
+        for f in (0.3, 2.0, 30.0):
+            t = two_sided(math.sqrt(f), freedom)
+            assert math.exp(log_survival_f(f, 1, freedom)) == pytest.approx(t, rel=1e-9)
+            closed = (1.0 + 2.0 * f / freedom) ** (-0.5 * freedom)
+            assert math.exp(log_survival_f(f, 2, freedom)) == pytest.approx(closed, rel=1e-9)
+    # Far out, where no number is small enough.
+    assert log_survival_f(1e9, 3, 400.0) < -1000.0
+
+
+@pytest.mark.parametrize("freedom", [4.0, 12.0, 100.0])
+@pytest.mark.parametrize("places", [1.0, 30.0])
+def test_over_an_estimated_variance_as_much_is_found_by_chance_as_over_a_known_one(freedom, places):
+    """At the decision the score is that of Fisher's F; beyond it, it grows with the gain."""
+    for variance in (1.0, 5.0):
+        gains = np.geomspace(10.0, 1e7, 8000)
+        scores = [surprise(g, 3, places, 5.0 * variance, freedom) for g in gains]
+        at = float(np.interp(least(), scores, gains)) / (5.0 * variance)
+        chance = math.exp(log_survival_f(at / 3.0, 3, freedom)) * places
+        assert -2.0 * math.log(chance) == pytest.approx(least(), rel=5e-3)
+    # A variance that is claimed is no smaller for having been seen smaller.
+    assert surprise(50.0, 3, 1.0, 0.01, 100.0) == surprise(50.0, 3)
