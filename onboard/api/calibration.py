@@ -15,7 +15,8 @@ from onboard.api.result import Result
 from onboard.api.sources import Source, opened
 from onboard.errors import UsageError
 from onboard.report.parameters import replay_text
-from onboard.report.replay import Drawn, replay_html
+from onboard.report.replay import replay_html
+from onboard.report.replay_charts import Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,7 +21,7 @@ from onboard.core.vehicle.records import VehicleMatch
 from onboard.errors import ExtraError
 from onboard.report.chart import Band
 from onboard.report.match_charts import most_shown
-from onboard.report.replay import SIGMAS, shown_range
+from onboard.report.replay_charts import SIGMAS, shown_range
 from onboard.report.residual_charts import COMPONENTS, marks
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from onboard.report.parameters import changes
 TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
 MOST_RIVALS = 3
+"""Effects that could stand for another, told one by one: the nearest; the rest in one line."""
 LEVELS = {"info": "worth knowing", "warning": "matters"}
 """How much an effect matters, in words: whether it forbids to set the calibration."""
 

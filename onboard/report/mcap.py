@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, DATA_END = 0x01, 0x02, 0x03, 0x04, 0x05, 0x0F
 NANOSECONDS = 1e9
+"""Of a second: the unit of the format's times."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,54 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from onboard.answers import words
 from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
-from onboard.answers.chronicle import FREE_S, Course, Curve, Figures, Span
+from onboard.answers.chronicle import FREE_S, Figures
 from onboard.answers.compared import common_cause
 from onboard.answers.knowledge import ALL_SIX, determined, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import LACKING, about_six
 from onboard.core.estimate.comparison import Comparison
-from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.report.chart import Band, Line, Ribbon, line_chart, pair_bar, share_bar
+from onboard.report.chart import pair_bar, share_bar
 from onboard.report.flight_rows import flight_rows
 from onboard.report.page import PAGE, render
+from onboard.report.replay_charts import (
+    Drawn,
+    certificate_chart,
+    residual_chart,
+    six_charts,
+    trust_chart,
+)
 
 Array = NDArray[np.float64]
 
 
-class Drawn(Protocol):
-    """What stood before the calibrators of a recording, or of several."""
-
-    @property
-    def duration_s(self) -> float:
-        """Where the drawn time ends, s."""
-
-    @property
-    def spans(self) -> tuple[Span, ...]:
-        """Trust over time."""
-
-    @property
-    def speed(self) -> Curve:
-        """Speed over ground that GPS reported, m/s."""
-
-    def figures(self, imu: int) -> Figures:
-        """The figures of one accelerometer."""
-
-
 TEMPLATE = "replay.html.j2"
-SIGMAS = 2.0
-BEGINNING = 0.15
-"""Share of a course whose wide bands may leave the picture."""
 ENOUGH_PERCENT = 60.0
 MOST_SPANS = 12
 HEADLINES = {
@@ -101,7 +84,7 @@ def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
         damage=[f"{r.path.name}: {n}" for r in result.recordings for n in r.damage],
         notes=[f"{r.path.name}: {n}" for r in result.recordings for n in r.notes]
         + [n for n in result.notes if n not in common],
-        trust_chart=_trust_chart(chronicle),
+        trust_chart=trust_chart(chronicle),
         trust=_trust(chronicle),
         imus=[
             _imu(a, chronicle.figures(a.imu), result.autopilot, chronicle, advice)
@@ -170,8 +153,8 @@ def _imu(
             (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
             for name, e in c.timing.items()
         ],
-        "six": _six_charts(f.course),
-        "residual": _residual_chart(f, chronicle),
+        "six": six_charts(f.course),
+        "residual": residual_chart(f, chronicle),
         "fits": _fits(c),
         "covers": [
             (name, share_bar(p / 100.0, f"{name} coverage", enough=p >= ENOUGH_PERCENT), p)
@@ -179,7 +162,7 @@ def _imu(
         ],
         "weak": _weak(f),
         "certificate": _certificate(c),
-        "certificate_chart": _certificate_chart(c, f.innovation),
+        "certificate_chart": certificate_chart(c, f.innovation),
         "rejected": [(name.replace("_", " "), n) for name, n in sorted(c.rejected.items())],
         "trusted": words.fixed(c.trusted_s, 0),
     }
@@ -274,57 +257,6 @@ def _weak(f: Figures) -> list[tuple[str, str]]:
     return [(advice, "; ".join(found)) for advice, found in by_advice.items()]
 
 
-def _six_charts(course: Course) -> list[Markup]:
-    """Convergence of each of the six, with its band of two sigma and the value in force."""
-    charts = []
-    for i, name in enumerate(SIX_NAMES):
-        t, value, sigma = course.t, course.value[:, i], course.sigma[:, i]
-        low, high = value - SIGMAS * sigma, value + SIGMAS * sigma
-        force = course.in_force[:, i]
-        unit = "factor" if i < 3 else "m/s²"
-        charts.append(
-            line_chart(
-                name,
-                unit,
-                [Line(t, force, "in-force", "in force"), Line(t, value, "estimate", "estimate")],
-                ribbons=[Ribbon(t, low, high, "estimate")],
-                y_range=shown_range(course, i),
-            )
-        )
-    return charts
-
-
-def shown_range(course: Course, i: int) -> tuple[float, float] | None:
-    """What of one number's course is shown: its wide beginning may leave the picture."""
-    spread = SIGMAS * course.sigma[:, i]
-    every = (course.value[:, i] - spread, course.value[:, i] + spread, course.in_force[:, i])
-    later = slice(int(BEGINNING * len(course.t)), None)
-    bounds = np.concatenate([curve[later] for curve in every])
-    bounds = bounds[np.isfinite(bounds)]
-    if not len(bounds):
-        return None
-    bottom, top = float(bounds.min()), float(bounds.max())
-    needs = Needs()
-    margin = 0.08 * max(top - bottom, needs.scale if i < 3 else needs.offset)
-    return bottom - margin, top + margin
-
-
-def _residual_chart(f: Figures, chronicle: Drawn) -> Markup:
-    every = np.concatenate([f.before.y, f.after.y])
-    known = every[np.isfinite(every)]
-    top = 1.1 * float(np.percentile(known, 99.5)) if len(known) else 1.0
-    return line_chart(
-        "Velocity error of free integration",
-        "m/s",
-        [
-            Line(f.before.t, f.before.y, "before", "before"),
-            Line(f.after.t, f.after.y, "after", "after"),
-        ],
-        _bands(chronicle.spans),
-        y_range=(0.0, top or 1.0),
-    )
-
-
 def _fits(c: Calibration) -> list[dict[str, Any]]:
     rows = [
         ("Not used in the fit", "× noise", c.held_out_before, c.held_out_after),
@@ -344,23 +276,6 @@ def _fits(c: Calibration) -> list[dict[str, Any]]:
         }
         for label, unit, a, b in rows
     ]
-
-
-def _trust_chart(chronicle: Drawn) -> Markup:
-    speed = chronicle.speed
-    top = 1.1 * float(speed.y.max()) if len(speed.y) else 1.0
-    return line_chart(
-        "Speed over ground",
-        "m/s",
-        [Line(speed.t, speed.y, "speed", "speed")],
-        _bands(chronicle.spans),
-        x_range=(0.0, max(chronicle.duration_s, 1.0)),
-        y_range=(0.0, top or 1.0),
-    )
-
-
-def _bands(spans: tuple[Span, ...]) -> list[Band]:
-    return [Band(s.start, s.end, "untrusted") for s in spans if s.reason]
 
 
 def _trust(chronicle: Drawn) -> dict[str, Any]:
@@ -392,15 +307,3 @@ def _certificate(c: Calibration) -> dict[str, str] | None:
         "l2": words.number(k.residual_l2),
         "slope": words.number(k.acceleration_bound),
     }
-
-
-def _certificate_chart(c: Calibration, innovation: Curve) -> Markup:
-    if c.certificate is None or not len(innovation.t):
-        return Markup("")
-    bound = c.certificate.uniform_bound
-    ends = np.array([innovation.t.min(), innovation.t.max()])
-    lines = [Line(innovation.t, innovation.y, "after", "residual")]
-    if math.isfinite(bound):
-        lines.append(Line(ends, np.array([bound, bound]), "bound", "bound"))
-    top = max([1.1 * float(innovation.y.max()), *([1.1 * bound] if math.isfinite(bound) else [])])
-    return line_chart("Velocity residual and its bound", "m/s", lines, y_range=(0.0, top or 1.0))

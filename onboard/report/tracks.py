@@ -10,7 +10,7 @@ from onboard.core.estimate.result import SIX_NAMES
 from onboard.report.mcap import Track
 
 if TYPE_CHECKING:
-    from onboard.report.replay import Drawn
+    from onboard.report.replay_charts import Drawn
 
 COMPONENTS = ("north", "east", "down")
 

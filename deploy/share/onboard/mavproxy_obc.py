@@ -28,7 +28,7 @@ SHOWN = ("OBC_STATE", "OBC_TRUST", "OBC_COVERAGE", "OBC_WAITING")
 IMUS = (1, 2, 3)
 
 
-class OnboardModule(mp_module.MPModule):  # type: ignore[misc]
+class OnboardModule(mp_module.MPModule):  # type: ignore[misc]  # MAVProxy has no types
     """The command and what it has heard."""
 
     def __init__(self, mpstate: object) -> None:

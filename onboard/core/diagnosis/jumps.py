@@ -25,7 +25,7 @@ from onboard.core.diagnosis.limits import (
 from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.selection import OFFSETS, Fit, Fitter, settled_from
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.scatter import Pool
+from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums

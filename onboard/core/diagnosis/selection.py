@@ -19,15 +19,10 @@ from numpy.typing import NDArray
 
 from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
-from onboard.core.estimate.scatter import (
-    Pool,
-    Scatter,
-    Weighing,
-    directions_of,
-    scores_of,
-    stacked,
-)
+from onboard.core.estimate.pool import Pool
+from onboard.core.estimate.scatter import Scatter, scores_of, stacked
 from onboard.core.estimate.solution import total
+from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums

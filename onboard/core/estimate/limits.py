@@ -6,6 +6,7 @@ nothing), or *tuned* (on simulated flights: to be derived).
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final
 
 # Linearisation (calibration_model): the range in which timing is looked for.
@@ -84,6 +85,13 @@ FEWEST_BLOCKS: Final = 6
 FEWEST_FREEDOM: Final = 3.0
 """Degrees of freedom below which the variance of Student's t is not told any more: at two it is
 infinite, at three three times the scale's [bound]."""
+KNOWN: Final = 0.5
+"""Share of the prior's variance below which the data know more of a number than it [bound: half
+of the variance is the data's]."""
+FREEDOMS: Final = (inf, 64.0, 32.0, 16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0, 1.4)
+CENTRES: Final = 16
+"""Where the likeliest pool of variances is looked for: closer together than twenty unknowns tell
+it [cost]."""
 ONE_IN_A_THOUSAND: Final = 3.09
 """Standard normal deviate that is exceeded once in a thousand times [probability]."""
 MOST_NOISE: Final = 0.9

@@ -6,99 +6,19 @@ there is, whatever the sums say (cluster-robust, Huber 1967, White 1980; cluster
 not the same in every direction.  What a vehicle's vibration does to a scale, it does not do to an
 offset or to the latency of GPS; one factor for all, the largest, would silence a flight for one bad
 number, and their mean would believe the bad one.
-
-In one direction few blocks count, and their scatter is itself uncertain.  So the variances of all
-directions of a flight are taken for draws from one distribution (inverse chi-square, its centre and
-its width found from them), and each is shrunk towards the centre by as much as it is uncertain: the
-moderated variances of Smyth (2004).  On a flight whose noise is as the model says all directions
-become one, and on one that contradicts itself each stands for itself.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.estimate.limits import FEWEST_FREEDOM
+from onboard.core.estimate.limits import FEWEST_FREEDOM, KNOWN
+from onboard.core.estimate.pool import TINY, Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
-
-TINY = 1e-30
-"""Information of a direction of which no block says anything."""
-KNOWN = 0.5
-"""Share of the prior's variance below which the data know more than it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pool:
-    """What variance the directions of one flight have: centre, and degrees of freedom of it."""
-
-    variance: float = 1.0
-    freedom: float = math.inf
-
-    @classmethod
-    def of(cls, ratio: Array, count: Array, least: float) -> Pool:
-        """The likeliest centre and width, given the scatter in every direction.
-
-        A ratio is then distributed as Fisher's F.  Of one below ``least`` only that is used: a
-        noise level that is too high is no contradiction.
-
-        Args:
-            ratio: (k,) variance over what the sums say.
-            count: (k,) blocks that count for it.
-            least: the centre is no smaller.
-        """
-        if not np.any(ratio > least):
-            return cls(least)
-        centres = np.geomspace(least, float(ratio.max()), CENTRES)
-        chances = [_log_likelihood(ratio, count, centres, f, least) for f in FREEDOMS]
-        i, j = np.unravel_index(int(np.argmax(chances)), (len(FREEDOMS), CENTRES))
-        return cls(float(centres[j]), FREEDOMS[i])
-
-    def moderated(self, ratio: float, count: float) -> tuple[float, float]:
-        """A variance shrunk towards the centre by its own uncertainty, and its freedom."""
-        if math.isinf(self.freedom):
-            return self.variance, self.freedom
-        total = self.freedom + count
-        return (self.freedom * self.variance + count * ratio) / total, total
-
-
-FREEDOMS = (math.inf, 64.0, 32.0, 16.0, 11.0, 8.0, 5.6, 4.0, 2.8, 2.0, 1.4)
-CENTRES = 16
-"""Where a pool is looked for: closer than they are known."""
-BELOW = np.geomspace(1e-3, 1.0, 24)
-"""Shares of the least centre at which the density below it is summed."""
-
-
-def _log_likelihood(
-    ratio: Array, count: Array, centres: Array, freedom: float, least: float
-) -> Array:
-    """Of ratios (k,), with each of the centres (c,): (c,)."""
-    above = ratio > least
-    inside = _log_density(ratio[above] / centres[:, None], count[above], freedom)
-    out: Array = np.sum(inside - np.log(centres)[:, None], axis=1)
-    u = BELOW[:, None] * (least / centres)[:, None, None]
-    under = np.trapezoid(np.exp(_log_density(u, count[~above], freedom)) * u, np.log(BELOW), axis=1)
-    out += np.log(np.maximum(under, TINY)).sum(axis=1)
-    return out
-
-
-def _log_density(u: Array, n: Array, freedom: float) -> Array:
-    """Of Fisher's F with ``n`` and ``freedom`` degrees; of chi-square over ``n`` without end."""
-    half = 0.5 * n
-    front = -np.array([math.lgamma(h) for h in half])
-    if math.isinf(freedom):
-        front += half * np.log(half)
-        tail = half * u
-    else:
-        front += np.array([math.lgamma(h + 0.5 * freedom) for h in half])
-        front += half * np.log(n / freedom) - math.lgamma(0.5 * freedom)
-        tail = (half + 0.5 * freedom) * np.log1p(n * u / freedom)
-    out: Array = front + (half - 1.0) * np.log(u) - tail
-    return out
 
 
 class Scatter:
@@ -207,56 +127,3 @@ def scores_of(N: Array, b: Array, gram: Array, theta: Array) -> Array:
     """What each block asks for beyond ``theta`` (m,): (K, m)."""
     out: Array = b - N @ theta + gram * theta
     return out
-
-
-def directions_of(information: Array, prior_information: Array) -> tuple[Array, Array]:
-    """Directions that are independent in the data and in the prior alike.
-
-    Args:
-        information: (m, m) of the data.
-        prior_information: (m,) of the prior, independent unknowns.
-
-    Returns:
-        X (m, m) with ``X^T P X = 1``, and (m,) what the data know along each, in units of the
-        prior.
-    """
-    root = 1.0 / np.sqrt(prior_information)
-    strength, turned = np.linalg.eigh(information * np.outer(root, root))
-    return root[:, None] * turned, strength
-
-
-class Weighing:
-    """Data with what the sums claim, and a prior, to an estimate with what blocks confirm.
-
-    In the coordinates ``X``, counted from the prior's centre, the prior is one and the data are
-    ``strength``; their noise is ``V`` times that.  Each direction is weighed by its own variance.
-    That the noise of two goes together is in the covariance alone: as a weight it would have to be
-    known better than blocks tell it, and made a plane's estimates a third worse.
-    """
-
-    def __init__(self, X: Array, strength: Array, V: Array) -> None:
-        """Take directions (m, m), information along them (m,) and noise (m, m)."""
-        self.X = X
-        self.weights: Array = 1.0 / np.diag(V)
-        root = np.sqrt(np.maximum(strength, TINY))
-        size, turned = np.linalg.eigh(V)
-        half = (turned * np.sqrt(size)) @ turned.T
-        self._noisy: Array = self.weights[:, None] * half * np.outer(root, 1.0 / root)
-        self.information: Array = np.maximum(strength, 0.0) * self.weights
-        self.gain: Array = X / (self.information + 1.0)
-
-    def estimate(self, score: Array) -> Array:
-        """(m,) from what the data ask for beyond the prior's centre, (m,)."""
-        out: Array = self.gain @ (self.weights * (self.X.T @ score))
-        return out
-
-    def noise(self, claimed: Array) -> Array:
-        """(m, m) along ``X`` of weighted scores of which the sums claim the noise (m, m)."""
-        back = self._noisy @ self.X.T
-        out: Array = back @ claimed @ back.T
-        return out
-
-    def covariance(self, noise: Array) -> Array:
-        """(m, m) of the estimate, with that noise of the weighted scores."""
-        out: Array = self.gain @ (noise + np.eye(len(noise))) @ self.gain.T
-        return (out + out.T) / 2

@@ -21,7 +21,8 @@ from onboard.core.estimate.limits import (
     MOST_NOISE,
     ONE_IN_A_THOUSAND,
 )
-from onboard.core.estimate.scatter import Scatter, Weighing, directions_of
+from onboard.core.estimate.scatter import Scatter
+from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums

@@ -10,7 +10,7 @@ from onboard.core.diagnosis.candidates import Candidate, accepted, smallest
 from onboard.core.diagnosis.hypotheses import choose, confounders_of
 from onboard.core.diagnosis.limits import MOST_EFFECTS
 from onboard.core.diagnosis.score import least, surprise
-from onboard.core.estimate.scatter import Pool
+from onboard.core.estimate.pool import Pool
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
 
 WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}

@@ -5,7 +5,7 @@ import pytest
 
 from onboard.core.diagnosis.selection import FORGOTTEN_S, OFFSETS, Fitter
 from onboard.core.estimate.limits import FOLDS
-from onboard.core.estimate.scatter import Pool
+from onboard.core.estimate.pool import Pool
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model, Unknown

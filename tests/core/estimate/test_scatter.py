@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.score import least, surprise
-from onboard.core.estimate.scatter import Pool, Scatter, Weighing, directions_of
+from onboard.core.estimate.pool import Pool
+from onboard.core.estimate.scatter import Scatter
+from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.student import log_survival_f, two_sided
 from tests.core.estimate.test_solution import MODEL, M, blocks_of, flight
 
