@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
-from onboard.core.diagnosis.limits import MATTERS_HELD_OUT, MATTERS_OFFSET, MATTERS_SCALE
+from onboard.core.diagnosis.limits import (
+    CLEARLY,
+    MATTERS_HELD_OUT,
+    MATTERS_OFFSET,
+    MATTERS_SCALE,
+)
 from onboard.core.diagnosis.score import least, needed, surprise
-from onboard.core.diagnosis.selection import Fit, Fitter
+from onboard.core.diagnosis.selection import Fit, Fitter, Gain
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
+from onboard.core.physics.effects.bias_step import Witness
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +26,7 @@ class Candidate:
 
     ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
     ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
-    the offsets at one moment.
+    the offsets at one moment; other accelerometers may have been ``witness`` of it.
     """
 
     effect: str
@@ -28,6 +35,7 @@ class Candidate:
     columns: Effect | None = None
     places: float = 1.0
     jump: bool = False
+    witness: Witness | None = None
 
     @property
     def sizes(self) -> list[int]:
@@ -41,11 +49,26 @@ class Candidate:
         than what it explains there.  An unknown that is not needed costs as much there as it
         brings in the fit, so twice the variance is given back for each (Akaike 1974, Stone 1977).
         """
-        unknowns = len(self.index)
+        unknowns, gain = len(self.index), self._gain(fitter, before, after)
+        if self.witness is None:
+            return surprise(gain.fall, unknowns, self.places, gain.variance, gain.freedom)
+        return surprise(self.witness.gain + gain.weakened, unknowns, self.witness.places)
+
+    def margin(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """By how much a jump is rather one of this accelerometer than of another one.
+
+        Without a witness there is nobody else.  With one, the size is told, so it is one model
+        against another without any unknown: what GPS explains by it, or contradicts, and what the
+        others say of each other.
+        """
+        if self.witness is None:
+            return inf
+        return self._gain(fitter, before, after).weakened + self.witness.blame
+
+    def _gain(self, fitter: Fitter, before: Fit, after: Fit) -> Gain:
         gain = fitter.gain_by(self.index, before, after)
-        there = fitter.held_gain(before, after) + 2.0 * unknowns * max(gain.variance, 1.0)
-        fall = gain.fall if np.isnan(there) else min(gain.fall, there)
-        return surprise(fall, unknowns, self.places, gain.variance, gain.freedom)
+        there = fitter.held_gain(before, after) + 2.0 * len(self.index) * max(gain.variance, 1.0)
+        return gain if np.isnan(there) else replace(gain, fall=min(gain.fall, there))
 
 
 def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
@@ -67,7 +90,7 @@ def smallest(fitter: Fitter, fit: Fit, c: Candidate) -> Array:
 
 def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
-    if c.score(fitter, before, after) < least():
+    if c.score(fitter, before, after) < least() or c.margin(fitter, before, after) <= CLEARLY:
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if np.any(np.abs(value) > np.array(c.plausible)):

@@ -94,7 +94,8 @@ class Judge:
         moving = self.engine.moving or self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, mismatch, moving=moving)
-        note = " ".join(x for x in (note, trim_in_words(self.calibrator.parameters)) if x)
+        trim = trim_in_words(self.calibrator.parameters)
+        note = " ".join(x for x in (note, self._of_others(), trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
@@ -120,6 +121,25 @@ class Judge:
             if verdict is not Verdict.INSUFFICIENT
             else _not_compared(self.evidence.unused),
         )
+
+    def _of_others(self) -> str:
+        """What the other accelerometers say of a jump, if that is not the sensor's alone."""
+        if (jump := self.choice.undecided) is not None and jump.witness is not None:
+            by = jump.witness.size
+            size = ", ".join(f"{a} {x:+.2f}" for a, x in zip("xyz", by.tolist(), strict=True))
+            return (
+                f"{self._when(jump)} this accelerometer jumped ({size} m/s^2) or the other one by "
+                "the opposite; the flight does not tell which, and the sigmas include both."
+            )
+        if (jump := self.choice.common) is not None:
+            return (
+                f"{self._when(jump)} all accelerometers ask for the same jump: rather something "
+                "that they share (GPS, the recorded attitude, a blow) than a sensor."
+            )
+        return ""
+
+    def _when(self, jump: BiasStep) -> str:
+        return f"At {jump.moment - self.final.origin.t0:.0f} s"
 
     def _mismatch(
         self, before: Fit, after: Fit, effects: Sequence[Finding], ladder: Sequence[Rung]

@@ -128,10 +128,10 @@ class Examination(Engine):
         families = (*self._own, *more)
         return Examination(self, families, t0=self.point.skew_from, start=self, refused=refused)
 
-    def shaken(self, shock: Family) -> Examination:
-        """The same flight and columns with a shock that whatever follows has to live with."""
+    def carrying(self, nuisance: Family) -> Examination:
+        """The same flight and columns with a nuisance that whatever follows has to live with."""
         t0 = self.point.skew_from
-        return Examination(self, self._own, t0=t0, start=self, carried=(shock,)).with_noise()
+        return Examination(self, self._own, t0=t0, start=self, carried=(nuisance,)).with_noise()
 
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is believed as little as may be.

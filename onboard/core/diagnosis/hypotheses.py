@@ -25,7 +25,8 @@ class Choice:
     """Effects that were taken, in order, and the sums in which they are columns.
 
     ``jump_from`` (3,) are sizes from which a jump would have been found at half of the moments at
-    which it was looked for; None where it was not.
+    which it was looked for; None where it was not.  ``common`` is a jump that all accelerometers of
+    the vehicle have made alike, ``undecided`` one that this one has made or another.
     """
 
     fitter: Fitter
@@ -33,6 +34,8 @@ class Choice:
     candidates: list[Candidate]
     chosen: list[Candidate]
     jump_from: Array | None = None
+    common: BiasStep | None = None
+    undecided: BiasStep | None = None
 
     @property
     def free(self) -> list[int]:

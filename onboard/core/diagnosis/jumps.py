@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate
+from onboard.core.diagnosis.companions import Companions
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import (
     AT_ONCE,
+    CLEARLY,
     CONTACT_S,
     FORGOTTEN_S,
     FURTHEST,
@@ -89,14 +91,17 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     return out
 
 
-def shown_from(full: Examination, looked: Sequence[Looked], pool: Pool) -> Array | None:
+def shown_from(
+    full: Examination, looked: Sequence[Looked], pool: Pool, companions: Companions, imu: int
+) -> Array | None:
     """Sizes (3,) from which a jump would have been found at half of the moments; None: at none."""
     if not looked:
         return None
     places = full.trusted_s / SPACINGS_S[0]
     known = np.median([at.known for at in looked], axis=0)
     out: Array = np.sqrt(needed(3, places, pool.variance, pool.freedom) / known)
-    return out
+    with_others = companions.shown_from(imu, known, pool.variance)
+    return out if with_others is None else np.minimum(out, with_others)
 
 
 def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:
@@ -113,6 +118,37 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> Bia
         if not at_edge:
             break
     return _best(full, chosen, centre, fine, 1.5 * coarse)
+
+
+def placed(full: Examination, seen: BiasStep) -> BiasStep:
+    """A jump that other accelerometers have seen, at the moment nearby that GPS likes best."""
+    at = (seen.moment - SPACINGS_S[-1], seen.moment, seen.moment + SPACINGS_S[-1])
+    jumps = [seen.at(t) for t in at if t > full.blocks[0].start]
+    return jumps[int(np.argmax(_gains(full, (), jumps)))]
+
+
+def halved(seen: BiasStep) -> BiasStep:
+    """A jump of this accelerometer or of another one, as likely: its mean and its spread."""
+    w = seen.witness
+    if w is None:
+        return seen
+    half = replace(w, size=0.5 * w.size, sigma=np.hypot(0.5 * w.size, w.sigma))
+    return seen.at(seen.moment, half)
+
+
+def alike(full: Examination, jump: BiasStep, own: BiasStep, variance: float) -> bool:
+    """Whether a jump is rather one of all accelerometers than, as others saw it, of one alone.
+
+    Args:
+        full: the flight with every column.
+        jump: found without the others.
+        own: the same as the others have seen it.
+        variance: of gains over what the sums say.
+    """
+    if own.witness is None:
+        return False
+    as_all, as_one = (gain / max(variance, 1.0) for gain in _gains(full, (), [jump, own]))
+    return as_all - as_one - own.witness.gain > CLEARLY
 
 
 def shock_instead(full: Examination, jump: BiasStep) -> Shock | None:
@@ -243,4 +279,5 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         family,
         places=made.trusted_s / SPACINGS_S[0] if jump else 1.0,
         jump=jump,
+        witness=family.witness if isinstance(family, BiasStep) else None,
     )

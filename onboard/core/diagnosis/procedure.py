@@ -9,25 +9,30 @@ timing and residuals.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import log
 
 from onboard.core.diagnosis.cleared import cleared, since_reboot
+from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
+    alike,
     candidate_of,
     explains,
+    halved,
     jump_near,
     jumps_anywhere,
+    placed,
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import FURTHEST, SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY, FURTHEST, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
-from onboard.core.diagnosis.score import surprise
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
 from onboard.core.estimate.calibrator import Calibrator
@@ -58,7 +63,8 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     flight = since_reboot(engine.batches) if latest else list(engine.batches)
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
-    full, choice = _selected(clear.full, clear.testable)
+    companions = _companions(calibrator, imu, clear.full, latest=latest)
+    full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
     rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
     final, families = settled(full, choice, families, named_only=clear.clipped)
@@ -85,40 +91,96 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
     )
 
 
-def _selected(full: Examination, testable: Sequence[Effect]) -> tuple[Examination, Choice]:
+def _companions(calibrator: Calibrator, imu: int, full: Examination, *, latest: bool) -> Companions:
+    """All accelerometers of the vehicle; of this one what is examined."""
+    prior = full.model.prior_sigma[:6]
+    everyone = {}
+    for other, batches in calibrator.flown.items():
+        own = full.batches if other == imu else since_reboot(batches) if latest else batches
+        before = calibrator.parameters.six(other).as_linear()
+        everyone[other] = Companion(own, before, prior)
+    return Companions(everyone)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is asked of a flight: its effects, and the accelerometers beside the one examined."""
+
+    testable: Sequence[Effect]
+    companions: Companions
+    imu: int
+
+
+def _selected(full: Examination, asked: _Asked, origin: Origin) -> tuple[Examination, Choice]:
     """Effects by their scores, a jump among them if there is one; and the sums that say so."""
-    choice = _chosen(full, testable)
+    choice = _chosen(full, asked.testable)
+    seen, undecided = asked.companions.jump(asked.imu, origin), None
+    if seen is not None:
+        seen = placed(full, seen)
+        wide, other = _beside(full, asked.testable, choice, seen)
+        if any(c.columns is seen for c in other.chosen):
+            return wide, other
+        if _nobodys(wide, other, seen):
+            undecided, full = seen, full.carrying(halved(seen))
+            choice = _chosen(full, asked.testable)
+    full, choice = _by_gps(full, asked, choice)
+    choice.undecided = undecided
+    return full, choice
+
+
+def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examination, Choice]:
+    """The same of jumps that the velocity shows."""
     for _ in range(FURTHEST):
-        jump = _jump(full, choice)
+        jump = _jump(full, choice, asked)
         if jump is None:
             break
         shock = shock_instead(full, jump)
         if shock is None:
-            return _with_jump(full, testable, choice, jump)
+            own = asked.companions.of(jump, asked.imu)
+            common = alike(full, jump, own, choice.fitter.pool.variance)
+            wide, other = _with_jump(full, asked.testable, choice, jump if common else own)
+            other.common = jump if common and any(c.columns is jump for c in other.chosen) else None
+            return wide, other
         steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
         if not explains(full, steady, shock):
             break
-        full = full.shaken(shock)
-        choice = _chosen(full, testable)
+        full = full.carrying(shock)
+        choice = _chosen(full, asked.testable)
     return full, choice
+
+
+def _nobodys(wide: Examination, choice: Choice, seen: BiasStep) -> bool:
+    """Whether a jump that is no chance is neither clearly of this accelerometer nor of another."""
+    on_trial = candidate_of(wide, seen)
+    if seen.witness is None or surprise(seen.witness.gain, 3, seen.witness.places) < least():
+        return False
+    fitter, free = choice.fitter, choice.free
+    margin = on_trial.margin(fitter, fitter.fit(free), fitter.fit([*free, *on_trial.index]))
+    return abs(margin) <= CLEARLY
 
 
 def _with_jump(
     full: Examination, testable: Sequence[Effect], choice: Choice, jump: BiasStep
 ) -> tuple[Examination, Choice]:
     """Effects with a jump among those that are compared, if the offset changes at all."""
+    wide, other = _beside(full, testable, choice, jump)
+    return (wide, other) if _wanders(choice) or _wanders(other) else (full, choice)
+
+
+def _beside(
+    full: Examination, testable: Sequence[Effect], choice: Choice, jump: BiasStep
+) -> tuple[Examination, Choice]:
+    """Effects with a jump among those that are compared."""
     everything = [*testable, jump]
     wide = Examination(full, everything, t0=full.point.skew_from, start=full).tuned()
     # Which change of the offset it is must not be decided by an attitude that it has tilted.
     kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
     other = _chosen(wide.doubting(), everything, kept)
     other.jump_from = choice.jump_from
-    if _wanders(choice) or _wanders(other):
-        return wide, other
-    return full, choice
+    return wide, other
 
 
-def _jump(full: Examination, choice: Choice) -> BiasStep | None:
+def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
     """The jump that explains most by itself; None if nothing looks like one.
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
@@ -128,7 +190,7 @@ def _jump(full: Examination, choice: Choice) -> BiasStep | None:
     if len(full.blocks) < FEWEST_BLOCKS:
         return None
     looked = jumps_anywhere(full)
-    choice.jump_from = shown_from(full, looked, choice.fitter.pool)
+    choice.jump_from = shown_from(full, looked, choice.fitter.pool, asked.companions, asked.imu)
     if not looked:
         return None
     best = max(looked, key=lambda at: at.gain)

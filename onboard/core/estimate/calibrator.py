@@ -92,6 +92,11 @@ class Calibrator:
         """Accelerometers that are estimated, in order."""
         return tuple(self._engines)
 
+    @property
+    def flown(self) -> dict[int, list[Batch]]:
+        """Flight that is kept of every accelerometer, of those that are not estimated, too."""
+        return {imu: self._engines[imu].batches for imu in self._engines} | self._engines.beside
+
     def engine(self, imu: int) -> Engine:
         """The engine of one accelerometer (for diagnosis and benchmarks).
 

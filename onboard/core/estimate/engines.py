@@ -17,6 +17,7 @@ class Engines:
 
     Attributes:
         earlier: sums of before the last start, until a flight agrees with them.
+        beside: flight of accelerometers that are not estimated, as long as the buffer.
     """
 
     def __init__(
@@ -28,6 +29,7 @@ class Engines:
         self._only = frozenset(only)
         self._engines: dict[int, Engine] = {}
         self.earlier = EarlierSums()
+        self.beside: dict[int, list[Batch]] = {}
 
     def __iter__(self) -> Iterator[int]:
         """Accelerometers that are estimated, in order."""
@@ -46,6 +48,7 @@ class Engines:
         newest: float | None = None
         for imu, made in batches.items():
             if self._only and imu not in self._only:
+                self._lay_beside(imu, made)
                 continue
             for batch in made:
                 if imu not in self._engines:
@@ -55,6 +58,14 @@ class Engines:
                 end = float(batch.fixes.t[-1])
                 newest = end if newest is None else max(newest, end)
         return newest
+
+    def _lay_beside(self, imu: int, made: list[Batch]) -> None:
+        """Keep flight of one that is not estimated: it still tells of those that are."""
+        kept = self.beside.setdefault(imu, [])
+        kept.extend(made)
+        held = sum(batch.duration for batch in kept)
+        while held > self._settings.buffer_s and len(kept) > 1:
+            held -= kept.pop(0).duration
 
     def refine(self) -> Counter[str]:
         """A flight is over: refine, and add sums of before that it agrees with; what was done."""

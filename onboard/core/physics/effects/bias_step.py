@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
+from onboard.core.model.regressors import Unknown
 from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import Bearing, Effect, on_axes
 from onboard.core.physics.finding import Finding
@@ -16,6 +18,25 @@ from onboard.core.physics.wording import each
 
 LARGEST = 3.0
 """m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """What the other accelerometers of the vehicle say of a jump.
+
+    Attributes:
+        gain: twice the rise of the log-likelihood of their differences by it.
+        places: moments at which it was looked for.
+        blame: by how much that is more than by a jump of any other one of them.
+        size: (3,) what this one reads too much, m/s^2, if it is this one.
+        sigma: (3,) of that.
+    """
+
+    gain: float
+    places: int
+    blame: float
+    size: Array
+    sigma: Array
 
 
 class BiasStep(Effect):
@@ -41,12 +62,22 @@ class BiasStep(Effect):
         lambda x, about: (x >= about).astype(np.float64),
     )
 
-    def at(self, moment: float) -> Self:
-        """The jump at a moment, s on the boot clock."""
+    witness: Witness | None = None
+    """Its prior, where other accelerometers have seen it."""
+
+    def at(self, moment: float, witness: Witness | None = None) -> Self:
+        """The jump at a moment, s on the boot clock, as the other accelerometers have seen it."""
         made = copy(self)
         made.onset = moment
         made.name = f"bias_step_{moment:.2f}"
         made.take_axes("m/s^2", LARGEST)
+        made.witness = witness or self.witness
+        if made.witness is not None:
+            seen = zip(made.unknowns, made.witness.size, made.witness.sigma, strict=True)
+            made.unknowns = tuple(
+                Unknown(u.name, u.unit, float(size), min(float(sigma), LARGEST))
+                for u, size, sigma in seen
+            )
         return made
 
     @property
