@@ -147,8 +147,9 @@ def alike(full: Examination, jump: BiasStep, own: BiasStep, variance: float) -> 
     """
     if own.witness is None:
         return False
-    as_all, as_one = (gain / max(variance, 1.0) for gain in _gains(full, (), [jump, own]))
-    return as_all - as_one - own.witness.gain > CLEARLY
+    # One after the other: they have the same name.
+    (as_all,), (as_one,) = _gains(full, (), [jump]), _gains(full, (), [own])
+    return (as_all - as_one) / max(variance, 1.0) - own.witness.gain > CLEARLY
 
 
 def shock_instead(full: Examination, jump: BiasStep) -> Shock | None:

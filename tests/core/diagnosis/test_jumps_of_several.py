@@ -1,0 +1,64 @@
+"""A jump of one accelerometer of several is said of that one; of none if nothing tells."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.explaining import heard
+from onboard.core.diagnosis.evidence import Judge
+from onboard.core.diagnosis.procedure import examine
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec
+
+AT = 61.3
+SPEC = FlightSpec(vehicle="copter", seed=23, duration=130.0, imus=random_imus(23, 3))
+
+
+def judged(imus: int, asked: int, **step) -> Judge:
+    """One accelerometer of a vehicle of several, ``step`` concealed."""
+    effect = concealed.BiasStep(time=AT, **step)
+    spec = dataclasses.replace(SPEC, imus=SPEC.imus[:imus], effects=(effect,))
+    return examine(heard(spec), asked)
+
+
+def offsets(judge: Judge):
+    """Offset found less the concealed one before the jump, and its sigma."""
+    c = judge.calibration
+    truth = np.array(SPEC.imus[judge.imu - 1].offset)
+    return np.array(c.offset) - truth, np.array(c.offset_sigma)
+
+
+@pytest.mark.slow
+def test_of_three_a_small_jump_is_said_of_the_one_that_made_it():
+    """5 cm/s^2: GPS alone shows it at the edge, the others without doubt."""
+    said = {imu: judged(3, imu, imu=2, x=0.05, y=-0.04).diagnosis() for imu in (1, 2)}
+    assert "bias_step" not in {e.name for e in said[1].effects}
+    (jump,) = (e for e in said[2].effects if e.name == "bias_step")
+    assert jump.unknowns["time"].value == pytest.approx(AT, abs=1.0)  # half a second is one sigma
+    for axis, size in zip("xyz", (0.05, -0.04, 0.0), strict=True):
+        found = jump.unknowns[axis]
+        assert found.value == pytest.approx(size, abs=4.0 * found.sigma)
+        assert found.sigma < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("imu", [1, 2])
+def test_of_two_nothing_is_said_wrongly_and_sigmas_hold(imu):
+    """Whoever is asked: the jump is its own, the other's, or nobody's and in the sigmas."""
+    judge = judged(2, imu, imu=2, x=0.1)
+    named = {e.name for e in judge.diagnosis().effects}
+    assert "bias_step" not in named or imu == 2
+    off, sigma = offsets(judge)
+    if judge.choice.undecided is not None:
+        assert "does not tell which" in judge.diagnosis().note
+        assert sigma[0] > 0.02
+    assert np.all(np.abs(off) < 4.0 * sigma)
+
+
+@pytest.mark.slow
+def test_what_all_do_alike_is_said_to_be_common():
+    diagnosis = judged(2, 1, imu=0, x=0.2, z=0.15).diagnosis()
+    assert "bias_step" in {e.name for e in diagnosis.effects}
+    assert "all accelerometers ask for the same jump" in diagnosis.note
