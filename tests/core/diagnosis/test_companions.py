@@ -55,12 +55,12 @@ def test_of_two_nobody_is_blamed_and_the_sizes_are_opposite():
 
 
 def test_what_all_do_alike_is_in_no_difference():
-    found = vehicle({imu: (AT, SIZE) for imu in (1, 2, 3)})
+    found = vehicle(dict.fromkeys((1, 2, 3), (AT, SIZE)))
     assert found.jump(1, Origin(T0)) is None
 
 
 def test_of_a_jump_that_was_found_otherwise_they_say_what_they_know():
-    found = vehicle({imu: (AT, SIZE) for imu in (1, 2, 3)})
+    found = vehicle(dict.fromkeys((1, 2, 3), (AT, SIZE)))
     alone = vehicle({1: (AT, SIZE)}).jump(1, Origin(T0))
     told = found.of(alone, 1)
     assert told.witness.gain < 15.0
