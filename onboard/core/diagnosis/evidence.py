@@ -12,7 +12,7 @@ from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
-from onboard.core.diagnosis.hypotheses import Choice
+from onboard.core.diagnosis.hypotheses import Choice, of_others
 from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
 from onboard.core.diagnosis.nuisance_effects import (
     constant_unknowns,
@@ -95,7 +95,8 @@ class Judge:
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, mismatch, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
-        note = " ".join(x for x in (note, self._of_others(), trim) if x)
+        others = of_others(self.choice, self.final.origin.t0)
+        note = " ".join(x for x in (note, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
@@ -121,25 +122,6 @@ class Judge:
             if verdict is not Verdict.INSUFFICIENT
             else _not_compared(self.evidence.unused),
         )
-
-    def _of_others(self) -> str:
-        """What the other accelerometers say of a jump, if that is not the sensor's alone."""
-        if (jump := self.choice.undecided) is not None and jump.witness is not None:
-            by = jump.witness.size
-            size = ", ".join(f"{a} {x:+.2f}" for a, x in zip("xyz", by.tolist(), strict=True))
-            return (
-                f"{self._when(jump)} this accelerometer jumped ({size} m/s^2) or the other one by "
-                "the opposite; the flight does not tell which, and the sigmas include both."
-            )
-        if (jump := self.choice.common) is not None:
-            return (
-                f"{self._when(jump)} all accelerometers ask for the same jump: rather something "
-                "that they share (GPS, the recorded attitude, a blow) than a sensor."
-            )
-        return ""
-
-    def _when(self, jump: BiasStep) -> str:
-        return f"At {jump.moment - self.final.origin.t0:.0f} s"
 
     def _mismatch(
         self, before: Fit, after: Fit, effects: Sequence[Finding], ladder: Sequence[Rung]

@@ -188,3 +188,25 @@ def _reconsider(choice: Choice) -> None:
                 if its > most and accepted(fitter, before, after, other):
                     better, most = other, its
         choice.chosen[choice.chosen.index(c)] = better
+
+
+def of_others(choice: Choice, t0: float) -> str:
+    """What the other accelerometers say of a jump, if that is not the sensor's alone.
+
+    Args:
+        choice: what was chosen.
+        t0: what times are said from, s on the boot clock.
+    """
+    if (jump := choice.undecided) is not None and jump.witness is not None:
+        by = zip("xyz", jump.witness.size.tolist(), strict=True)
+        size = ", ".join(f"{axis} {x:+.2f}" for axis, x in by)
+        return (
+            f"At {jump.moment - t0:.0f} s this accelerometer jumped ({size} m/s^2) or the other "
+            "one by the opposite; the flight does not tell which, and the sigmas include both."
+        )
+    if (jump := choice.common) is not None:
+        return (
+            f"At {jump.moment - t0:.0f} s all accelerometers ask for the same jump: rather "
+            "something that they share (GPS, the recorded attitude, a blow) than a sensor."
+        )
+    return ""

@@ -18,50 +18,18 @@ from onboard.core.diagnosis.limits import (
     AT_ONCE,
     CLEARLY,
     CONTACT_S,
-    FORGOTTEN_S,
     FURTHEST,
-    LARGEST_TURN,
     SCAN_S,
     SPACINGS_S,
 )
+from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise
-from onboard.core.diagnosis.selection import OFFSETS, Fit, Fitter, settled_from
-from onboard.core.estimate.engine import Engine
+from onboard.core.diagnosis.selection import settled_from
+from onboard.core.diagnosis.shocks import Shock
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
-from onboard.core.maths.sums import NormalSums
-from onboard.core.model.nuisances import AXIS
-from onboard.core.model.quadrature import Signals
-from onboard.core.model.regressors import Family, Model, Unknown
-from onboard.core.physics.effect import Effect, Origin, on_axes
-from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
-
-
-class Shock(Family):
-    """Force and turn that the samples have missed, for a while after a moment."""
-
-    def __init__(self, moment: float, lasts: float) -> None:
-        """Take the moment, s on the boot clock, and for how long, s."""
-        self.moment, self.lasts = moment, lasts
-        self.name = f"shock_{moment:.2f}"
-        self.unknowns = (
-            *(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, LARGEST) for a in AXIS),
-            *(Unknown(f"{self.name}_turn_{a}", "rad/s", 0.0, LARGEST_TURN) for a in AXIS),
-        )
-
-    def acceleration(self, nodes: Signals) -> Array:
-        """``-e_i`` for as long as it lasts."""
-        return np.concatenate([self._during(nodes), np.zeros((*nodes.t.shape, 3, 3))], axis=-1)
-
-    def rate(self, nodes: Signals) -> Array:
-        """The same of the rates."""
-        return np.concatenate([np.zeros((*nodes.t.shape, 3, 3)), self._during(nodes)], axis=-1)
-
-    def _during(self, nodes: Signals) -> Array:
-        since = nodes.t - self.moment
-        inside = ((since >= 0.0) & (since < self.lasts)).astype(np.float64)
-        return on_axes(np.repeat(inside[..., None], 3, axis=-1))
+from onboard.core.physics.effect import Effect, Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +52,7 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     out: list[Looked] = []
     for i in range(0, len(moments), AT_ONCE):
         some = moments[i : i + AT_ONCE]
-        fitter, before, fits = _fitted(full, (), [jump.at(t) for t in some])
+        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some])
         for t, (index, after) in zip(some, fits, strict=True):
             known = np.diag(fitter.informed(after, index))
             out.append(Looked(t, fitter.gain(before, after), known))
@@ -124,7 +92,7 @@ def placed(full: Examination, seen: BiasStep) -> BiasStep:
     """A jump that other accelerometers have seen, at the moment nearby that GPS likes best."""
     at = (seen.moment - SPACINGS_S[-1], seen.moment, seen.moment + SPACINGS_S[-1])
     jumps = [seen.at(t) for t in at if t > full.blocks[0].start]
-    return jumps[int(np.argmax(_gains(full, (), jumps)))]
+    return jumps[int(np.argmax(gains(full, (), jumps)))]
 
 
 def halved(seen: BiasStep) -> BiasStep:
@@ -148,7 +116,7 @@ def alike(full: Examination, jump: BiasStep, own: BiasStep, variance: float) -> 
     if own.witness is None:
         return False
     # One after the other: they have the same name.
-    (as_all,), (as_one,) = _gains(full, (), [jump]), _gains(full, (), [own])
+    (as_all,), (as_one,) = gains(full, (), [jump]), gains(full, (), [own])
     return (as_all - as_one) / max(variance, 1.0) - own.witness.gain > CLEARLY
 
 
@@ -162,16 +130,16 @@ def shock_instead(full: Examination, jump: BiasStep) -> Shock | None:
         return None
     for spacing in SPACINGS_S:
         shocks = [Shock(float(t), spacing) for t in np.arange(start, end, spacing)]
-        own, *gains = _gains(full, (), [jump, *shocks])
-        best = shocks[int(np.argmax(gains))]
+        own, *theirs = gains(full, (), [jump, *shocks])
+        best = shocks[int(np.argmax(theirs))]
         start, end = best.moment - spacing, best.moment + spacing
-    likelier = surprise(max(gains), len(best.unknowns)) > surprise(own, len(jump.unknowns))
+    likelier = surprise(max(theirs), len(best.unknowns)) > surprise(own, len(jump.unknowns))
     return best if likelier else None
 
 
 def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
     """Whether what a shock explains beside ``chosen`` effects is no chance at all its moments."""
-    (gain,) = _gains(full, chosen, [shock])
+    (gain,) = gains(full, chosen, [shock])
     return surprise(gain, len(shock.unknowns), full.trusted_s / SPACINGS_S[-1]) >= least()
 
 
@@ -192,82 +160,7 @@ def _best(
     times = np.maximum(times, settled_from(full.blocks))
     times = np.unique(times)
     jumps = [jump.at(float(t)) for t in times]
-    return jumps[int(np.argmax(_gains(full, chosen, jumps)))]
-
-
-def _gains(
-    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
-) -> list[float]:
-    """Gain of each jump alone beside the chosen effects."""
-    fitter, before, fits = _fitted(full, chosen, steps)
-    return [fitter.gain(before, after) for _, after in fits]
-
-
-def _fitted(
-    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
-) -> tuple[Fitter, Fit, list[tuple[list[int], Fit]]]:
-    """Fits without jumps, and with each of them alone; from one pass with all of them.
-
-    Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
-    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.
-
-    Returns:
-        Sums with a column for each; the fit without; columns of each jump, and the fit with it.
-    """
-    families: tuple[Family, ...] = (*chosen, *full.carried, *steps)
-    made = Engine(
-        replace(full.settings, refine=False), full.prior, full.point, full.noise, more=families
-    )
-    moments = [s.moment for s in steps]
-    first, last = min(moments) - FORGOTTEN_S, max(moments) + FORGOTTEN_S
-    far: list[Block] = []
-    for batch, block in zip(full.batches, full.blocks, strict=True):
-        if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
-            after = bool(batch.fixes.t[0] > last)
-            far.append(_with_jumps(block, full, made.model, steps, after=after))
-        else:
-            made.add(batch)
-    absent = np.zeros(made.model.size)
-    if "clock_rate" in made.model.index:
-        absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter([*far, *made.blocks], made.model, absent)
-    places = range(made.model.size)
-    columns = [list(places[made.model.slices[s.name]]) for s in steps]
-    stepped = {i for index in columns for i in index}
-    free = [i for i in places if i not in stepped]
-    before = fitter.fit(free, held_out=False)
-    fits = [(index, fitter.fit([*free, *index], held_out=False)) for index in columns]
-    return fitter, before, fits
-
-
-def _with_jumps(
-    block: Block,
-    full: Examination,
-    model: Model,
-    steps: Sequence[BiasStep | Shock],
-    *,
-    after: bool,
-) -> Block:
-    """Sums of ``model`` over a block that lies before or after every jump."""
-    source, sign = np.full(model.size, -1), np.ones(model.size)
-    for i, unknown in enumerate(model.unknowns):
-        source[i] = full.model.index.get(unknown.name, -1)
-    for family in full.model.families:
-        if family.instead_of in model.slices:
-            theirs = full.model.slices[family.name]
-            source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
-    if after:
-        for step in (s for s in steps if not isinstance(s, Shock)):
-            # What the sensor reads too much; the offsets' columns are what is added to it.
-            source[model.slices[step.name]], sign[model.slices[step.name]] = OFFSETS, -1.0
-    mine = np.flatnonzero(source >= 0)
-    to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
-    signs = np.outer(sign[mine], sign[mine])
-    sums = NormalSums.zeros(model.size)
-    sums.N[to], sums.G[to] = signs * block.sums.N[of], signs * block.sums.G[of]
-    sums.b[mine] = sign[mine] * block.sums.b[source[mine]]
-    sums.s, sums.rows, sums.log_det = block.sums.s, block.sums.rows, block.sums.log_det
-    return Block(block.start, block.end, sums)
+    return jumps[int(np.argmax(gains(full, chosen, jumps)))]
 
 
 def candidate_of(made: Examination, family: Effect) -> Candidate:

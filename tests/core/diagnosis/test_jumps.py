@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
-from onboard.core.diagnosis import jumps, testability
+from onboard.core.diagnosis import jumps, onsets, testability
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.physics.catalogue import catalogue
@@ -56,14 +56,14 @@ def full(request):
 
 
 def gains(full, times):
-    return np.array(jumps._gains(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times]))
+    return np.array(onsets.gains(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times]))
 
 
 @pytest.mark.slow
 def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeypatch):
     times = full.point.skew_from + AT + np.arange(-8.0, 9.0, 4.0)
     near = gains(full, times)
-    monkeypatch.setattr(jumps, "FORGOTTEN_S", 1e6)
+    monkeypatch.setattr(onsets, "FORGOTTEN_S", 1e6)
     whole = gains(full, times)
     assert whole.max() > 200.0
     assert near == pytest.approx(whole, rel=0.15)
