@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.examination import VELOCITY, Examination
 from onboard.core.diagnosis.jumps import jump_near
 from onboard.core.diagnosis.limits import CLEARLY, JUMP_SHARE
-from onboard.core.diagnosis.selection import settled_from
 from onboard.core.filter.refused import Refused
 from onboard.core.physics.finding import Finding
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted
 from onboard.core.diagnosis.limits import CLEARLY, MOST_EFFECTS
 from onboard.core.diagnosis.score import least
@@ -159,7 +160,7 @@ def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | 
     located = any(c.jump for c in choice.candidates)
     if located or len(fitter.blocks) < FEWEST_BLOCKS:
         return None, fitter
-    jumps = fitter.jumps(list(beside))
+    jumps = jumps_of_blocks(fitter, list(beside))
     if not jumps:
         return None, fitter
     boundary = max(jumps, key=lambda x: x[1])[0]
@@ -167,7 +168,7 @@ def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | 
     step = Candidate(
         BiasStep.effect, (m, m + 1, m + 2), (LARGEST,) * 3, places=len(jumps), jump=True
     )
-    return step, fitter.stepped(boundary)
+    return step, stepped(fitter, boundary)
 
 
 def _reconsider(choice: Choice) -> None:

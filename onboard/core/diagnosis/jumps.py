@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
 from onboard.core.diagnosis.examination import Examination
@@ -24,7 +25,6 @@ from onboard.core.diagnosis.limits import (
 )
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise
-from onboard.core.diagnosis.selection import settled_from
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array

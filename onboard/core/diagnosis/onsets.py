@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from onboard.core.diagnosis.block_jumps import OFFSETS
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import FORGOTTEN_S
-from onboard.core.diagnosis.selection import OFFSETS, Fit, Fitter
+from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block

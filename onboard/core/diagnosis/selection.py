@@ -17,7 +17,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
 from onboard.core.estimate.pool import Pool
 from onboard.core.estimate.scatter import Scatter, scores_of, stacked
@@ -26,11 +25,7 @@ from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
-from onboard.core.model.regressors import Family, Model, Unknown
-from onboard.core.physics.effects.bias_step import LARGEST
-
-OFFSETS = (3, 4, 5)
-"""Columns of the offsets among the six."""
+from onboard.core.model.regressors import Model
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +72,7 @@ class Fitter:
         self.blocks = list(blocks)
         self.model = model
         self.sums = total(self.blocks)
-        self._prior = 1.0 / model.prior_sigma**2
+        self.prior_information = 1.0 / model.prior_sigma**2
         folds = np.array_split(np.arange(len(self.blocks)), min(FOLDS, len(self.blocks)))
         self._members = [fold for fold in folds if len(fold) > 0]
         self._folds = [total([self.blocks[i] for i in fold]) for fold in self._members]
@@ -114,8 +109,12 @@ class Fitter:
         index = list(free)
         theta = at.copy()
         theta[index] = 0.0
-        A = self._information(sums, index) + np.diag(self._prior[index])
-        c = sums.b[index] - sums.N[index] @ theta + self._prior[index] * self.model.prior[index]
+        A = self._information(sums, index) + np.diag(self.prior_information[index])
+        c = (
+            sums.b[index]
+            - sums.N[index] @ theta
+            + self.prior_information[index] * self.model.prior[index]
+        )
         theta[index] = np.linalg.solve(A, c)
         return theta
 
@@ -127,7 +126,7 @@ class Fitter:
     def _penalised(self, sums: NormalSums, theta: Array, free: Sequence[int]) -> float:
         index = list(free)
         off = theta[index] - self.model.prior[index]
-        return float(sums.residual(theta) + off @ (self._prior[index] * off))
+        return float(sums.residual(theta) + off @ (self.prior_information[index] * off))
 
     @staticmethod
     def gain(before: Fit, after: Fit) -> float:
@@ -146,7 +145,7 @@ class Fitter:
     def informed(self, fit: Fit, columns: Sequence[int]) -> Array:
         """(k, k) what the sums know of ``columns`` of a fit, the rest of it unknown."""
         index = list(fit.free)
-        A = self._information(self.sums, index) + np.diag(self._prior[index])
+        A = self._information(self.sums, index) + np.diag(self.prior_information[index])
         place = [index.index(c) for c in columns]
         out: Array = np.linalg.inv(np.linalg.inv(A)[np.ix_(place, place)])
         return out
@@ -167,7 +166,7 @@ class Fitter:
         """Covariance (m, m) of a fit, as blocks confirm it; zeros for what is not free."""
         index = list(fit.free)
         information = self._information(self.sums, index)
-        X, strength = directions_of(information, self._prior[index])
+        X, strength = directions_of(information, self.prior_information[index])
         weighing = Weighing(X, strength, self._scatter(fit).noise(X, strength, self.pool))
         out = np.zeros_like(self.sums.N)
         out[np.ix_(index, index)] = weighing.covariance(weighing.noise(information))
@@ -180,7 +179,7 @@ class Fitter:
         least = max(1.0, self.sums.residual(everything.theta) / max(self.rows, 1.0))
         if len(self.blocks) < FEWEST_BLOCKS:
             return Pool(least)
-        return self._scatter(everything).pool(self._prior, least)
+        return self._scatter(everything).pool(self.prior_information, least)
 
     @cached_property
     def _stacked(self) -> tuple[Array, Array, Array]:
@@ -190,7 +189,7 @@ class Fitter:
         """Scores of the blocks about a fit, in its own columns."""
         index = list(fit.free)
         N, b, gram = self._stacked
-        A = self._information(self.sums, index) + np.diag(self._prior[index])
+        A = self._information(self.sums, index) + np.diag(self.prior_information[index])
         scores = scores_of(N, b, gram, fit.theta)[:, index]
         inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
         return Scatter(N[:, index][:, :, index], scores, inverse)
@@ -207,80 +206,3 @@ class Fitter:
     def log_rows(self) -> float:
         """What BIC charges for one unknown."""
         return float(np.log(max(self.rows, 2.0)))
-
-    def stepped(self, boundary: int) -> Fitter:
-        """The same with three more columns at the end: offsets that jump at a block's start.
-
-        The jump is the offset's own columns in the blocks from ``boundary`` on; the filter's
-        memory blurs that by some seconds, which is enough to know where to look closer.
-        """
-        m = self.model.size
-        unknowns = tuple(Unknown(f"jump_{a}", "m/s^2", 0.0, LARGEST) for a in "xyz")
-        model = Model([*self.model.families, _Jump(unknowns)])
-        after = [*range(m), *OFFSETS]
-        blocks = []
-        for i, p in enumerate(self.blocks):
-            sums = NormalSums.zeros(m + 3)
-            sums.s, sums.rows, sums.log_det = p.sums.s, p.sums.rows, p.sums.log_det
-            sums.G[:m, :m] = p.sums.G
-            if i >= boundary:
-                sums.N[:] = p.sums.N[np.ix_(after, after)]
-                sums.b[:] = p.sums.b[after]
-            else:
-                sums.N[:m, :m], sums.b[:m] = p.sums.N, p.sums.b
-            blocks.append(Block(p.start, p.end, sums))
-        return Fitter(blocks, model, np.concatenate([self.absent, np.zeros(3)]))
-
-    def jumps(self, free: Sequence[int]) -> list[tuple[int, float]]:
-        """Blocks at whose start a jump of the offsets would help: (block, gain).
-
-        Not while an EKF that has just begun converges: its attitude jumps then.
-        """
-        index, offsets = list(free), list(OFFSETS)
-        information = np.concatenate([self._prior[index], np.full(3, LARGEST**-2)])
-        prior = np.diag(information)
-        mean = np.concatenate([self.model.prior[index], np.zeros(3)])
-        at = self.absent.copy()
-        at[index] = 0.0
-        base = self.fit(index, held_out=False)
-        shifted, after = self.sums.shifted(at), None
-        settled = settled_from(self.blocks)
-        out = []
-        for i in range(len(self.blocks) - 1, 0, -1):
-            p = self.blocks[i].sums.shifted(at)
-            after = p if after is None else after + p
-            if self.blocks[i].start < settled:
-                continue
-            N = np.block(
-                [
-                    [
-                        (shifted.N - shifted.G)[np.ix_(index, index)],
-                        after.N[np.ix_(index, offsets)],
-                    ],
-                    [after.N[np.ix_(offsets, index)], after.N[np.ix_(offsets, offsets)]],
-                ]
-            )
-            b = np.concatenate([shifted.b[index], after.b[offsets]])
-            theta = np.linalg.solve(N + prior, b + prior @ mean)
-            off = theta - mean
-            N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
-            chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
-            out.append((i, float(base.chi2 - chi2)))
-        return out
-
-
-def settled_from(blocks: Sequence[Block]) -> float:
-    """When jumps may begin, s on the boot clock: when there is flight before them.
-
-    Not while an EKF that has begun with the autopilot converges: its attitude jumps then.
-    """
-    return max(blocks[0].end, FORGOTTEN_S)
-
-
-class _Jump(Family):
-    """Names for the columns of :meth:`Fitter.stepped`; nothing is evaluated."""
-
-    name = "jump"
-
-    def __init__(self, unknowns: tuple[Unknown, ...]) -> None:
-        self.unknowns = unknowns

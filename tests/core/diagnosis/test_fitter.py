@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.selection import FORGOTTEN_S, OFFSETS, Fitter
+from onboard.core.diagnosis.block_jumps import OFFSETS, jumps_of_blocks, stepped
+from onboard.core.diagnosis.limits import FORGOTTEN_S
+from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.blocks import Block
@@ -161,24 +163,24 @@ def jumped(problem, boundary):
 
 @pytest.mark.parametrize("boundary", [1, 4, 9])
 def test_stepped_sums_are_those_of_regressors_that_begin_at_the_block(problem, absent, boundary):
-    stepped = problem.fitter(absent).stepped(boundary)
+    made_so = stepped(problem.fitter(absent), boundary)
     written = jumped(problem, boundary)
     wide = np.concatenate([absent, np.zeros(3)])
-    np.testing.assert_array_equal(stepped.absent, wide)
-    for got, made in zip(stepped.blocks, written.blocks, strict=True):
+    np.testing.assert_array_equal(made_so.absent, wide)
+    for got, made in zip(made_so.blocks, written.blocks, strict=True):
         np.testing.assert_allclose(got.sums.N, made.sums.N, atol=1e-9)
         np.testing.assert_allclose(got.sums.b, made.sums.b, atol=1e-9)
         assert got.sums.s == made.sums.s
     free = [*range(6), 9, 12, 13, 14]
     theta, chi2, _ = least_squares(written, free, wide)
-    fit = stepped.fit(free)
+    fit = made_so.fit(free)
     np.testing.assert_allclose(fit.theta, theta, rtol=1e-8, atol=1e-11)
     assert fit.chi2 == pytest.approx(chi2, rel=1e-9)
 
 
 @pytest.mark.parametrize("free", [range(6), [*range(6), 6, 7, 8, 9]])
 def test_jumps_are_scored_as_if_each_had_been_fitted(problem, absent, free):
-    scored = problem.fitter(absent).jumps(free)
+    scored = jumps_of_blocks(problem.fitter(absent), free)
     settled = [i for i in range(1, len(problem.y)) if BLOCK_S * i >= FORGOTTEN_S]
     assert sorted(i for i, _ in scored) == settled
     without = least_squares(problem, free, absent)[1]
@@ -196,8 +198,8 @@ def test_jumps_and_stepped_agree_where_regressors_are_noisy(problem):
     fitter = Fitter(blocks, problem.model)
     free = list(range(7))
     before = fitter.fit(free)
-    for boundary, gain in fitter.jumps(free):
-        after = fitter.stepped(boundary).fit([*free, 12, 13, 14])
+    for boundary, gain in jumps_of_blocks(fitter, free):
+        after = stepped(fitter, boundary).fit([*free, 12, 13, 14])
         assert gain == pytest.approx(fitter.gain(before, after), rel=1e-7)
 
 
@@ -207,10 +209,10 @@ def test_a_jump_gains_most_where_it_is(problem):
     y[at:] += problem.h[at:][..., OFFSETS] @ size
     moved = Problem(problem.model, problem.h, y).fitter()
     free = list(range(12))
-    best = max(moved.jumps(free), key=lambda x: x[1])
+    best = max(jumps_of_blocks(moved, free), key=lambda x: x[1])
     assert best[0] == at
-    fit = moved.stepped(at).fit([*free, 12, 13, 14])
-    sigma = np.sqrt(np.diag(moved.stepped(at).covariance(fit))[12:])
+    fit = stepped(moved, at).fit([*free, 12, 13, 14])
+    sigma = np.sqrt(np.diag(stepped(moved, at).covariance(fit))[12:])
     assert np.all(np.abs(fit.theta[12:] - size) < 4.0 * sigma)
 
 
@@ -265,8 +267,8 @@ def test_it_takes_blocks_as_they_are(problem):
     blocks = problem.blocks
     fitter = Fitter(blocks, problem.model)
     fitter.fit(range(12))
-    fitter.jumps(range(6))
-    fitter.stepped(3)
+    jumps_of_blocks(fitter, range(6))
+    stepped(fitter, 3)
     fitter.covariance(fitter.fit(range(6)))
     assert all(isinstance(p, Block) for p in blocks)
     assert [p.sums.to_bytes() for p in blocks] == before
