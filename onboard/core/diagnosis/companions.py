@@ -21,7 +21,12 @@ import numpy as np
 
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SEARCHED
 from onboard.core.diagnosis.score import needed, surprise
-from onboard.core.estimate.limits import FEWEST_WINDOWS, MISPLACED_M, SHARED_WINDOW_S
+from onboard.core.estimate.limits import (
+    FEWEST_WINDOWS,
+    MISPLACED_M,
+    PAIR_NOISE_FLOOR,
+    SHARED_WINDOW_S,
+)
 from onboard.core.estimate.shared_windows import SharedWindows, shared_windows
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -187,6 +192,6 @@ def _pair(windows: SharedWindows, a: Companion, b: Companion) -> _Pair:
     for j in range(3):
         H = np.column_stack([agreed[:, j], np.ones(len(windows)), windows.swing[:, j], drift])
         prior = [sigma[j], sigma[3 + j], *(MISPLACED_M,) * 3, LARGEST]
-        axes.append(steps_in(y[:, j], H, np.array(prior) ** -2.0))
+        axes.append(steps_in(y[:, j], H, np.array(prior) ** -2.0, PAIR_NOISE_FLOOR))
     x, y_, z = axes
     return _Pair(windows.t, (x, y_, z))

@@ -202,8 +202,8 @@ def of_others(choice: Choice, t0: float) -> str:
         by = zip("xyz", jump.witness.size.tolist(), strict=True)
         size = ", ".join(f"{axis} {x:+.2f}" for axis, x in by)
         return (
-            f"At {jump.moment - t0:.0f} s this accelerometer jumped ({size} m/s^2) or the other "
-            "one by the opposite; the flight does not tell which, and the sigmas include both."
+            f"At {jump.moment - t0:.0f} s this accelerometer jumped ({size} m/s^2) or another one "
+            "by the opposite; the flight does not tell which, and the sigmas include both."
         )
     if (jump := choice.common) is not None:
         return (

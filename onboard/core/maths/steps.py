@@ -12,7 +12,7 @@ The samples are means over windows: a step begins inside of one, which may be an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -22,6 +22,8 @@ SHARES = np.array([0.0, 0.1, 0.3, 0.6, 0.9, 0.97])
 """Of the variance that wanders."""
 CONSTANTS = 6
 """Time constants that are tried, between two samples and half of the series [cost]."""
+LONGEST = 1200
+"""Samples that are gone through at once: a step shows in those around it [cost: memory]."""
 TOLD = 1e-6
 """Of a step, the share of its square that other columns must leave: below is rounding [bound]."""
 TINY = 1e-300
@@ -46,22 +48,41 @@ class Steps:
     variance: Array
 
 
-def steps_in(y: Array, H: Array, information: Array) -> Steps:
+def steps_in(y: Array, H: Array, information: Array, floor: float = 0.0) -> Steps:
     """Steps of a series beside columns that are in it anyway.
+
+    Each is judged by the :data:`LONGEST` samples around it.
 
     Args:
         y: (n,) evenly spaced.
         H: (n, k) columns.
         information: (k,) prior information of their coefficients, about zero.
+        floor: sigma of noise that is there, whatever the series looks like.
     """
+    n, half = len(y), LONGEST // 2
+    if n <= LONGEST:
+        return _steps_in(y, H, information, floor)
+    made = [np.empty(n) for _ in fields(Steps)]
+    starts = [*range(0, n - LONGEST, half), n - LONGEST]
+    for start in starts:
+        part = slice(start, start + LONGEST)
+        found = _steps_in(y[part], H[part], information, floor)
+        # What is nearer to its beginning was nearer to the middle of the part before.
+        kept = 0 if start == 0 else half // 2
+        for whole, field in zip(made, fields(Steps), strict=True):
+            whole[start + kept : start + LONGEST] = getattr(found, field.name)[kept:]
+    return Steps(*made)
+
+
+def _steps_in(y: Array, H: Array, information: Array, floor: float) -> Steps:
     n, k = H.shape
     grid = _Grid.over(n)
     white = grid.whitened(np.column_stack([y, H]))
     z, W = white[..., 0], white[..., 1:]
-    squares = np.sum(z**2, axis=1)
     b = np.einsum("gnk,gn->gk", W, z)
     gram = np.einsum("gnk,gnl->gkl", W, W)
     freedom = max(n - k - 2, 1)
+    squares = np.sum(z**2, axis=1) + freedom * floor**2
     # Two rounds for the level, with which the prior is weighed.
     chi2 = squares
     for _ in range(2):

@@ -6,6 +6,7 @@ import pytest
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S
 from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 from tests.core.diagnosis.flights import batches, flown
 
 SECONDS, RATE = 90.0, 50.0
@@ -97,3 +98,14 @@ def test_quiet_flights_show_no_jump():
     """One in ten is looked into; none is blamed on anyone clearly and large."""
     looked = [vehicle({}, seed=s).jump(1, Origin(T0)) for s in range(12)]
     assert sum(j is not None for j in looked) <= 4  # of 12 at one in ten, exceeded once in 200
+
+
+def test_two_streams_of_one_sensor_tell_nothing_and_break_nothing():
+    """Some logs have the same accelerometer twice."""
+    raw = flown(np.random.default_rng(1), SECONDS, rate=RATE)
+    made = {i: Companion(batches(raw, rate=RATE, t0=T0), IN_FORCE, PRIOR) for i in (1, 2)}
+    found = Companions(made)
+    assert found.jump(1, Origin(T0)) is None
+    told = found.of(BiasStep(Origin(T0)).at(T0 + AT), 1)
+    assert np.all(np.isfinite(told.witness.size))
+    assert np.all(told.witness.sigma > 0.0)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from onboard.core.maths import steps
 from onboard.core.maths.chi_square import log_survival
 from onboard.core.maths.steps import _Grid, steps_in
 
@@ -119,3 +120,27 @@ def test_units_do_not_matter():
     assert other.gain[inside] == pytest.approx(one.gain[inside], abs=1e-6)
     assert other.size[inside] == pytest.approx(1e-3 * one.size[inside])
     assert other.variance[inside] == pytest.approx(1e-6 * one.variance[inside])
+
+
+def test_a_long_series_is_judged_by_what_is_around(monkeypatch):
+    rng = np.random.default_rng(7)
+    n = 400
+    H = np.ones((n, 1))
+    y = 0.1 * rng.normal(size=n)
+    y[250:] += 1.0
+    whole = steps_in(y, H, WIDE[:1])
+    monkeypatch.setattr(steps, "LONGEST", 160)
+    parts = steps_in(y, H, WIDE[:1])
+    # A step from 250 on is one from 251 on, the sample before it being whole.
+    assert {int(np.argmax(parts.gain)), int(np.argmax(whole.gain))} <= {250, 251}
+    assert parts.size[250] == pytest.approx(whole.size[250], abs=0.05)
+    # The moments of every part are there, each once: far from the step nothing is found.
+    quiet = np.r_[3:150, 350:397]
+    assert np.all(np.isfinite(parts.size))
+    assert parts.gain[quiet].max() < 20.0
+
+
+def test_two_that_are_the_same_have_no_step():
+    found = steps_in(np.zeros(N), np.ones((N, 1)), WIDE[:1], 1e-4)
+    assert np.all(found.gain == pytest.approx(0.0, abs=1e-6))
+    assert np.all(np.isfinite(found.size))
