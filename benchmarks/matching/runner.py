@@ -83,7 +83,10 @@ def saturated(flight: Flight) -> float:
 def one(secret: Secret, asked: Asked = by_command) -> Outcome:
     """Draw, record, seal, ask."""
     begun = time.process_time()
-    flight, answer = made(secret)
+    try:
+        flight, answer = made(secret)
+    except NotFlownError as error:
+        return Outcome(secret, "", {}, None, failure=str(error))
     seal = hashlib.sha256(json.dumps(answer, sort_keys=True).encode()).hexdigest()
     with tempfile.TemporaryDirectory(prefix="matching-") as folder:
         path = Path(folder) / "flight.tlog"
