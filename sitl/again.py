@@ -24,6 +24,7 @@ def fly_again(
     wind: Air,
     out: str | Path,
     *,
+    recorded_in: Air | None = None,
     imus: tuple[ImuTruth, ...] = (ImuTruth(),),
     seed: int = 0,
 ) -> dict[str, Any]:
@@ -34,6 +35,7 @@ def fly_again(
         airframe: what flies it; load it from a frame or coefficient file.
         wind: in which.
         out: the .tlog that is written.
+        recorded_in: wind of the recording; ``wind`` if nothing is said.
         imus: the sensors that it flies with.
         seed: of their noise.
 
@@ -43,7 +45,8 @@ def fly_again(
     Raises:
         SitlError: the recording cannot be flown again, or by no such vehicle.
     """
-    flown = recorded_motion(recording, (wind.north, wind.east))
+    was = wind if recorded_in is None else recorded_in
+    flown = recorded_motion(recording, (was.north, was.east))
     fitting = Airframe if flown.vehicle == "copter" else Wing
     if not isinstance(airframe, fitting):
         raise SitlError(f"a {flown.vehicle} flew it, and the airframe is none of a {flown.vehicle}")

@@ -16,7 +16,7 @@ from pymavlink.DFReader import DFReader_binary
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.builtin import rotation
-from sitl.builtin.airframe.motion import Motion, bank_of
+from sitl.builtin.airframe.motion import Motion, leaning
 from sitl.builtin.smoothing import DT, Array, smooth
 from sitl.builtin.trajectory import Environment, Start, whole_samples
 from sitl.builtin.world import Vehicle
@@ -56,7 +56,8 @@ def recorded_motion(path: str | Path, wind: tuple[float, float] = (0.0, 0.0)) ->
 
     Args:
         path: .tlog or DataFlash.
-        wind: towards north and east, m/s: what a plane banks in.
+        wind: towards north and east, m/s, in which it was recorded: a plane's sideslip is that of
+            its nose in the air, whatever the wind in which it flies again.
 
     Raises:
         SitlError: the recording has no velocity, no attitude or no flight.
@@ -97,13 +98,15 @@ def _motion(rows: _Rows, name: str, wind: tuple[float, float]) -> Motion:
     roll, pitch, heading = (
         _smooth_at(t, attitude[:, 0], np.unwrap(attitude[:, i])) for i in (1, 2, 3)
     )
-    bank = np.zeros(n)
+    bank, slip = np.zeros(n), np.zeros(n)
     if rows.plane:
         R_nb = rotation.from_euler(roll, pitch, heading)
-        bank = np.unwrap(bank_of(R_nb, v_n - np.array([*wind, 0.0]))) * _smooth_in(~landed)
+        bank, slip = leaning(R_nb, v_n - np.array([*wind, 0.0]))
+        aloft = _smooth_in(~landed)
+        bank, slip = np.unwrap(bank) * aloft, slip * aloft
     armed = (t >= lift_off - 3.0) & (t < touch_down + 3.0)
     start = Start(yaw=float(heading[0]))
-    return Motion(v_n, heading, bank, armed, landed, start)
+    return Motion(v_n, heading, bank, slip, armed, landed, start)
 
 
 def _sorted(rows: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:

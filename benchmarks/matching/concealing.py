@@ -34,8 +34,10 @@ SMALL = 0.2
 """A small effect is this share of a large one."""
 DURATION_S = (120.0, 200.0)
 SLOWER = 0.85
-"""What the airframe cannot fly is drawn again, and flown so much slower."""
+"""What the airframe cannot fly is flown again, on another mission and so much slower."""
 ATTEMPTS = 4
+DRAWS = 5
+"""What it cannot fly in so many attempts is no flight that a person would record: drawn again."""
 AGAIN = 100_000
 ALTITUDE: dict[Vehicle, tuple[float, float]] = {"copter": (0.0, 1000.0), "plane": (0.0, 30.0)}
 """Of the field, m.  ArduPilot's simulated plane takes the equivalent airspeed for the true one;
@@ -97,8 +99,12 @@ class Secret:
         return bool(self.wanted) and self.level == "large" and not self.wanted & set(UNSHOWN)
 
     def spec(self, attempt: int = 0) -> FlightSpec:
-        """The flight with everything drawn; a later attempt flies another mission, slower."""
-        rng = np.random.default_rng([self.seed, 983])
+        """The flight with everything drawn; a later attempt flies another mission, slower.
+
+        After every ``ATTEMPTS`` all sizes are drawn anew.
+        """
+        draw, slower = divmod(attempt, ATTEMPTS)
+        rng = np.random.default_rng([self.seed, 983, draw] if draw else [self.seed, 983])
         duration = float(rng.uniform(*DURATION_S))
         imu = ImuTruth(
             scale=_three(1.0 + RESIDUAL_SCALE * rng.standard_normal(3)),
@@ -108,7 +114,7 @@ class Secret:
         aircraft = Aircraft(
             craft=Wing() if self.vehicle == "plane" else Airframe(),
             air=Air(seed=self.seed),
-            fastest=float(rng.uniform(9.0, 12.0)) * SLOWER**attempt,
+            fastest=float(rng.uniform(9.0, 12.0)) * SLOWER**slower,
         )
         share = SMALL if self.level == "small" else 1.0
         extra: list[sensors.Effect] = []

@@ -21,7 +21,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from benchmarks.challenge import answers, kept, parser, summary
 from benchmarks.matching.adapter import Asked, MatchError, by_command
-from benchmarks.matching.concealing import ATTEMPTS, Challenge, Secret
+from benchmarks.matching.concealing import ATTEMPTS, DRAWS, Challenge, Secret
 from benchmarks.matching.scoring import LEGEND, Outcome, describe, measured, table
 from sitl.builtin.airframe.differences import differences
 from sitl.builtin.airframe.frame import Airframe
@@ -32,12 +32,22 @@ MOST_SATURATED = 5e-3
 """Share of a flight in which motors may be at their limits; more would be flown slower."""
 
 
+class NotFlownError(Exception):
+    """No vehicle of the kind that was drawn can fly it."""
+
+
 def made(secret: Secret) -> tuple[Flight, dict[str, Any]]:
-    """The flight, slow enough for its motors, and the answer."""
-    for attempt in range(ATTEMPTS):
+    """A flight that its motors and surfaces can fly, and the answer.
+
+    Raises:
+        NotFlownError: none was drawn.
+    """
+    for attempt in range(DRAWS * ATTEMPTS):
         flight = run(secret.spec(attempt))
         if saturated(flight) <= MOST_SATURATED:
             break
+    else:
+        raise NotFlownError(f"{secret} asks for more than its vehicle has")
     aircraft = flight.spec.aircraft
     assert aircraft is not None
     answer = differences(aircraft, flight.pieces[-1].trajectory)
@@ -73,7 +83,10 @@ def saturated(flight: Flight) -> float:
 def one(secret: Secret, asked: Asked = by_command) -> Outcome:
     """Draw, record, seal, ask."""
     begun = time.process_time()
-    flight, answer = made(secret)
+    try:
+        flight, answer = made(secret)
+    except NotFlownError as error:
+        return Outcome(secret, "", {}, None, failure=str(error))
     seal = hashlib.sha256(json.dumps(answer, sort_keys=True).encode()).hexdigest()
     with tempfile.TemporaryDirectory(prefix="matching-") as folder:
         path = Path(folder) / "flight.tlog"

@@ -26,8 +26,11 @@ from onboard.errors import RecordingError
 from onboard.recordings.opening import open_recording
 
 STEP_S: Final = SIMULATED_PERIOD_S
-"""Step of the grid on which two flights are laid side by side, s: the simulator's receiver says no
-more of the motion between two fixes [data sheet]."""
+"""What is compared are means over so long, s: the simulator's receiver says no more of the motion
+between two fixes [data sheet]."""
+FINE: Final = 10
+"""Steps of the grid in such a mean: 0.02 s of turning at 100 deg/s are a third of a typical
+difference of tilt [tuned]."""
 LEAST_OVERLAP: Final = 0.6
 """Share of the shorter flight that must lie beside the other: short of what it flies, standing
 before one flight beside standing after the other would fit best [tuned]."""
@@ -77,7 +80,7 @@ class FlownAgain:
 
 @dataclass(frozen=True, slots=True)
 class Courses:
-    """A flight on an even grid: velocity (n, 3) NED, force (n, 3) body, roll and pitch (n, 2)."""
+    """Means over STEP_S, FINE of them in it: v (n, 3) NED, f (n, 3) body, roll and pitch (n, 2)."""
 
     v_n: Array
     f_b: Array
@@ -161,23 +164,18 @@ def courses(path: str | Path) -> Courses:
         raise RecordingError(f"{path}: no motion to lay side by side")
     v, f, a = (np.array(rows) for rows in (fixes, imu, attitude))
     start = max(x[0, 0] for x in (v, f, a))
-    n = int((min(x[-1, 0] for x in (v, f, a)) - start) / STEP_S)
-    if n < 2:
+    n = int((min(x[-1, 0] for x in (v, f, a)) - start) / STEP_S) * FINE
+    if n < 2 * FINE:
         raise RecordingError(f"{path}: no motion to lay side by side")
-    t = start + STEP_S * np.arange(n)
+    t = start + STEP_S / FINE * np.arange(n)
     return Courses(_means(t, v), _means(t, f), _means(t, a))
 
 
 def _means(t: Array, rows: Array) -> Array:
-    """(n, k) means over the steps that begin at t (n,); straight lines where a step is empty."""
-    middle = t + 0.5 * STEP_S
-    out = np.column_stack([np.interp(middle, rows[:, 0], x) for x in rows[:, 1:].T])
-    which = np.floor((rows[:, 0] - t[0]) / STEP_S).astype(np.int64)
-    inside = (which >= 0) & (which < len(t))
-    counts = np.bincount(which[inside], minlength=len(t))
-    for k, x in enumerate(rows[:, 1:].T):
-        sums = np.bincount(which[inside], weights=x[inside], minlength=len(t))
-        out[:, k] = np.where(counts > 0, sums / np.maximum(counts, 1), out[:, k])
+    """(n - FINE, k) means of straight lines between rows, over the STEP_S that begin at t (n,)."""
+    even = np.column_stack([np.interp(t, rows[:, 0], x) for x in rows[:, 1:].T])
+    sums = np.cumsum(even, axis=0)
+    out: Array = (sums[FINE:] - sums[:-FINE]) / FINE
     return out
 
 
@@ -187,7 +185,7 @@ def beside(real: Courses, simulated: Courses) -> dict[str, float]:
     Raises:
         RecordingError: they are not of one motion.
     """
-    shift = _shift(real.v_n, simulated.v_n)
+    shift = _shift(real, simulated)
     i, j = max(shift, 0), max(-shift, 0)
     n = min(len(real.v_n) - i, len(simulated.v_n) - j)
     one, other = slice(i, i + n), slice(j, j + n)
@@ -203,17 +201,25 @@ def beside(real: Courses, simulated: Courses) -> dict[str, float]:
     return out
 
 
-def _shift(a: Array, b: Array) -> int:
-    """Steps that a is ahead of b: where the velocities differ least."""
-    best, at = math.inf, 0
+def _shift(real: Courses, simulated: Courses) -> int:
+    """Steps of the grid that one flight is ahead of the other.
+
+    Found by the velocity, which is anywhere what was flown, and then by the tilt, which no receiver
+    makes late.
+    """
+    a, b = real.v_n[::FINE, :2], simulated.v_n[::FINE, :2]
     least = int(LEAST_OVERLAP * min(len(a), len(b)))
-    for shift in range(least - len(b), len(a) - least + 1):
-        i, j = max(shift, 0), max(-shift, 0)
-        n = min(len(a) - i, len(b) - j)
-        apart = float(np.mean((a[i : i + n, :2] - b[j : j + n, :2]) ** 2))
-        if apart < best:
-            best, at = apart, shift
-    return at
+    shifts = range(least - len(b), len(a) - least + 1)
+    roughly = FINE * min(shifts, key=lambda s: _apart(a, b, s))
+    near = range(roughly - 2 * FINE, roughly + 2 * FINE + 1)
+    return min(near, key=lambda s: _apart(real.tilt, simulated.tilt, s))
+
+
+def _apart(a: Array, b: Array, shift: int) -> float:
+    """Mean square of what two flights differ by while they overlap."""
+    i, j = max(shift, 0), max(-shift, 0)
+    n = min(len(a) - i, len(b) - j)
+    return float(np.mean((a[i : i + n] - b[j : j + n]) ** 2)) if n > 0 else math.inf
 
 
 def _rms(x: Array) -> float:

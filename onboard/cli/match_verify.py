@@ -46,8 +46,9 @@ def verify(result: Match, recording: Path) -> FlownAgain:
     with tempfile.TemporaryDirectory() as folder:
         nominal, found = Path(folder) / "nominal.tlog", Path(folder) / "again.tlog"
         try:
-            fly_again(recording, Wing() if plane else Airframe(), Air(), nominal)
-            fly_again(recording, craft_of(result), air_of(result), found)
+            air = air_of(result)
+            fly_again(recording, Wing() if plane else Airframe(), Air(), nominal, recorded_in=air)
+            fly_again(recording, craft_of(result), air, found)
         except (SitlError, ValueError) as error:
             raise UsageError(f"--verify: {error}") from None
         try:

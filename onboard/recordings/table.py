@@ -36,6 +36,7 @@ from onboard.core.maths.frames import (
     rotation_from_quaternion,
     vector_from_rotation,
 )
+from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording, elapsed_s
 from onboard.recordings.table_map import TableMap, load_map
@@ -169,6 +170,7 @@ def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterato
         _imu(tracks, Track(t, R_nb), chosen),
         _fixes(tracks, chosen),
         _outputs(tracks, chosen),
+        *_of_a_plane(tracks),
         _battery(tracks),
     ]
     if "airspeed" in tracks:
@@ -281,6 +283,28 @@ def _outputs(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
     return [
         Outputs(float(a), tuple(float(c) for c in row), normalised)
         for a, row in zip(its.t, x, strict=True)
+    ]
+
+
+def _of_a_plane(tracks: dict[str, Track]) -> list[list[Sample]]:
+    """Throttle and rudder as an autopilot's outputs would have them."""
+    throttle, rudder = tracks.get("throttle"), tracks.get("rudder")
+    if throttle is None or not len(throttle.t):
+        return []
+    there = rudder is not None and len(rudder.t) > 0
+    turned = np.zeros(len(throttle.t))
+    if rudder is not None and there:
+        turned = np.interp(throttle.t, rudder.t, rudder.x[:, 0])
+    named: list[Sample] = [ParameterValue("SERVO1_FUNCTION", THROTTLE_FUNCTION, 0.0)]
+    if there:
+        named.append(ParameterValue("SERVO2_FUNCTION", RUDDER_FUNCTION, 0.0))
+    pulses = np.column_stack([1000.0 + 1000.0 * throttle.x[:, 0], 1500.0 + 500.0 * turned])
+    return [
+        named,
+        [
+            Outputs(float(t), (float(a), float(b)), normalised=False)
+            for t, (a, b) in zip(throttle.t, pulses, strict=True)
+        ],
     ]
 
 

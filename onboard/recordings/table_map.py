@@ -23,13 +23,15 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "force": {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY},
     "rates": {"rad/s": 1.0, "deg/s": DEGREE, "mrad/s": 1e-3},
     "motors": {"us": 1.0, "1": 1.0, "%": 0.01},
+    "throttle": {"1": 1.0, "%": 0.01},
+    "rudder": {"1": 1.0, "%": 0.01},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
     "airspeed": {"m/s": 1.0, "cm/s": 0.01},
 }
 """Units of each quantity; the first is meant where none is given."""
 WIDTHS = {"time": 1, "position": 3, "velocity": 3, "force": 3, "rates": 3}
-WIDTHS |= {"voltage": 1, "current": 1, "airspeed": 1}
+WIDTHS |= {"voltage": 1, "current": 1, "airspeed": 1, "throttle": 1, "rudder": 1}
 WORLDS = {
     "ned": np.eye(3),
     "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
@@ -132,6 +134,10 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
             raise ValueError(f"[{needed}] is missing")
     if not {"velocity", "position"} & set(quantities):
         raise ValueError("[velocity] or [position] is missing")
+    if "throttle" in quantities and "motors" in quantities:
+        raise ValueError("a copter has [motors], a plane has [throttle]: one of them is too many")
+    if "rudder" in quantities and "throttle" not in quantities:
+        raise ValueError("[rudder] is of no use without [throttle]")
     attitude, force = _table(found, "attitude"), _table(found, "force")
     origin = _table(found, "origin") if "origin" in found else {}
     _only(origin, {"latitude", "longitude", "altitude"}, "origin.")

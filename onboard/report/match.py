@@ -32,6 +32,13 @@ OF_EFFECT = {
 }
 """Curves that show an effect."""
 
+IN_FILE = {
+    "copter": {
+        *("rotor_drag", "body_drag", "thrust_scale", "thrust_curve", "voltage_sag", "thrust_tilt"),
+    },
+    "plane": {"lift", "drag", "side_force"},
+}
+"""Effects that a frame or coefficient file has keys for: without one it is the file of before."""
 FRAME_BY = {PAGE: "--frame-out", HEAD: "frame_file()"}
 SETTINGS_BY = {PAGE: "--param", HEAD: "param()"}
 """How who reads it writes the files: a page comes of the command, a head of the library."""
@@ -66,7 +73,7 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         hand_back=_hand_back(match, FRAME_BY[base]),
         frame_by=FRAME_BY[base],
         settings_by=SETTINGS_BY[base],
-        note=v.note,
+        note=f"{words.capital(v.note)}." if v.note else "",
         effects=[_card(d, v) for d in match.effects],
         forces=_forces(v),
         alone_s=words.fixed(float(v.alone.t[-1]), 0) if v.alone is not None else "",
@@ -109,13 +116,19 @@ def _nothing(match: Match) -> str:
 
 
 def _hand_back(match: Match, frame_by: str) -> str:
-    if not match.settings and not match.effects:
-        return "Nothing."
+    v = match.vehicle
+    in_file = {d.name for d in match.effects} & IN_FILE.get(v.vehicle, set())
     count = len(match.settings)
-    if not count:
-        return f"Load the frame file of this match ({frame_by}) into the simulator."
     many = f"the {count} parameters" if count > 1 else "the parameter"
-    return f"Set {many} below in the simulator, and load the frame file ({frame_by})."
+    if count and in_file:
+        return f"Set {many} below in the simulator, and load the frame file ({frame_by})."
+    if count:
+        return f"Set {many} below in the simulator."
+    if in_file:
+        return f"Load the frame file of this match ({frame_by}) into the simulator."
+    if match.effects:
+        return "Nothing: the simulator has no setting for what differs."
+    return "Nothing."
 
 
 def _card(d: Difference, v: VehicleMatch) -> dict[str, Any]:

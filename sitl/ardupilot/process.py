@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import shutil
 import socket
@@ -20,6 +21,7 @@ FRAMES = {"plane": "plane", "copter": "+"}
 FIRST_PORT = 5760
 PORTS_OF_ONE = (0, 2, 3)
 """Serial ports 0, 1 and 2 listen on these offsets from 5760 + 10 per instance."""
+AIRFRAME = "airframe.json"
 INSTANCES = range(20, 90)
 PATIENCE = 30.0
 """Seconds for a binary to open its first port."""
@@ -51,6 +53,7 @@ class ArdupilotProcess:
         vehicle: ``plane`` or ``copter``.
         speedup: simulated seconds a second, as far as the machine can follow.
         parameters: beside the defaults that make it fly.
+        airframe: keys of a frame or coefficient file; its own without.
     """
 
     def __init__(
@@ -59,8 +62,10 @@ class ArdupilotProcess:
         *,
         speedup: float = 5.0,
         parameters: Mapping[str, float] | None = None,
+        airframe: Mapping[str, object] | None = None,
     ) -> None:
         self._parameters = parameters or {}
+        self._airframe = airframe
         self.vehicle = vehicle
         self._binary = find_binary(vehicle)
         self._speedup = speedup
@@ -83,10 +88,14 @@ class ArdupilotProcess:
         folder = Path(self._folder.name)
         defaults = folder / "defaults.parm"
         defaults.write_text(defaults_text(self.vehicle, self._parameters))
+        model = FRAMES[self.vehicle]
+        if self._airframe is not None:
+            (folder / AIRFRAME).write_text(json.dumps(dict(self._airframe)))
+            model = f"{model}:{AIRFRAME}"  # read relative to where it is started
         self._instance = _free_instance()
         with (folder / "output.txt").open("wb") as output:
             self._process = await asyncio.create_subprocess_exec(
-                *(str(self._binary), "-w", "--model", FRAMES[self.vehicle]),
+                *(str(self._binary), "-w", "--model", model),
                 *("--speedup", f"{self._speedup:g}", "--defaults", str(defaults)),
                 *("--home", HOME, "-I", str(self._instance)),
                 cwd=folder,
@@ -106,6 +115,17 @@ class ArdupilotProcess:
     def output(self) -> str:
         """What it has printed."""
         return (Path(self._folder.name) / "output.txt").read_text(errors="replace")
+
+    def keep_log(self, out: str | Path) -> None:
+        """Copies the last DataFlash log; after it has disarmed, which ends it.
+
+        Raises:
+            SitlError: there is none.
+        """
+        logs = sorted((Path(self._folder.name) / "logs").glob("*.BIN"))
+        if not logs:
+            raise SitlError("it has written no log")
+        shutil.copyfile(logs[-1], out)
 
     async def stop(self) -> None:
         """Ends it and removes its files."""

@@ -14,6 +14,7 @@ from onboard.core.inputs.samples import (
     GpsFix,
     ImuSample,
     Outputs,
+    ParameterValue,
     VehicleState,
 )
 from onboard.core.maths.frames import rotation_from_euler
@@ -132,6 +133,7 @@ def test_rates_that_are_not_measured_are_the_slope_of_the_attitude(tmp_path, col
         ('column = "t_ms"', "column = 3", "time.column must name columns"),
         ('vehicle = "copter"', "fix_rate = 0", "fix_rate must be positive"),
         ('vehicle = "copter"', "vehicle = ", "no TOML"),
+        ("[voltage]", '[throttle]\ncolumn = "m1"\n[voltage]', "one of them is too many"),
     ],
 )
 def test_what_is_wrong_is_named(table, columns, old, new, said):
@@ -140,6 +142,29 @@ def test_what_is_wrong_is_named(table, columns, old, new, said):
     with pytest.raises((ConfigurationError, RecordingError), match=said) as caught:
         open_table(table, columns(text.replace(old, new, 1)))
     assert "map.toml" in str(caught.value) or "flight.csv" in str(caught.value)
+
+
+def test_throttle_and_rudder_of_a_plane_are_outputs_with_their_functions(table, columns):
+    levers = """
+[throttle]
+column = "m1"
+unit = "%"
+
+[rudder]
+column = "m2"
+unit = "%"
+"""
+    text = MAP.replace("copter", "plane") + levers
+    told = samples(table, columns(text), ParameterValue)
+    assert {p.name: p.value for p in told}["SERVO1_FUNCTION"] == 70
+    assert {p.name: p.value for p in told}["SERVO2_FUNCTION"] == 21
+    # 1150 and 1550 % in the table: pulses of 1 ms and a half more for all of them.
+    assert samples(table, columns(text), Outputs)[0].values == (12_500.0, 9_250.0)
+
+
+def test_a_rudder_without_throttle_is_refused(table, columns):
+    with pytest.raises(ConfigurationError, match="of no use without"):
+        load_map(columns(MAP + '[rudder]\ncolumn = "m2"\n'))
 
 
 def test_a_table_that_is_none_is_named(tmp_path, columns):
@@ -180,6 +205,6 @@ def test_the_map_of_the_manual_is_one(columns):
     manual = Path(__file__).parents[2] / "docs" / "matching.md"
     (text,) = re.findall(r"```text\n(vehicle.*?)```", manual.read_text(encoding="utf-8"), re.DOTALL)
     chosen = load_map(columns(text))
-    assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"}
+    assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"} - {"throttle", "rudder"}
     assert chosen.quaternion
     assert chosen.airborne

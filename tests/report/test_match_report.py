@@ -63,6 +63,15 @@ def test_files_are_written_by_what_the_reader_has_in_hand():
     assert "--param" not in head
 
 
+def test_no_frame_file_is_to_be_loaded_where_the_airframe_is_right():
+    match = by_hand()
+    of_air = tuple(d for d in match.effects if d.name == "wind")
+    assert of_air
+    told = "load the frame file"
+    assert told in page().words.lower()
+    assert told not in Page.of(match_html(replace(match, effects=of_air))).words.lower()
+
+
 def test_names_of_files_and_numbers_of_others_are_escaped():
     html = match_html(by_hand(name="<script>alert(1)</script>.BIN", note="a < b & c"))
     assert html.count("<script") == 1  # ours
@@ -101,7 +110,7 @@ def test_a_recording_without_anything_is_still_a_page():
     empty = VehicleMatch("unknown", not_testable=nothing.not_testable, note="no GPS")
     match = replace(nothing, vehicle=empty, verdict=Verdict.INSUFFICIENT)
     said = Page.of(match_html(match)).words
-    assert "no GPS" in said
+    assert "No GPS" in said
     assert "This recording says too little" in said
     assert "nan" not in said.lower().split()
 

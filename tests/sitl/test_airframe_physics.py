@@ -12,7 +12,9 @@ from sitl.builtin.airframe import copter_force, motors
 from sitl.builtin.airframe.air import GRAVITY, Air, density, profile, turbulence
 from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.airframe.battery import discharge
+from sitl.builtin.airframe.flight import flown
 from sitl.builtin.airframe.frame import Airframe
+from sitl.builtin.airframe.motion import Motion
 from sitl.builtin.airframe.wing import Wing
 from sitl.builtin.smoothing import DT, integral
 from sitl.builtin.trajectory import Environment, Start, specific_force_n
@@ -250,6 +252,44 @@ def test_planes_fly_at_the_angle_that_gives_their_lift(plane):
     lift, drag = Wing(c_drag_p=0.13).coefficients(alpha)
     expected = -0.45 * pressure * (drag * np.sin(alpha) + lift * np.cos(alpha))
     assert np.abs(plane.outputs.drag_b[inside, 2] - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("c_y_b", [-0.25, -0.49])
+def test_planes_with_little_side_force_fly_what_they_are_told(c_y_b):
+    """The rudder that holds a slip takes all of its force: lift that leans makes the rest."""
+    wing = Wing(c_y_b=c_y_b)
+    flight = fly(wing, Air(), 95.0, seed=5)
+    inside = aloft(flight)
+    outputs = flight.outputs
+    missing = outputs.mass[:, None] * flight.f_b - outputs.thrust_b - outputs.drag_b
+    assert np.abs(missing[inside]).max() < 1e-9
+    u_b = rotation.rotate_back(flight.R_nb, flight.v_n)[inside]
+    slip = np.arctan2(u_b[:, 1], u_b[:, 0])
+    assert 0.05 < np.abs(slip).max() < 0.3
+    assert np.abs(flight.w_b[inside]).max() < 4.0
+
+
+def test_a_push_over_without_lift_does_not_roll_the_plane_over():
+    n = 20_000
+    t = np.arange(n) * DT
+    down = 12.0 * np.sin(0.9 * t)  # its slope takes the lift through zero
+    v_n = np.column_stack([np.full(n, 30.0), 0.3 * np.sin(2.0 * t), down])
+    told = Motion(
+        v_n, np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n, bool), np.zeros(n, bool), Start()
+    )
+    flight = flown(told, Wing(), Air(), HOME)
+    middle = slice(6000, 14_000)
+    assert flight.f_b[middle, 2].max() > -0.5
+    assert np.abs(flight.w_b[middle, 0]).max() < 3.0
+
+
+def test_a_nose_in_gusts_stays_where_it_was_turned_to():
+    calm, gusty = (fly(Wing(), Air(turbulence=s, seed=5), 60.0) for s in (0.0, 0.6))
+    inside = aloft(calm)
+    heading, other = (rotation.to_euler(f.R_nb[inside])[:, 2] for f in (calm, gusty))
+    turned = np.arctan2(np.sin(other - heading), np.cos(other - heading))
+    gust = gusty.outputs.wind_n[inside, 1] / 20.0
+    assert np.std(np.diff(turned[::100])) < 0.5 * np.std(np.diff(gust[::100]))
 
 
 def test_an_airspeed_sensor_errs_by_the_root_of_its_ratio():

@@ -101,6 +101,9 @@ AMBIGUOUS: Final = 10.0
 [probability]."""
 TURBULENCE_FLOOR_M_S: Final = 0.3
 """Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
+HEADING_RAD: Final = 0.03
+"""What a heading is good to that a compass holds, rad: at speed it is an error of the velocity
+across the way, wandering for as long as nobody turns [data sheet]."""
 
 MOST_BY_GUSTS: Final = 0.95
 """Share of what tells an unknown that gusts may make; past it nothing is known [probability]."""

@@ -12,7 +12,6 @@ from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.flown_alone import drift_alone
-from onboard.core.vehicle.limits import TURBULENCE_FLOOR_M_S
 from onboard.core.vehicle.matching import Matched, held_out
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
@@ -192,17 +191,17 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 
 def is_explained(m: Matched) -> bool:
-    """Whether what is left is less than what errors of the velocity or the gusts found make."""
+    """Whether what is left is less than errors of the motion, or the gusts found, make."""
     if m.remainders:
         return False
     if m.turbulence.found:
         return True
-    left = [
-        rms(m.held[:, k]) / max(rms(m.fit.sensitivity[:, k]), 1e-6)
+    unclear = m.model.unclear(m.fit.theta)
+    return all(
+        rms(m.held[:, k]) < rms(unclear[:, k])
         for k, axis in enumerate(m.model.axes)
         if axis in FORCE
-    ]
-    return max(left, default=0.0) < TURBULENCE_FLOOR_M_S
+    )
 
 
 def note_of(m: Matched) -> str:

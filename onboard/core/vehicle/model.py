@@ -12,6 +12,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import HEADING_RAD, TURBULENCE_FLOOR_M_S
 
 DIFFERENCE = 1e-3
 """Step of a difference quotient, in plausible sizes: forces are smooth [cost]."""
@@ -150,6 +151,16 @@ class ForceModel:
     def sensitivity(self, theta: Array) -> Array:
         """(n, k) change of the force by a gust of 1 m/s from anywhere, 1/s."""
         out: Array = np.sqrt(np.sum(self.gust_slope(theta) ** 2, axis=-1))
+        return out
+
+    def unclear(self, theta: Array) -> Array:
+        """(n, k) m/s^2 that errors of the velocity and of the heading may make, and no gust."""
+        slope = self.gust_slope(theta)
+        u_n = np.einsum("nij,ni->nj", self.flight.R_bn, self.air(theta).u_b)
+        across = np.column_stack([-u_n[:, 1], u_n[:, 0], np.zeros(len(u_n))])
+        turned = np.einsum("nki,ni->nk", slope, across)
+        square = TURBULENCE_FLOOR_M_S**2 * np.sum(slope**2, axis=-1)
+        out: Array = np.sqrt(square + (HEADING_RAD * turned) ** 2)
         return out
 
     def measured(self) -> Array:

@@ -13,10 +13,12 @@ from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.lift import Lift
+from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
 from onboard.core.vehicle.effects.servo_lag import ServoLag
 from onboard.core.vehicle.effects.side_force import SideForce
+from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
@@ -94,8 +96,10 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
         ServoLag(),
         Lift(frame),
         Drag(frame),
+        SlipDrag(),
         SideForce(frame),
         Propulsion(frame),
+        PropellerInflow(frame),
         *([AirspeedScale(flight.rho)] if sensor else []),
         SensorOffset(force_sigma),
     ]

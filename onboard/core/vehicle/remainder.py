@@ -22,7 +22,6 @@ from onboard.core.vehicle.limits import (
     MARGIN_S,
     STILL_M_S,
     TOLD_S,
-    TURBULENCE_FLOOR_M_S,
 )
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms, whitened
@@ -48,8 +47,8 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     """Spans of the whole flight that the fit describes worse than chance and gusts would have it.
 
     In a span the whitened squares of a block are rarer than :data:`FALSE_ALARM` among all blocks,
-    by the scatter that blocks usually have, and what is left is more than a gust of
-    :data:`TURBULENCE_FLOOR_M_S` would make.
+    by the scatter that blocks usually have, and what is left is more than errors of the velocity
+    and the heading would make.
 
     Args:
         whole: the model with the whole flight, also what the fit left out.
@@ -59,6 +58,7 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     windows = windows_of(flight)
     residual = windows.mean(whole.measured() - whole.predicted(fit.theta))
     sensitivity = windows.mean(whole.sensitivity(fit.theta))
+    unclear = windows.mean(whole.unclear(fit.theta))
     t = flight.t[windows.first] - flight.t[0]
     block = np.floor(t / BLOCK_S).astype(int)
     numbers = np.unique(block)
@@ -86,7 +86,7 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
         for b, count, its in zip(numbers.tolist(), rows.tolist(), energy.tolist(), strict=True):
             mine = block == b
             force = rms(residual[mine, k])
-            matters = force > TURBULENCE_FLOOR_M_S * rms(sensitivity[mine, k])
+            matters = force > rms(unclear[mine, k])
             dof = max(round(share * count), 1)
             if matters and survival(dof * its / (usual * count), dof) < level:
                 start, end = float(t[mine][0]), float(t[mine][-1]) + windows.length_s

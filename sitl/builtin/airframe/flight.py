@@ -46,6 +46,8 @@ class _Course:
         v_n: (n, 3) velocity, m/s NED.
         f_n: (n, 3) specific force that makes it, m/s^2 NED.
         wind_n: (n, 3) velocity of the air, m/s NED.
+        unlooked_n: (n, 3) what of it the autopilot does not turn the nose into: gusts, and how
+            far they have carried it from its way, m/s NED.
         rho: (n,) density, kg/m^3.
         aloft: (n,) 0 on the ground to 1 in the air.
     """
@@ -53,6 +55,7 @@ class _Course:
     v_n: Array
     f_n: Array
     wind_n: Array
+    unlooked_n: Array
     rho: Array
     aloft: Array
 
@@ -65,8 +68,8 @@ def flown(motion: Motion, craft: Craft, air: Air, environment: Environment) -> T
     """
     n = motion.n
     begin, end = motion.in_air_s
-    fade = 2.0 if isinstance(craft, Airframe) else 3.0
-    aloft = envelope(n, begin + 0.5, end - 0.5, fade)
+    copter = isinstance(craft, Airframe)
+    aloft = envelope(n, begin + 0.5, end - 0.5, 2.0) if copter else motion.aloft
     unsteady = aloft[:, None] * air.unsteady(n)
     away = integral(_carried(craft, unsteady, motion.yaw))
     # It touches down where it was told to.
@@ -77,7 +80,7 @@ def flown(motion: Motion, craft: Craft, air: Air, environment: Environment) -> T
     wind_n = aloft[:, None] * air.steady(-p_n[:, 2], t) + unsteady
     rho = air.density_ratio * density(environment.altitude - p_n[:, 2])
     f_n = specific_force_n(v_n, environment)
-    course = _Course(v_n, f_n, wind_n, rho, aloft)
+    course = _Course(v_n, f_n, wind_n, unsteady - derivative(away), rho, aloft)
     if isinstance(craft, Airframe):
         R, throttle, outputs = _copter(craft, motion, environment, course)
     else:
@@ -168,8 +171,10 @@ def _plane(
         wing,
         course.f_n,
         air_n,
-        motion.bank,
+        bank=motion.bank,
+        slip=motion.slip,
         course=_course(air_n, motion.start.yaw),
+        steered=_course(air_n + course.unlooked_n, motion.start.yaw),
         aloft=course.aloft,
         mass=mass,
         density=rho,

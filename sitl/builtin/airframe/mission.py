@@ -141,6 +141,7 @@ def _flown(plan: _Plan, seed: int, duration: float, touch_down: float, start: St
         v_n=v_n,
         yaw=smooth(staircase(n, plan.yaw_times, plan.yaw), YAW_S),
         bank=np.zeros(n),
+        slip=np.zeros(n),
         armed=(t >= LIFT_OFF - 2.0) & (t < touch_down + 2.0),
         landed=(t < LIFT_OFF) | (t >= touch_down),
         start=start,

@@ -131,10 +131,17 @@ class Wing:
         """Yawing moment of the whole rudder, with what its side force does about the mass."""
         return self.c_n_deltar + self.CGOffset[0] / self.b * self.c_y_deltar
 
-    def rudder_for(self, beta: Array, yaw_rate: Array, speed: Array) -> Array:
-        """(n,) rudder, -1 ... 1, at which a sideslip is steady."""
+    def held_slip(self, slip: Array, yaw_rate: Array, speed: Array) -> tuple[Array, Array]:
+        """(n,) sideslip, rad, as much of the wanted as the rudder can hold, and (n,) that rudder.
+
+        Args:
+            slip: (n,) wanted, rad.
+            yaw_rate: (n,) rad/s.
+            speed: (n,) through the air, m/s.
+        """
         damping = self.c_n_r * self.b * yaw_rate / (2.0 * speed)
-        return np.clip(-(self.yaw_stiffness * beta + damping) / self.rudder_power, -1.0, 1.0)
+        rudder = np.clip(-(self.yaw_stiffness * slip + damping) / self.rudder_power, -1.0, 1.0)
+        return -(self.rudder_power * rudder + damping) / self.yaw_stiffness, rudder
 
     def elevator_for(self, alpha: Array, pitch_rate: Array, speed: Array) -> Array:
         """(n,) elevator, -1 ... 1, at which an angle of attack is steady."""

@@ -1,8 +1,10 @@
-"""A plane's attitude, thrust and outputs that belong to a velocity, a bank and a wind.
+"""A plane's attitude, thrust and outputs that belong to a velocity, a sideslip and a wind.
 
 Inverse dynamics: in axes of the air velocity, rolled by the bank, thrust less drag must be the
 specific force wanted ahead, side force that to the right and lift that upwards: the first gives the
-thrust, the second the sideslip, the third the angle of attack.
+thrust, the second the bank, the third the angle of attack.  The bank and not the sideslip, since
+lift can be leant to any side, and side force may be too weak to be of use: the rudder that holds a
+sideslip takes half of the nominal plane's away again, and all of it from one with half as much.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ STANDING_PITCH = 0.03
 ATTACK = (-0.3, 0.4)
 """Angles of attack that are looked at, rad."""
 MOST_SLIP = 0.4
+EASE = 0.05
+"""Sideslip that is as little asked for as a radian of bank: where a push-over leaves no lift to be
+leant, a little sideslip makes the side force."""
 VOLTAGE, SAG, FULL_CURRENT = 12.6, 0.7, 50.0
 """Battery of ArduPilot's simulated plane: V, V and A at full throttle."""
 CENTRE, HALF = 1500.0, 500.0
@@ -46,9 +51,11 @@ def balanced(
     wing: Wing,
     f_n: Array,
     air_n: Array,
-    bank: Array,
     *,
+    bank: Array,
+    slip: Array,
     course: Array,
+    steered: Array,
     aloft: Array,
     mass: Array,
     density: Array,
@@ -59,38 +66,57 @@ def balanced(
         wing: the plane.
         f_n: (n, 3) specific force wanted, NED, m/s^2.
         air_n: (n, 3) velocity through the air, NED, m/s.
-        bank: (n,) about the air velocity, rad.
+        bank: (n,) about the air velocity, rad: where the search begins.
+        slip: (n,) sideslip that the rudder holds, as far as it can, rad.
         course: (n,) direction of ``air_n`` over ground, also where it stands, rad.
+        steered: (n,) where that would be without gusts, rad: they turn the air and not the nose.
         aloft: (n,) 0 where the wheels carry, 1 where the wing does.
         mass: (n,) kg.
         density: (n,) kg/m^3.
     """
-    true_speed = np.linalg.norm(air_n, axis=1)
-    speed = np.maximum(true_speed, SLOWEST)
-    pressure = 0.5 * density * speed**2
+    speed = np.maximum(np.linalg.norm(air_n, axis=1), SLOWEST)
+    lifted = 0.5 * density * speed**2 * wing.s
     gamma = climb_angle(air_n)
-    W = rotation.about_z(course) @ rotation.about_y(gamma) @ rotation.about_x(aloft * bank)
-    wanted = mass[:, None] * rotation.rotate_back(W, f_n)
-    # How fast the air velocity turns: what the yaw damping of the tail feels.
-    yawing = derivative(course) * np.cos(gamma) * np.cos(bank) * aloft
-    lifted = pressure * wing.s
+    level = rotation.about_z(course) @ rotation.about_y(gamma)
+    wanted = mass[:, None] * rotation.rotate_back(level, f_n)
+    # How fast the path turns, seen by a plane that leans: what the yaw damping of the tail feels.
+    yawing = derivative(steered) * np.cos(gamma) * np.cos(bank) * aloft
+    held, rudder = wing.held_slip(slip, yawing, speed)
+    gusty = np.arctan2(np.sin(course - steered), np.cos(course - steered))
+    beta = aloft * np.clip(held + gusty, -MOST_SLIP, MOST_SLIP)
+    bank = aloft * bank
     alpha = (-wanted[:, 2] / lifted - wing.c_lift_0) / wing.c_lift_a
-    beta = np.zeros_like(alpha)
     for _ in range(ROUNDS):
-        air_b, rudder, thrust, force = _forces(wing, alpha, beta, yawing, speed, lifted, wanted)
+        air_b, thrust, force = _forces(wing, alpha, beta, rudder, lifted, wanted[:, 0])
+        right, down = _rolled(wanted, bank)
         stiff = lifted * wing.c_lift_a + np.abs(thrust)
-        turned = lifted * _side_slope(wing, rudder) + np.abs(thrust)
-        rise = (force[:, 2] - wanted[:, 2]) / stiff
-        swing = (force[:, 1] - wanted[:, 1]) / turned
+        rise = (force[:, 2] - down) / stiff
+        lean, swing = _sideways(right - force[:, 1], down, lifted * wing.c_y_b - np.abs(thrust))
         alpha = np.clip(alpha + rise, *ATTACK)
-        beta = np.clip(beta + swing, -MOST_SLIP, MOST_SLIP)
-        if max(np.max(np.abs(rise)), np.max(np.abs(swing))) < 1e-15:
+        bank = bank + aloft * lean
+        beta = np.clip(beta + aloft * swing, -MOST_SLIP, MOST_SLIP)
+        if np.max(np.abs(aloft * [rise, lean, swing])) < 1e-15:
             break
     alpha = STANDING_PITCH + aloft * (alpha - STANDING_PITCH)
-    beta = aloft * beta
-    air_b, rudder, thrust, _ = _forces(wing, alpha, beta, yawing, speed, lifted, wanted)
-    R = W @ np.swapaxes(from_wind_axes(alpha, beta), 1, 2)
+    air_b, thrust, _ = _forces(wing, alpha, beta, rudder, lifted, wanted[:, 0])
+    R = level @ rotation.about_x(bank) @ np.swapaxes(from_wind_axes(alpha, beta), 1, 2)
     return Aloft(R, alpha, beta, rudder, speed, thrust, air_b)
+
+
+def _rolled(force: Array, bank: Array) -> tuple[Array, Array]:
+    """To the right and down, of an (n, 3) force in axes that are rolled by (n,) rad."""
+    c, s = np.cos(bank), np.sin(bank)
+    return c * force[:, 1] + s * force[:, 2], c * force[:, 2] - s * force[:, 1]
+
+
+def _sideways(missing: Array, down: Array, slope: Array) -> tuple[Array, Array]:
+    """(n,) changes of bank and sideslip, rad, that make a side force of ``missing`` N.
+
+    The least that will do, of both: as the force ``down`` and the ``slope`` of the side force by
+    sideslip (N and N/rad) let them.
+    """
+    able = down**2 + (EASE * slope) ** 2
+    return -missing * down / able, missing * EASE**2 * slope / able
 
 
 def climb_angle(air_n: Array) -> Array:
@@ -100,35 +126,20 @@ def climb_angle(air_n: Array) -> Array:
     return out
 
 
-def _side_slope(wing: Wing, rudder: Array) -> Array:
-    """(n,) how much side force a sideslip makes with the rudder that holds it, per rad."""
-    free = np.abs(rudder) < 1.0
-    slope = wing.c_y_b - free * wing.c_y_deltar * wing.yaw_stiffness / wing.rudder_power
-    out: Array = np.maximum(-slope, 0.05)
-    return out
-
-
 def _forces(
-    wing: Wing,
-    alpha: Array,
-    beta: Array,
-    yawing: Array,
-    speed: Array,
-    lifted: Array,
-    wanted: Array,
-) -> tuple[Array, Array, Array, Array]:
-    """Force of the air (body axes), rudder, thrust, and all force in axes of the air velocity.
+    wing: Wing, alpha: Array, beta: Array, rudder: Array, lifted: Array, ahead: Array
+) -> tuple[Array, Array, Array]:
+    """Force of the air (body axes), thrust, and all force in axes of the air velocity.
 
-    The thrust is what makes the force along the air velocity the wanted one.
+    The thrust is what makes the force along the air velocity the (n,) one that is wanted, N.
     """
-    rudder = wing.rudder_for(beta, yawing, speed)
     air_b = wing.force(alpha, beta, rudder, lifted / wing.s)
     B = from_wind_axes(alpha, beta)
-    ahead = B[:, :, 0]
-    thrust = (wanted[:, 0] - np.einsum("ni,ni->n", air_b, ahead)) / ahead[:, 0]
+    nose = B[:, :, 0]
+    thrust = (ahead - np.einsum("ni,ni->n", air_b, nose)) / nose[:, 0]
     force = air_b.copy()
     force[:, 0] += thrust
-    return air_b, rudder, thrust, rotation.rotate_back(B, force)
+    return air_b, thrust, rotation.rotate_back(B, force)
 
 
 def outputs(

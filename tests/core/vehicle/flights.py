@@ -106,8 +106,15 @@ def plane_flight(
     c_drag_p=0.1,
     c_y_b=-0.98,
     reading=None,
+    lost=0.0,
+    slip_drag=0.0,
+    heading_off=0.0,
 ):
-    """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``."""
+    """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
+
+    ``lost`` of the thrust by m/s that the propeller meets; drag by the square of sideslip; standard
+    deviation of a slow error of the recorded heading, rad.
+    """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = 50.0 + STEP * np.arange(n)
@@ -122,7 +129,7 @@ def plane_flight(
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     q = 0.5 * rho * rho / 1.225 * speed**2 * 0.45 / 2.0
     lift = c_lift_0 + 6.9 * alpha
-    drag = c_drag_p + lift**2 / (np.pi * 0.9 * 1.88**2 / 0.45)
+    drag = c_drag_p + lift**2 / (np.pi * 0.9 * 1.88**2 / 0.45) + slip_drag * beta**2
     throttle = 0.5 + np.clip(smooth(rng, n, 0.15), -0.4, 0.4)
     rudder = smooth(rng, n, 0.15)
     decay = np.exp(-STEP / 0.14)
@@ -137,7 +144,8 @@ def plane_flight(
             row[k] = state
     f_b = np.stack(
         [
-            G / 0.7 * late[0] + q * (lift * np.sin(alpha) - drag * np.cos(alpha)),
+            G / 0.7 * (late[0] - lost * np.sqrt(np.clip(late[0], 0.0, None)) * x)
+            + q * (lift * np.sin(alpha) - drag * np.cos(alpha)),
             q * (c_y_b * beta - 0.2 * late[1]),
             -q * (lift * np.cos(alpha) + drag * np.sin(alpha)),
         ],
@@ -148,4 +156,8 @@ def plane_flight(
     if reading is not None:
         airspeed = reading * speed * np.sqrt(rho / 1.225) + 0.2 * rng.normal(size=n)
     commands = np.stack([throttle, rudder], axis=1)
+    if heading_off:
+        off = smooth(rng, n, heading_off, 15.0)
+        zero = np.zeros(n)
+        R = rotation_from_euler(zero, zero, off) @ R
     return flight_with(t, R, v_n, height, f_b, commands=commands, airspeed=airspeed)

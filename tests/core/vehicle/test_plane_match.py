@@ -49,3 +49,28 @@ def test_each_coefficient_that_is_off_is_named_alone_with_its_value(change, effe
     assert names(match) == {effect}
     number = match.numbers[key]
     assert abs(number.real - truth) < 4.0 * number.sigma
+
+
+def test_a_propeller_that_pulls_less_at_speed_is_no_drag():
+    """With the nominal one for all the thrust, the speed's share would be the profile's drag."""
+    match = matched(plane_flight(seed=8, lost=0.008))
+    assert "drag" not in names(match)
+    drag = match.numbers["drag.c_drag_p"]
+    assert abs(drag.real - 0.1) < 3.0 * drag.sigma
+    slope = match.numbers["propeller_inflow"]
+    assert abs(slope.real - 0.008) < 3.0 * slope.sigma
+    assert slope.real > 3.0 * slope.sigma
+
+
+def test_drag_of_sideslip_is_no_other_drag():
+    match = matched(plane_flight(seed=9, slip_drag=1.5))
+    assert names(match) == set()
+    slip = match.numbers["slip_drag"]
+    assert abs(slip.real - 1.5) < 3.0 * slip.sigma
+
+
+def test_a_heading_that_is_as_good_as_compasses_are_leaves_nothing_unexplained():
+    good, bad = (matched(plane_flight(seed=10, heading_off=off)) for off in (0.02, 0.1))
+    assert names(good) == set()
+    assert good.explained
+    assert not bad.explained
