@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 from onboard.core.estimate.determined import Determined, determine
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.wording import listed
@@ -12,8 +15,27 @@ YES, ROUGHLY, TOGETHER, NO = "yes", "roughly", "together", "no"
 number of its axis, as the axis is loaded in flight; not at all."""
 
 
+@dataclass(frozen=True, slots=True)
+class _This:
+    """A calibration by itself and not by its numbers, of which there are hundreds."""
+
+    calibration: Calibration
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _This) and self.calibration is other.calibration
+
+    def __hash__(self) -> int:
+        return id(self.calibration)
+
+
 def determined(c: Calibration) -> Determined | None:
     """What the flight determines beyond the values in force in it; None if nothing can be said."""
+    return _determined(_This(c))
+
+
+@lru_cache(maxsize=8)  # a page asks several times a second about the five of one vehicle
+def _determined(this: _This) -> Determined | None:
+    c = this.calibration
     try:
         return determine(c, c.in_force_scale + c.in_force_offset)
     except ValueError:  # no covariance: there was no flight

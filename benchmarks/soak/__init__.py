@@ -1,0 +1,1 @@
+"""Days of the service at speed."""
