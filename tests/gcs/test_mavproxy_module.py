@@ -101,6 +101,16 @@ def test_others_in_its_name_are_not_heard(module, capsys):
     assert "state 77" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -1.0, -1e30, 1e30])
+def test_whatever_number_it_is_told_is_shown(module, capsys, number):
+    obc = module.init(SimpleNamespace(master=Sent()))
+    obc.commands["obc"](["status"])
+    asked = [name for _, _, name in obc.master.read]
+    for name in asked:
+        obc.mavlink_packet(value(name, number))
+    assert capsys.readouterr().out.count("obc: ") == len(asked)
+
+
 def test_approve_sets_one_parameter_and_nothing_else_does(module, capsys):
     sent = Sent()
     obc = module.init(SimpleNamespace(master=sent))

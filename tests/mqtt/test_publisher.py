@@ -226,6 +226,38 @@ async def test_a_prefix_of_ones_own_needs_no_vehicle(broker, publishing):
         await station.payload("fleet/kite/state")
 
 
+async def test_the_place_follows_the_vehicle(broker, publishing):
+    """Somebody was taken for the vehicle before the vehicle was there."""
+    async with Subscriber(broker.client()) as station:
+        async with publishing(broker.port, commands=True, discovery="house") as publisher:
+            publisher.publish(snapshot(system_id=42))
+            await station.until(lambda: "onboard/42/state" in station.latest)
+            await station.payload("house/device/onboard-42/config")
+            publisher.publish(snapshot(system_id=None))
+            publisher.publish(snapshot(system_id=1))
+            await station.until(lambda: station.latest["onboard/42/availability"] == b"offline")
+            await station.until(lambda: "onboard/1/state" in station.latest)
+            publisher.publish(snapshot(system_id=1))
+            await station.until(lambda: "house/device/onboard-1/config" in station.latest)
+            await station.until(lambda: station.latest["house/device/onboard-42/config"] == b"")
+            assert station.latest["onboard/1/availability"] == b"online"
+            await station.client.publish("onboard/42/command", b"approve", qos=1)
+            await station.client.publish("onboard/1/command", b"approve", qos=1)
+            await station.payload("onboard/1/command/reply")
+        assert "onboard/42/command/reply" not in station.latest
+        assert station.latest["onboard/42/availability"] == b"offline"
+
+
+async def test_a_given_prefix_stays_whatever_the_vehicle(broker, publishing):
+    async with Subscriber(broker.client()) as station:
+        async with publishing(broker.port, prefix="fleet/kite") as publisher:
+            for system in (42, 1):
+                publisher.publish(snapshot(system_id=system))
+            await station.until(lambda: "fleet/kite/state" in station.latest)
+        assert not any("/42/" in topic or "/1/" in topic for topic in station.latest)
+        assert publisher.counters["mqtt_connects"] == 1
+
+
 async def test_without_a_vehicle_there_is_no_prefix_and_no_connection(broker, publishing):
     async with publishing(broker.port) as publisher:
         publisher.publish(snapshot(system_id=None))

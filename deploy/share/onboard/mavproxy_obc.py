@@ -10,6 +10,7 @@ sets ``OBC_APPROVE``.  Everything goes over MAVLink, to the component of the veh
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from MAVProxy.modules.lib import mp_module
@@ -61,13 +62,14 @@ class OnboardModule(mp_module.MPModule):  # type: ignore[misc]  # MAVProxy has n
             print(f"obc: {self.told(packet.param_id, packet.param_value)}")
 
     def told(self, name: str, value: float) -> str:
-        """A parameter in words."""
-        number = int(value)
+        """A parameter in words; whoever speaks as the component may say anything."""
+        number = int(value) if math.isfinite(value) else -1
+        if number < 0:
+            return f"{name} says nothing ({value:g})"
         if name == "OBC_STATE":
-            return STATES[number] if 0 <= number < len(STATES) else f"state {number}"
+            return STATES[number] if number < len(STATES) else f"state {number}"
         if name.endswith("_STAT"):
-            known = 0 <= number < len(IMU_STATES)
-            said = IMU_STATES[number] if known else f"state {number}"
+            said = IMU_STATES[number] if number < len(IMU_STATES) else f"state {number}"
             return f"accelerometer {name.split('_')[1]}: {said}"
         return {
             "OBC_TRUST": "GPS is trusted" if number else "GPS is not trusted",

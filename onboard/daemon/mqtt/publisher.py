@@ -22,6 +22,7 @@ from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.home_assistant import discovery_message, discovery_topic
 from onboard.daemon.mqtt.outbox import Outbox, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
+from onboard.daemon.mqtt.place import Place
 from onboard.daemon.mqtt.summary import summary_message
 from onboard.daemon.mqtt.tls import tls_context
 from onboard.daemon.setup.configuration import MqttSettings
@@ -83,10 +84,7 @@ class Publisher:
         self._backoff = Backoff(jitter, limits.BACKOFF_BASE_S, limits.BACKOFF_CAP_S)
         self._outbox = Outbox()
         self._news = asyncio.Event()
-        self._named = asyncio.Event()
-        self._prefix = (settings.prefix or "").rstrip("/")
-        if self._prefix:
-            self._named.set()
+        self._place = Place(settings.prefix)
         self._journal: tuple[JournalLine, ...] | None = None
         self._next_state = 0.0
         self._outage = Outage(limits.STABLE_S)
@@ -99,13 +97,11 @@ class Publisher:
     @property
     def prefix(self) -> str:
         """What all topics begin with; empty until the vehicle is known."""
-        return self._prefix
+        return self._place.prefix
 
     def publish(self, snapshot: Snapshot) -> None:
         """Take a snapshot; what is new in it goes to the broker as soon as it takes it."""
-        if not self._named.is_set() and snapshot.link.system_id is not None:
-            self._prefix = f"onboard/{snapshot.link.system_id}"
-            self._named.set()
+        self._place.hear(snapshot.link.system_id)
         journal = snapshot.journal
         if self._journal is not None:
             for line in newer(self._journal, journal):
@@ -117,9 +113,9 @@ class Publisher:
             self._next_state = now + self._settings.state_interval_s
             self._outbox.retain("state", snapshot.to_json())
             self._outbox.retain("summary", summary_message(snapshot))
-        if self._settings.discovery is not None and self._prefix:
-            there = discovery_topic(self._settings.discovery, self._prefix)
-            self._outbox.retain(f"/{there}", discovery_message(self._prefix, snapshot))
+        if self._settings.discovery is not None and self.prefix:
+            there = discovery_topic(self._settings.discovery, self.prefix)
+            self._outbox.retain(f"/{there}", discovery_message(self.prefix, snapshot))
         self._outbox.retain("calibration", calibration_message(snapshot))
         if snapshot.diagnosis is not None:
             self._diagnosed = True
@@ -131,9 +127,10 @@ class Publisher:
     async def run(self) -> None:
         """Keep the connection until :meth:`close` or cancellation."""
         self._task = asyncio.current_task()
-        await self._named.wait()
+        await self._place.named.wait()
         while not self._closing.is_set():
             began = self._clock()
+            self._move()
             try:
                 await self._session()
             except asyncio.CancelledError:
@@ -164,7 +161,7 @@ class Publisher:
         self._closing.set()
         if last is not None:
             self.publish(last)
-        self._named.set()
+        self._place.named.set()
         self._news.set()
         task = self._task
         if task is None or task.done():
@@ -183,10 +180,10 @@ class Publisher:
         client = aiomqtt.Client(
             settings.host,
             settings.port,
-            identifier=settings.client_id or self._prefix.replace("/", "-"),
+            identifier=settings.client_id or self.prefix.replace("/", "-"),
             username=settings.username,
             password=self._password,
-            will=aiomqtt.Will(self._topic("availability"), OFFLINE, qos=1, retain=True),
+            will=aiomqtt.Will(self._place.topic("availability"), OFFLINE, qos=1, retain=True),
             tls_context=self._tls,
             keepalive=limits.KEEPALIVE_S,
             logger=library,
@@ -207,7 +204,7 @@ class Publisher:
         if self._settings.commands:
             await self._subscribe(client)
         self._outbox.connected()
-        await client.publish(self._topic("availability"), ONLINE, qos=1, retain=True)
+        await client.publish(self._place.topic("availability"), ONLINE, qos=1, retain=True)
         self.counters["mqtt_connects"] += 1
         self.connected = True
         if self._outage.since is None:
@@ -219,7 +216,7 @@ class Publisher:
             # Leaving in good order keeps the broker from publishing the last will.
             with contextlib.suppress(aiomqtt.MqttError):
                 await client.publish(
-                    self._topic("availability"),
+                    self._place.topic("availability"),
                     OFFLINE,
                     qos=1,
                     retain=True,
@@ -231,6 +228,7 @@ class Publisher:
         tasks = {
             asyncio.create_task(self._listen(client), name="mqtt listener"),
             asyncio.create_task(self._send(client), name="mqtt sender"),
+            asyncio.create_task(self._moving(), name="mqtt mover"),
         }
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -242,7 +240,7 @@ class Publisher:
             task.result()
 
     async def _subscribe(self, client: aiomqtt.Client) -> None:
-        granted = await client.subscribe(self._topic("command"), qos=1)
+        granted = await client.subscribe(self._place.topic("command"), qos=1)
         for code in granted:
             refused = (code if isinstance(code, int) else code.value) >= 0x80
             if refused and not self._refused:
@@ -259,7 +257,7 @@ class Publisher:
             self._news.clear()
             while (parcel := self._outbox.next()) is not None:
                 await client.publish(
-                    self._topic(parcel.topic), parcel.payload, qos=1, retain=parcel.retain
+                    self._place.topic(parcel.topic), parcel.payload, qos=1, retain=parcel.retain
                 )
                 self._outbox.confirm(parcel)
                 self.counters["mqtt_published"] += 1
@@ -281,11 +279,16 @@ class Publisher:
     def _where(self) -> str:
         return f"{self._settings.host}:{self._settings.port}"
 
-    def _topic(self, name: str) -> str:
-        """Below the prefix; what begins with a stroke is a whole topic."""
-        if name.startswith("/"):
-            return name[1:]
-        return f"{self._prefix}/{name}"
+    async def _moving(self) -> None:
+        """Ends the connection when everything has to be published elsewhere."""
+        await self._place.moving.wait()
+
+    def _move(self) -> None:
+        """The device of a vehicle that was none is taken out of Home Assistant."""
+        left = self._place.move()
+        if left is not None and self._settings.discovery is not None:
+            there = discovery_topic(self._settings.discovery, left)
+            self._outbox.retain(f"/{there}", b"")
 
     def _lost(self, reason: str) -> bool:
         """Say so once for each reason, and whether that was now; every further try only counts."""
