@@ -227,7 +227,11 @@ class Journal:
         except OSError:
             os.close(fd)
             raise StateError(f"{self._path}: in use by another process") from None
-        _sync_directory(self._path.parent)
+        try:
+            _sync_directory(self._path.parent)
+        except OSError:
+            os.close(fd)
+            raise
         return fd
 
     def _load(self) -> None:

@@ -174,6 +174,19 @@ def test_unusable_place_is_one_clear_error(tmp_path):
         Journal(tmp_path)
 
 
+@pytest.mark.parametrize(
+    "broken", ["onboard.push.journal._sync_directory", "pathlib.Path.read_bytes"]
+)
+def test_a_start_that_fails_leaves_no_lock(path, monkeypatch, broken):
+    def fail(*_):
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as failing, pytest.raises(StateError, match="Input/output"):
+        failing.setattr(broken, fail)
+        Journal(path)
+    Journal(path).close()
+
+
 def test_full_disk_is_reported_and_the_file_stays_whole(path, monkeypatch):
     entries = story("a")
     with Journal(path) as journal:
