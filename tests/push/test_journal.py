@@ -181,9 +181,10 @@ def test_a_start_that_fails_leaves_no_lock(path, monkeypatch, broken):
     def fail(*_):
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    with monkeypatch.context() as failing, pytest.raises(StateError, match="Input/output"):
+    with monkeypatch.context() as failing:
         failing.setattr(broken, fail)
-        Journal(path)
+        with pytest.raises(StateError, match="Input/output"):
+            Journal(path)
     Journal(path).close()
 
 
