@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import tracemalloc
 
 import pytest
 
@@ -18,6 +19,12 @@ async def kinds(publisher, kind):
         while not (found := [n for n in publisher.kept if n.kind == kind]):
             await asyncio.sleep(0.01)
     return found
+
+
+async def until_counted(publisher, name, count):
+    async with asyncio.timeout(60.0):
+        while publisher.counters[name] < count:
+            await asyncio.sleep(0.01)
 
 
 async def test_everything_retained_is_there_for_whoever_comes_late(broker, publishing):
@@ -200,6 +207,32 @@ async def test_a_retained_command_is_nobodys_wish(broker, publishing):
                 while not publisher.counters["mqtt_commands_ignored"]:
                     await asyncio.sleep(0.01)
     assert obedient.asked == []
+
+
+async def test_a_command_without_end_takes_no_memory(broker, publishing, monkeypatch):
+    """The library would have all of it, 256 MB at the most, before its length is looked at."""
+    monkeypatch.setattr("onboard.daemon.mqtt.limits.DEAF_S", 3.0)
+    size = 20_000_000
+    topic = "onboard/1/command"
+    async with Subscriber(broker.client()) as station:
+        await station.client.publish(topic, bytes(size), qos=1, retain=True)
+    async with publishing(broker.port, commands=True) as publisher:
+        tracemalloc.start()
+        try:
+            publisher.publish(snapshot())
+            await until_counted(publisher, "mqtt_commands_refused", 2)
+            assert tracemalloc.get_traced_memory()[1] < size / 4
+        finally:
+            tracemalloc.stop()
+        async with Subscriber(broker.client()) as station:
+            # Everything else goes on meanwhile.
+            assert b"onboard.state" in await station.payload("onboard/1/state")
+            await station.client.publish(topic, b"", qos=1, retain=True)
+            while "onboard/1/command/reply" not in station.latest:
+                await station.client.publish(topic, b"approve", qos=1)
+                await asyncio.sleep(0.2)
+            assert b"approved" in station.latest["onboard/1/command/reply"]
+        assert len(await kinds(publisher, "mqtt_command_too_long")) == 1
 
 
 async def test_commands_are_off_by_default(broker, publishing):

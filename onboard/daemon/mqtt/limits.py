@@ -32,3 +32,8 @@ COMMANDS_WAITING: Final = 16
 """Commands that wait to be carried out [cost: people do not send more at a time]."""
 COMMAND_MAX: Final = 1024
 """bytes; a longer command is none of ours [cost]."""
+PACKET_MAX: Final = 16_384
+"""bytes; a longer packet ends the connection: commands and acknowledgements are short [cost]."""
+DEAF_S: Final = 300.0
+"""s without commands after that: a retained one would come again at once, and nothing else be
+published [tuned]."""

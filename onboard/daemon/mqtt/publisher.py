@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import random
 import re
 from collections import Counter
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING
 import aiomqtt
 
 from onboard.daemon.mqtt import limits
+from onboard.daemon.mqtt.client import Client
 from onboard.daemon.mqtt.commands import Commands
 from onboard.daemon.mqtt.home_assistant import discovery_message, discovery_topic
 from onboard.daemon.mqtt.outbox import Outbox, newer
@@ -89,6 +91,8 @@ class Publisher:
         self._next_state = 0.0
         self._outage = Outage(limits.STABLE_S)
         self._refused = False
+        self._deaf_until = -math.inf
+        self._overlong = False
         self._closing = asyncio.Event()
         self._hurried = False
         self._diagnosed = False
@@ -177,7 +181,7 @@ class Publisher:
     async def _session(self) -> None:
         settings = self._settings
         self.counters["mqtt_attempts"] += 1
-        client = aiomqtt.Client(
+        client = Client(
             settings.host,
             settings.port,
             identifier=settings.client_id or self.prefix.replace("/", "-"),
@@ -196,12 +200,14 @@ class Publisher:
             try:
                 await self._talk(client)
             finally:
+                if client.overlong:
+                    self._stop_listening()
                 if self._closing.is_set():  # the library disconnects with this patience
                     client.timeout = limits.HANG_UP_S
 
     async def _talk(self, client: aiomqtt.Client) -> None:
         """What is said from the first word to the last."""
-        if self._settings.commands:
+        if self._settings.commands and not self._deaf_for():
             await self._subscribe(client)
         self._outbox.connected()
         await client.publish(self._place.topic("availability"), ONLINE, qos=1, retain=True)
@@ -231,7 +237,9 @@ class Publisher:
             asyncio.create_task(self._moving(), name="mqtt mover"),
         }
         try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait(
+                tasks, return_when=asyncio.FIRST_COMPLETED, timeout=self._deaf_for()
+            )
         finally:
             for task in tasks:
                 task.cancel()
@@ -278,6 +286,23 @@ class Publisher:
     @property
     def _where(self) -> str:
         return f"{self._settings.host}:{self._settings.port}"
+
+    def _deaf_for(self) -> float | None:
+        """Time until commands are listened to again, s; None: they are, or never asked for."""
+        left = self._deaf_until - self._clock()
+        return left if left > 0.0 else None
+
+    def _stop_listening(self) -> None:
+        self._deaf_until = self._clock() + limits.DEAF_S
+        self.counters["mqtt_commands_refused"] += 1
+        if not self._overlong:
+            self._overlong = True
+            self._notices.post(
+                "mqtt_command_too_long",
+                f"broker {self._where}: somebody sends commands without end; no commands for "
+                f"{limits.DEAF_S:.0f} s each time",
+                warning=True,
+            )
 
     async def _moving(self) -> None:
         """Ends the connection when everything has to be published elsewhere."""

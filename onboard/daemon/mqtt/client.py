@@ -1,0 +1,32 @@
+"""The broker's line: aiomqtt's client, which hangs up on what is longer than anything said to us.
+
+The library would collect a packet of up to 256 MB before anybody sees how long it is, and a
+retained one comes again with every connection.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import aiomqtt
+
+from onboard.daemon.mqtt import limits
+
+
+class Client(aiomqtt.Client):
+    """As the library's, all arguments too."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - the library's
+        super().__init__(*args, **kwargs)
+        self.overlong = False
+        """Whether it has hung up because of that."""
+        receive = self._client._sock_recv  # noqa: SLF001 - it has no limit of its own
+
+        def receive_within_limits(bufsize: int) -> bytes:
+            if bufsize > limits.PACKET_MAX:
+                self.overlong = True
+                raise ConnectionError(f"a packet of {bufsize} bytes")
+            return receive(bufsize)
+
+        # What is left of a packet is asked for at once, so this is its length.
+        self._client._sock_recv = receive_within_limits  # type: ignore[method-assign]  # noqa: SLF001
