@@ -1,6 +1,7 @@
 """Against a real broker: topics, retained state, restarts, refusals, commands."""
 
 import asyncio
+import gc
 import json
 import tracemalloc
 
@@ -209,7 +210,7 @@ async def test_a_retained_command_is_nobodys_wish(broker, publishing):
     assert obedient.asked == []
 
 
-async def test_a_command_without_end_takes_no_memory(broker, publishing, monkeypatch):
+async def test_a_command_without_end_takes_no_memory(broker, publishing, monkeypatch, caplog):
     """The library would have all of it, 256 MB at the most, before its length is looked at."""
     monkeypatch.setattr("onboard.daemon.mqtt.limits.DEAF_S", 3.0)
     size = 20_000_000
@@ -233,6 +234,8 @@ async def test_a_command_without_end_takes_no_memory(broker, publishing, monkeyp
                 await asyncio.sleep(0.2)
             assert b"approved" in station.latest["onboard/1/command/reply"]
         assert len(await kinds(publisher, "mqtt_command_too_long")) == 1
+    gc.collect()
+    assert not [r for r in caplog.records if r.name == "asyncio" and r.levelname == "ERROR"]
 
 
 async def test_commands_are_off_by_default(broker, publishing):

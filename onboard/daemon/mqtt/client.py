@@ -6,6 +6,7 @@ retained one comes again with every connection.
 
 from __future__ import annotations
 
+from types import TracebackType
 from typing import Any
 
 import aiomqtt
@@ -30,3 +31,14 @@ class Client(aiomqtt.Client):
 
         # What is left of a packet is asked for at once, so this is its length.
         self._client._sock_recv = receive_within_limits  # type: ignore[method-assign]  # noqa: SLF001
+
+    async def __aexit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        tb: TracebackType | None,
+    ) -> None:
+        """As the library's; why the line was lost is told by whoever used it."""
+        if self._disconnected.done() and not self._disconnected.cancelled():
+            self._disconnected.exception()
+        await super().__aexit__(exc_type, exc, tb)
