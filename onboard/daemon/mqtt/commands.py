@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from onboard.daemon.mqtt import limits
 from onboard.daemon.mqtt.payloads import ReplyMessage, read_command
 from onboard.daemon.view.notices import Notices
 from onboard.errors import OnboardError, UsageError
@@ -30,6 +32,24 @@ class Commands:
         self._notices = notices
         self._counters = counters
         self._warned = False
+        self._off_until = -math.inf
+
+    def off_for(self, now: float) -> float | None:
+        """Time until commands are listened to again, s; None if nothing is against it."""
+        left = self._off_until - now
+        return left if left > 0.0 else None
+
+    def stop(self, now: float, where: str) -> None:
+        """One had no end: whatever keeps coming with every connection is not asked for."""
+        if self._off_until == -math.inf:
+            self._notices.post(
+                "mqtt_command_too_long",
+                f"broker {where}: somebody sends commands without end; no commands for "
+                f"{limits.DEAF_S:.0f} s each time",
+                warning=True,
+            )
+        self._off_until = now + limits.DEAF_S
+        self._counters["mqtt_commands_refused"] += 1
 
     async def take(self, payload: bytes, *, retained: bool) -> ReplyMessage | None:
         """Carry out one message; what is to be answered, None if it is ignored."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import random
 import re
 from collections import Counter
@@ -91,8 +90,6 @@ class Publisher:
         self._next_state = 0.0
         self._outage = Outage(limits.STABLE_S)
         self._refused = False
-        self._deaf_until = -math.inf
-        self._overlong = False
         self._closing = asyncio.Event()
         self._hurried = False
         self._diagnosed = False
@@ -201,13 +198,13 @@ class Publisher:
                 await self._talk(client)
             finally:
                 if client.overlong:
-                    self._stop_listening()
+                    self._commands.stop(self._clock(), self._where)
                 if self._closing.is_set():  # the library disconnects with this patience
                     client.timeout = limits.HANG_UP_S
 
     async def _talk(self, client: aiomqtt.Client) -> None:
         """What is said from the first word to the last."""
-        if self._settings.commands and not self._deaf_for():
+        if self._settings.commands and not self._commands.off_for(self._clock()):
             await self._subscribe(client)
         self._outbox.connected()
         await client.publish(self._place.topic("availability"), ONLINE, qos=1, retain=True)
@@ -238,7 +235,9 @@ class Publisher:
         }
         try:
             done, _ = await asyncio.wait(
-                tasks, return_when=asyncio.FIRST_COMPLETED, timeout=self._deaf_for()
+                tasks,
+                return_when=asyncio.FIRST_COMPLETED,
+                timeout=self._commands.off_for(self._clock()),
             )
         finally:
             for task in tasks:
@@ -286,23 +285,6 @@ class Publisher:
     @property
     def _where(self) -> str:
         return f"{self._settings.host}:{self._settings.port}"
-
-    def _deaf_for(self) -> float | None:
-        """Time until commands are listened to again, s; None: they are, or never asked for."""
-        left = self._deaf_until - self._clock()
-        return left if left > 0.0 else None
-
-    def _stop_listening(self) -> None:
-        self._deaf_until = self._clock() + limits.DEAF_S
-        self.counters["mqtt_commands_refused"] += 1
-        if not self._overlong:
-            self._overlong = True
-            self._notices.post(
-                "mqtt_command_too_long",
-                f"broker {self._where}: somebody sends commands without end; no commands for "
-                f"{limits.DEAF_S:.0f} s each time",
-                warning=True,
-            )
 
     async def _moving(self) -> None:
         """Ends the connection when everything has to be published elsewhere."""
