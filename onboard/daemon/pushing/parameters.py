@@ -141,6 +141,9 @@ class ParameterWatch:
                         self._absent[name] = now
                         self._next_read = min(self._next_read, now + limits.RETRY_S)
                 case ValueChanged(name, previous, value) if previous is not None:
+                    # An autopilot tells its statistics, too, every half minute for ever.
+                    if name not in NEEDED:
+                        continue
                     self.counters["parameters_changed"] += 1
                     logger.info("%s changed from %.7g to %.7g", name, previous, value)
                 case _ if isinstance(output, SendAction):
