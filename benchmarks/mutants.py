@@ -172,12 +172,13 @@ def play(chosen: argparse.Namespace) -> int:
     sys.dont_write_bytecode = True
     for name in AHEAD:
         importlib.import_module(name)
-    package = chosen.package.as_posix().replace("/", ".")
+    package = chosen.package.with_suffix("").as_posix().replace("/", ".")
     if early := [name for name in sys.modules if name.startswith(package)]:
         raise SystemExit(f"loaded before it is changed: {early}")
     if (found := fate(chosen.tests, chosen.limit)) != "survived":
         raise SystemExit(f"the tests do not pass without any change ({found})")
-    files = sorted(p for p in chosen.package.rglob("*.py") if p.name not in LEFT_OUT)
+    there = chosen.package.rglob("*.py") if chosen.package.is_dir() else (chosen.package,)
+    files = sorted(path for path in there if path.name not in LEFT_OUT)
     everywhere = [
         Mutant(path, index)
         for path in files
@@ -204,7 +205,7 @@ def play(chosen: argparse.Namespace) -> int:
 def main() -> int:
     """Make the copy, and play there."""
     parser = argparse.ArgumentParser(prog="benchmarks.mutants", description=__doc__)
-    parser.add_argument("package", type=Path)
+    parser.add_argument("package", type=Path, help="or one file")
     parser.add_argument("--tests", nargs="+", required=True, help="quick ones first")
     parser.add_argument("--count", type=int, default=80)
     parser.add_argument("--seed", type=int, default=1)

@@ -227,6 +227,17 @@ class TestSize:
             assert journal.last_completed(1).transaction == "t199"
         assert [p.name for p in path.parent.iterdir()] == [path.name]
 
+    def test_shrinking_keeps_no_descriptor(self, path):
+        with Journal(path, limit_bytes=4_000, keep=1) as journal:
+            there = len(os.listdir("/proc/self/fd"))
+            files = set()
+            for i in range(20):
+                for entry in story(f"t{i}"):
+                    journal.append(entry, float(i))
+                files.add(path.stat().st_ino)
+            assert len(files) > 1, "rewritten"
+            assert len(os.listdir("/proc/self/fd")) == there
+
     @pytest.mark.parametrize("call", ["fsync", "rename", "write"])
     def test_failing_to_shrink_loses_nothing(self, path, monkeypatch, call):
         write(path, story("a") + story("b") + story("c"))
