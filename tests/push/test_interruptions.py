@@ -2,7 +2,8 @@
 
 import pytest
 
-from onboard.mavlink.parameter_messages import SendParamSet
+from onboard.mavlink.parameter_messages import SendAction, SendParamSet
+from onboard.push import limits
 from onboard.push.entries import Planned, Result, audit
 from onboard.push.signals import Cancelled, LinkLost, Reason, Rebooted, VehicleReport
 from tests.push.pushing import finish, make_plan, when_written
@@ -235,3 +236,38 @@ def test_roll_back_that_is_not_stored_stays_open(world):
     assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
     assert outcome.open
     assert {n: world.autopilot.ram[n] for n in world.plan.names} == world.plan.before
+
+
+@pytest.mark.parametrize("flies", [False, True])
+def test_an_armed_vehicle_that_does_not_answer_is_asked_nothing_any_more(world, flies):
+    """Repetitions end with the time that there is for undoing, or at once in the air."""
+    ends, sent = [], []
+    handle, beat = world.handle, world.beat
+
+    def handled(outputs):
+        outputs = tuple(outputs)
+        sent.extend(world.now for output in outputs if isinstance(output, SendAction))
+        handle(outputs)
+
+    def beaten():
+        if world.armed and not flies:
+            ends.append(world.now + limits.ARMED_UNDO_S + 0.5)  # the line's delay is in it
+        beat()
+
+    def take_off():
+        ends.append(world.now)
+        world.feed(VehicleReport(armed=True, landed=False))
+
+    def arm_and_hear_no_more():
+        world.arm()
+        world.autopilot.receive = lambda *_: None
+        world.feed(VehicleReport(armed=True, landed=True))
+        if flies:
+            world.at(world.now + 0.7, take_off)
+
+    world.handle, world.beat = handled, beaten
+    when_written(world, 3, arm_and_hear_no_more)
+    assert world.run_through()
+    (outcome,) = world.outcomes
+    assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
+    assert max(sent) <= ends[0]
