@@ -23,7 +23,7 @@ from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.filter.kernel import prefer_compiled
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.segments import Batch
 

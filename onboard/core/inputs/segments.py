@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops
 from onboard.core.maths.frames import (
     interpolate_rotation,
     rotation_from_vector,
@@ -95,6 +96,12 @@ class Segment:
         if len(t_k) < 2:
             return interpolate_rotation(at, t_k, R_k)
         at = np.clip(at, t_k[0], t_k[-1])
+        loops = compiled_loops()
+        if loops is not None:
+            between = np.empty((len(at), 3, 3))
+            powers = Hermite(self.t, self.w_b).cubics
+            loops.attitudes(self.t, powers, t_k, R_k, at, delay, PARTS, between)
+            return between
         k = np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
         used, which = np.unique(k, return_inverse=True)
         start, end = t_k[used], t_k[used + 1]
