@@ -120,12 +120,12 @@ class Recorded:
         return {imu: self.calibrator.engine(imu).batches for imu in self.imus}
 
     def _asked(self, imu: int) -> Answer:
-        plain = self.calibrator.calibration(imu)
         try:
             found = examine(self.calibrator, imu)
             given = judged(found.diagnosis())
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
             why = f"the flight could not be diagnosed ({error})"
+            plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
         self._engines[imu] = found.engine

@@ -16,10 +16,10 @@ import numpy as np
 from onboard.core.filter.readings import Index
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.compiler import compiled
+from onboard.core.maths.compiler import compiled, part
 
 
-@compiled("void(f8, f8[:,:], f8[:,::1], f8[:,::1])")
+@part
 def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
     """Into ``F`` (MEASURED, ERRORS), which is zero."""
     n = np.zeros((3, 8))
@@ -38,7 +38,7 @@ def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
             F[4 + i, MEASURED + j] = -n[i, 2 + j]
 
 
-@compiled("void(f8[:,:], f8[:,::1], f8[:,::1])")
+@part
 def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
     """Add a stack in body axes to the first states."""
     for i in range(MEASURED):
@@ -63,7 +63,7 @@ def measured(
         z[4 + i, 0] += turned[i]
 
 
-@compiled("void(f8[:,::1], f8[:,::1])")
+@part
 def _from_the_left(F: Array, C: Array) -> None:
     """``F C`` in place: rows of the states that are driven by others."""
     for i in (3, 0, 1, 2, 4, 5, 6):  # height needs the velocity of before, both attitude's
@@ -76,7 +76,7 @@ def _from_the_left(F: Array, C: Array) -> None:
                     row[c] += f * from_[c]
 
 
-@compiled("void(f8[:,::1], f8[::1], f8[:,:])")
+@part
 def _from_the_right(F: Array, decay: Array, P: Array) -> None:
     """``P F^T`` in place; rows below are those beside, for the matrix will be symmetric."""
     for i in range(STATES):

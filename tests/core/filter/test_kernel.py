@@ -319,7 +319,7 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
 @pytest.mark.slow
 def test_two_processes_may_fill_the_same_cache(tmp_path):
     code = """
-        from onboard.core.filter.loops import compiled
+        from onboard.core.maths.compiler import compiled
         @compiled("f8(f8)")
         def doubled(x):
             return 2.0 * x
