@@ -8,6 +8,11 @@ from __future__ import annotations
 
 from types import ModuleType
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from onboard.core.maths.arrays import Array
+
 
 class _Choice:
     compiled = False
@@ -36,3 +41,8 @@ def compiled_loops() -> ModuleType | None:
         _Choice.compiled = False
         return None
     return loops
+
+
+def plain(x: ArrayLike) -> Array:
+    """Numbers as compiled loops take them: contiguous, and not marked as read-only."""
+    return np.require(x, np.float64, ("C", "W"))

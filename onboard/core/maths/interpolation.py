@@ -10,13 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.compiling import compiled_loops
+from onboard.core.maths.compiling import compiled_loops, plain
 
 
 class Hermite:
     """Cubic Hermite interpolant with three-point slopes (exact for parabolas)."""
 
     __slots__ = ("_cubics", "_shape", "_t")
+
+    @property
+    def t(self) -> Array:
+        """(n,) times of the samples, s."""
+        return self._t
 
     @property
     def cubics(self) -> Array:
@@ -30,9 +35,9 @@ class Hermite:
         flat = x.reshape(len(t), -1)
         loops = compiled_loops()
         if loops is not None:
-            self._t, flat = np.ascontiguousarray(t, np.float64), np.ascontiguousarray(flat)
+            self._t, flat = plain(t), plain(flat)
             self._cubics = np.empty((len(t) - 1, 4, flat.shape[1]))
-            loops.cubics(self._t, flat.astype(np.float64, copy=False), self._cubics)
+            loops.cubics(self._t, flat, self._cubics)
             return
         h = np.diff(t)[:, None]
         slope = np.gradient(flat, t, axis=0, edge_order=2 if len(t) > 2 else 1)
@@ -48,7 +53,7 @@ class Hermite:
         loops = compiled_loops()
         if loops is not None:
             found = np.empty((len(times), self._cubics.shape[2]))
-            loops.values(self._t, self._cubics, times, found)
+            loops.values(self._t, self._cubics, plain(times), found)
             return found.reshape(*np.shape(at), *self._shape)
         i = np.clip(np.searchsorted(self._t, times, side="right") - 1, 0, len(self._t) - 2)
         t0 = self._t[i]

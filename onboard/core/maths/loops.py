@@ -267,3 +267,13 @@ def attitudes(
         _turn(share * missed[0], share * missed[1], share * missed[2], A)
         _product(turn, A, B)
         _product(R_k[k], B, out[m])
+
+
+@compiled("void(f8[::1], f8[::1], f8[::1], f8[:,::1])")
+def dragged(load: Array, start: Array, plays: Array, out: Array) -> None:
+    """Followers that a load (n,) drags along once it is a play away, into (n, plays)."""
+    for j in range(len(plays)):
+        place, play = start[j], plays[j]
+        for i in range(len(load)):
+            place = min(max(place, load[i] - play), load[i] + play)
+            out[i, j] = place

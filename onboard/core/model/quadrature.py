@@ -14,7 +14,7 @@ import numpy as np
 
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.compiling import compiled_loops
+from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
 
 AROUND_SPAN_S = 0.44
@@ -81,8 +81,8 @@ class Intervals:
         if loops is not None:
             K, _, _, m = x_b.shape
             one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
-            P, x = np.ascontiguousarray(self.P), np.ascontiguousarray(x_b)
-            loops.integrals(P, self.weight, self.weight_to_end, x, one, two)
+            weights = plain(self.weight), plain(self.weight_to_end)
+            loops.integrals(plain(self.P), *weights, plain(x_b), one, two)
             return one, two
         turned = self.P @ x_b
         return (
@@ -200,7 +200,7 @@ def turns_in_a_row(w_b: Array, h: Array, middle: int = 0) -> Array:
     loops = compiled_loops()
     if loops is not None:
         P = np.empty((len(h), w_b.shape[1] // 2 + 1, 3, 3))
-        loops.turns_in_a_row(np.ascontiguousarray(w_b), h, middle, P)
+        loops.turns_in_a_row(plain(w_b), plain(h), middle, P)
         return P
     turns = rotation_from_vector(rotation_increments(w_b, h))
     after = _chain(turns[:, middle:])

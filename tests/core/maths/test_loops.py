@@ -10,6 +10,7 @@ from onboard.core.maths.compiling import compiled_loops, prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
 from onboard.core.model.quadrature import NodeMaker
+from onboard.core.physics.effects.accelerometer_hysteresis import PLAYS, _dragged
 
 pytest.importorskip("numba", reason="numba is not installed")
 SEEDS = st.integers(0, 2**32 - 1)
@@ -96,3 +97,12 @@ def test_nodes_and_integrals_are_the_same(seed):
 
     for one, other in zip(*both_ways(made), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))
+
+
+@given(SEEDS, st.integers(1, 300))
+@settings(max_examples=30, deadline=None)
+def test_what_is_dragged_is_the_same(seed, n):
+    rng = np.random.default_rng(seed)
+    load, start = np.cumsum(rng.normal(size=n)), rng.normal(size=len(PLAYS))
+    one, other = both_ways(lambda: _dragged(load, start))
+    np.testing.assert_array_equal(other, one)
