@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from onboard.core.estimate.determined import Determined, determine
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.wording import listed
@@ -12,12 +14,22 @@ YES, ROUGHLY, TOGETHER, NO = "yes", "roughly", "together", "no"
 number of its axis, as the axis is loaded in flight; not at all."""
 
 
+_LATEST: deque[tuple[Calibration, Determined | None]] = deque(maxlen=5)
+"""Of as many calibrations as there are accelerometers: a page asks every second, for each several
+times, and an answer comes every ten."""
+
+
 def determined(c: Calibration) -> Determined | None:
     """What the flight determines beyond the values in force in it; None if nothing can be said."""
+    for known, answer in tuple(_LATEST):
+        if known is c:  # it never changes
+            return answer
     try:
-        return determine(c, c.in_force_scale + c.in_force_offset)
+        found = determine(c, c.in_force_scale + c.in_force_offset)
     except ValueError:  # no covariance: there was no flight
-        return None
+        found = None
+    _LATEST.append((c, found))
+    return found
 
 
 def seen(c: Calibration) -> tuple[str, ...]:
