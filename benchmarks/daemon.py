@@ -29,7 +29,6 @@ from typing import Any
 
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
-from onboard.mavlink.autopilot import Autopilot, AutopilotFound
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message
 
@@ -199,7 +198,7 @@ async def day(hours: float) -> Day:
     with tempfile.TemporaryDirectory() as folder:
         document = {"state": {"directory": folder}, "http": {"enabled": False}}
         service = Service(from_mapping(document, source="benchmark"), clock=clock)
-        service.contact.on_link_event(now, AutopilotFound(Autopilot(1, 1, 1, 3)))
+        presence, contact = service.link.presence, service.contact
         flight = Path(folder) / "flight.tlog"
         in_a_process(record_landed, str(flight), FLIGHT_S, RATES).join()
         flights = max(5, round(hours * 3600.0 / FLIGHT_S))
@@ -214,6 +213,9 @@ async def day(hours: float) -> Day:
                 for frame in codec.feed(raw):
                     if frame.message is not None:
                         later(frame.message, number * FLIGHT_S)
+                        heard = presence.hear((1, 1), (0, ("", 0)), frame.message, None, now)
+                        for event in heard.events:
+                            contact.on_link_event(now, event)
                         service.on_message(now, frame.message)
                 if now >= next_tick:
                     next_tick += 1.0
