@@ -26,7 +26,7 @@ from benchmarks import (
 )
 from benchmarks.matching import runner as matching
 from benchmarks.real import runner as real
-from onboard.core.filter.kernel import prefer_compiled
+from onboard.core.maths.compiling import prefer_compiled
 
 
 def _paths() -> None:

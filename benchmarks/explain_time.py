@@ -1,18 +1,21 @@
-"""How long ``onboard explain`` takes over ten minutes of flight, page and files included.
+"""What ``onboard replay`` and ``onboard explain`` cost: processor, times real time, memory.
 
-The command itself, in a process of its own, imports and all.  Processor time is what counts: it
-is the time that it takes on a machine that has nothing else to do.
+The commands themselves, each in a process of its own, imports, decoding, page and files included.
+Processor time is what counts: it is the time that it takes on a machine that has nothing else to
+do.  ``--hours 0.1 1 10`` replays longer and longer flights instead: the cost of an hour and what
+memory is beyond the recording's own samples have to stay as they are.
 """
 
 from __future__ import annotations
 
 import argparse
-import resource
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from sitl.builtin.effects import BiasStep, Effect, GpsLeverArm
@@ -20,44 +23,85 @@ from sitl.builtin.truth import random_imus
 from sitl.builtin.world import Vehicle
 from sitl.recording import FlightSpec, write_tlog
 
-FLIGHTS: tuple[tuple[str, Vehicle, tuple[Effect, ...]], ...] = (
-    ("copter, nothing concealed", "copter", ()),
-    ("plane, nothing concealed", "plane", ()),
-    ("copter, antenna away from the IMU", "copter", (GpsLeverArm(x=0.8, y=-0.5, z=-0.4),)),
-    ("plane, offset that jumps", "plane", (BiasStep(time=290.0, x=0.3, y=-0.2, z=0.0),)),
+FLIGHTS: tuple[tuple[str, str, Vehicle, int, tuple[Effect, ...]], ...] = (
+    ("replay", "copter, two accelerometers", "copter", 2, ()),
+    ("explain", "copter, nothing concealed", "copter", 1, ()),
+    ("explain", "plane, nothing concealed", "plane", 1, ()),
+    (
+        "explain",
+        "copter, antenna away from the IMU",
+        "copter",
+        1,
+        (GpsLeverArm(x=0.8, y=-0.5, z=-0.4),),
+    ),
+    (
+        "explain",
+        "plane, offset that jumps",
+        "plane",
+        1,
+        (BiasStep(time=290.0, x=0.3, y=-0.2, z=0.0),),
+    ),
 )
 SEED = 3
 
 
-def seconds(log: Path) -> tuple[float, float]:
-    """Processor and wall time of the command with everything it can write, s."""
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Of one command: s of processors, s of the clock, most memory, MB."""
+
+    processor: float
+    wall: float
+    memory: float
+
+
+def cost(command: str, log: Path) -> Cost:
+    """The command with everything that it can write."""
     files = [f"--{kind}={log.with_suffix(f'.{kind}')}" for kind in ("report", "json", "param")]
-    command = [sys.executable, "-m", "onboard", "explain", str(log), *files]
-    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - ours
-    after, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - began
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall
+    began = time.perf_counter()
+    child = subprocess.Popen(  # noqa: S603 - ours
+        [sys.executable, "-m", "onboard", command, str(log), *files], stdout=subprocess.DEVNULL
+    )
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise subprocess.CalledProcessError(child.returncode, command)
+    wall = time.perf_counter() - began
+    return Cost(used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024.0)
+
+
+def flown(log: Path, vehicle: Vehicle, count: int, effects: tuple[Effect, ...], s: float) -> None:
+    """A simulated flight."""
+    imus = random_imus(SEED, count)
+    write_tlog(FlightSpec(vehicle=vehicle, seed=SEED, duration=s, imus=imus, effects=effects), log)
+
+
+def line(name: str, found: Cost, length: float) -> str:
+    """One row."""
+    return (
+        f"{name:44}{found.processor:10.1f} s{length / found.processor:10.0f} x"
+        f"{found.memory:10.0f} MB{found.wall:10.1f} s"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description="Time that an explanation takes.")
+    parser = argparse.ArgumentParser(description="Time that a replay and an explanation take.")
     parser.add_argument("--length", type=float, default=600.0, help="of each flight, s")
+    parser.add_argument("--hours", type=float, nargs="+", default=[], help="replays of so many")
     chosen = parser.parse_args(arguments)
-    print(f"{f'{chosen.length:.0f} s of flight, GPS at 5 Hz':44}{'processor':>12}{'wall':>10}")
+    print(f"{'GPS at 5 Hz, inertial data at 50 Hz':44}{'processor':>12}{'real time':>12}", end="")
+    print(f"{'memory':>13}{'wall':>12}")
     with tempfile.TemporaryDirectory() as folder:
-        for k, (name, vehicle, effects) in enumerate(FLIGHTS):
+        if chosen.hours:
+            for hours in chosen.hours:
+                log = Path(folder) / "flight.tlog"
+                flown(log, "copter", 1, (), 3600.0 * hours)
+                print(line(f"replay, {hours:g} h", cost("replay", log), 3600.0 * hours), flush=True)
+            return
+        for k, (command, name, vehicle, count, effects) in enumerate(FLIGHTS):
             log = Path(folder) / f"{k}.tlog"
-            spec = FlightSpec(
-                vehicle=vehicle,
-                seed=SEED,
-                duration=chosen.length,
-                imus=random_imus(SEED),
-                effects=effects,
-            )
-            write_tlog(spec, log)
-            processor, wall = seconds(log)
-            print(f"{name:44}{processor:10.1f} s{wall:8.1f} s", flush=True)
+            flown(log, vehicle, count, effects, chosen.length)
+            print(line(f"{command}: {name}", cost(command, log), chosen.length), flush=True)
 
 
 if __name__ == "__main__":

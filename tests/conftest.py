@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from onboard.core.filter.kernel import prefer_compiled
+from onboard.core.maths.compiling import prefer_compiled
 from sitl.virtual_time import VirtualTimeLoop
 
 prefer_compiled()

@@ -23,9 +23,9 @@ from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.filter.kernel import prefer_compiled
 from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.segments import Batch
+from onboard.core.maths.compiling import prefer_compiled
 
 PAUSE_S = 10.0
 """Between two recordings."""
@@ -120,12 +120,12 @@ class Recorded:
         return {imu: self.calibrator.engine(imu).batches for imu in self.imus}
 
     def _asked(self, imu: int) -> Answer:
-        plain = self.calibrator.calibration(imu)
         try:
             found = examine(self.calibrator, imu)
             given = judged(found.diagnosis())
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
             why = f"the flight could not be diagnosed ({error})"
+            plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
         self._engines[imu] = found.engine

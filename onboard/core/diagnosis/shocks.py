@@ -36,4 +36,4 @@ class Shock(Family):
     def _during(self, nodes: Signals) -> Array:
         since = nodes.t - self.moment
         inside = ((since >= 0.0) & (since < self.lasts)).astype(np.float64)
-        return on_axes(np.repeat(inside[..., None], 3, axis=-1))
+        return on_axes(inside[..., None])

@@ -14,8 +14,7 @@ right, too.
 
 numpy's functions are here and are what the others are held to.  Compiled ones
 (:mod:`onboard.core.filter.compiled`) do the same two to five times as fast where numba is installed
-and :func:`prefer_compiled` was called.  Importing numba takes a second and 110 MB, which a filter
-that follows one flight in real time has no need of.
+and :func:`~onboard.core.maths.compiling.prefer_compiled` was called.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from onboard.core.filter.innovations import Epoch, Step
 from onboard.core.filter.readings import Reading
 from onboard.core.filter.state import BIAS, ERRORS, MEASURED, PSI, STATES, H
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import prefer_compiled, preferred
 
 _EYE = np.eye(MEASURED, ERRORS)
 
@@ -224,25 +224,16 @@ def take(carried: Array, made: Whitening, reading: Reading, gram: Array | None) 
 NUMPY = Kernel(measured, predict, whiten, take)
 
 
-class _Choice:
-    compiled = False
-
-
-def prefer_compiled(*, yes: bool = True) -> None:
-    """From now on filters use compiled loops, if they can; with ``yes=False`` numpy."""
-    _Choice.compiled = yes
-
-
 def chosen() -> Kernel:
     """Who does the arithmetic of a filter that begins now.
 
     Compiled loops if they are preferred, numba is installed and there is a place to keep them.
     """
-    if not _Choice.compiled:
+    if not preferred():
         return NUMPY
     try:
         from onboard.core.filter import compiled  # noqa: PLC0415 - a second, and only if wanted
     except ImportError:
-        _Choice.compiled = False
+        prefer_compiled(yes=False)
         return NUMPY
     return compiled.COMPILED

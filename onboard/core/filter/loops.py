@@ -5,45 +5,21 @@ calls cost, and with what is known of the matrices: most of a transition is zero
 covariance is symmetric.  Rows of a state are 0 to 2 velocity, 3 height, 4 to 6 attitude, 7 to 9
 bias, then the slow errors (:mod:`onboard.core.filter.state`).
 
-Compiled code is kept on disk, beside this file or where numba keeps it for a user, so that only
-the first run waits for the compiler.  numba notices changes of this file alone: whoever changes the
-order of the states has to touch it.  Each function has one signature, so that processes that
-compile it at the same time write the same.
+Compiled code is kept on disk (:mod:`onboard.core.maths.compiler`).  numba notices changes of this
+file alone: whoever changes the order of the states has to touch it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
-
-import numba
 import numpy as np
 
 from onboard.core.filter.readings import Index
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
 from onboard.core.maths.arrays import Array
-
-_F = TypeVar("_F", bound=Callable[..., object])
-
-
-def compiled(signature: str) -> Callable[[_F], _F]:
-    """Compile a function for one signature, or take it from where it was kept.
-
-    Raises:
-        ImportError: it cannot be kept, and compiling it in every run costs more than it saves.
-    """
-
-    def compile_(function: _F) -> _F:
-        try:
-            made: _F = numba.njit(signature, cache=True, error_model="numpy")(function)
-        except (RuntimeError, OSError) as error:  # numba finds no place, or the disk is full
-            raise ImportError("there is no place to keep compiled code") from error
-        return made
-
-    return compile_
+from onboard.core.maths.compiler import compiled, part
 
 
-@compiled("void(f8, f8[:,:], f8[:,::1], f8[:,::1])")
+@part
 def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
     """Into ``F`` (MEASURED, ERRORS), which is zero."""
     n = np.zeros((3, 8))
@@ -62,7 +38,7 @@ def _transition(duration: float, R_nb: Array, moved: Array, F: Array) -> None:
             F[4 + i, MEASURED + j] = -n[i, 2 + j]
 
 
-@compiled("void(f8[:,:], f8[:,::1], f8[:,::1])")
+@part
 def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
     """Add a stack in body axes to the first states."""
     for i in range(MEASURED):
@@ -87,7 +63,7 @@ def measured(
         z[4 + i, 0] += turned[i]
 
 
-@compiled("void(f8[:,::1], f8[:,::1])")
+@part
 def _from_the_left(F: Array, C: Array) -> None:
     """``F C`` in place: rows of the states that are driven by others."""
     for i in (3, 0, 1, 2, 4, 5, 6):  # height needs the velocity of before, both attitude's
@@ -100,7 +76,7 @@ def _from_the_left(F: Array, C: Array) -> None:
                     row[c] += f * from_[c]
 
 
-@compiled("void(f8[:,::1], f8[::1], f8[:,:])")
+@part
 def _from_the_right(F: Array, decay: Array, P: Array) -> None:
     """``P F^T`` in place; rows below are those beside, for the matrix will be symmetric."""
     for i in range(STATES):

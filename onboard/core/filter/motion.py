@@ -11,13 +11,14 @@ import math
 
 import numpy as np
 
-from onboard.core.filter.loops import compiled, predict
+from onboard.core.filter.loops import predict
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiler import part
 from onboard.core.maths.earth import EARTH_RATE, SEMI_MAJOR_AXIS
 
 
-@compiled("f8(f8[:,:,::1], i8, f8[::1])")
+@part
 def mean(carried: Array, state: int, theta: Array) -> float:
     """A state of member 0 at ``theta``."""
     row = carried[0, state]
@@ -27,7 +28,7 @@ def mean(carried: Array, state: int, theta: Array) -> float:
     return float(x)
 
 
-@compiled("void(f8, f8, f8, f8[:,::1])")
+@part
 def turn_by(x: float, y: float, z: float, R: Array) -> None:
     """``exp([x, y, z]) R`` in place: :func:`onboard.core.maths.small_turns.turn_by`."""
     angle2 = x * x + y * y + z * z
@@ -43,7 +44,7 @@ def turn_by(x: float, y: float, z: float, R: Array) -> None:
         R[2, j] = (cx * z - sy) * a + (cy * z + sx) * b + (1.0 - cx * x - cy * y) * d
 
 
-@compiled("void(f8[:,:], f8[:,::1], f8[::1])")
+@part
 def angle_of(R_attitude: Array, R_nb: Array, turned: Array) -> None:
     """Rotation vector from one attitude to the other, NED: ``small_turns.angle_of``."""
     M = np.zeros((3, 3))
@@ -59,10 +60,7 @@ def angle_of(R_attitude: Array, R_nb: Array, turned: Array) -> None:
     turned[0], turned[1], turned[2] = x * longer, y * longer, z * longer
 
 
-@compiled(
-    "void(f8[:,:,::1], f8[:,::1], f8, f8[:,:], f8[:,::1], f8[:,::1], f8, f8[::1],"
-    " f8[:,::1], f8[:,::1], f8[::1], f8, i8)"
-)
+@part
 def carry(
     carried: Array,
     R_nb: Array,

@@ -13,10 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.limits import MOST_PREPARED_BYTES, NEAR_BIAS_RAD_S
+from onboard.core.filter.limits import (
+    MOST_PREPARED_BYTES,
+    MOST_PREPARED_LIVE_BYTES,
+    NEAR_BIAS_RAD_S,
+)
 from onboard.core.filter.prepared import Prepared
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import preferred
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +80,10 @@ class Kept:
 class Preparations:
     """What the passes about one linearisation, with one model, have made ready."""
 
-    def __init__(self, most_bytes: int = MOST_PREPARED_BYTES) -> None:
-        """Take how much may be kept."""
-        self._room = most_bytes
+    def __init__(self, most_bytes: int | None = None) -> None:
+        """Take how much may be kept; None: what the program can spare."""
+        spare = MOST_PREPARED_BYTES if preferred() else MOST_PREPARED_LIVE_BYTES
+        self._room = spare if most_bytes is None else most_bytes
         self._kept: dict[tuple[int, ...], Kept] = {}
 
     def __len__(self) -> int:

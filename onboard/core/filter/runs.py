@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.filter.loops import compiled, measured, take, take_noise, whiten
+from onboard.core.filter.loops import measured, take, take_noise, whiten
 from onboard.core.filter.motion import angle_of, carry, mean, turn_by
 from onboard.core.filter.readings import Index
 from onboard.core.filter.state import STATES
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiler import compiled, part
 
 
-@compiled("b1(f8[:,:,::1], f8[::1], i8[::1], i8, f8[::1], f8[::1])")
+@part
 def _ordinary(
     W: Array, theta: Array, offered: Index, judged: int, gates: Array, tails: Array
 ) -> bool:
@@ -40,7 +41,7 @@ def _ordinary(
     return True
 
 
-@compiled("void(f8[:,:,::1], i8)")
+@part
 def _symmetric(carried: Array, m1: int) -> None:
     """Covariances made symmetric, in place."""
     for b in range(len(carried)):
@@ -50,7 +51,7 @@ def _symmetric(carried: Array, m1: int) -> None:
                 P[i, j] = P[j, i] = (P[i, j] + P[j, i]) / 2.0
 
 
-@compiled("i8[::1](i8[::1])")
+@part
 def _numbers(offered: Index) -> Index:
     """Which numbers an epoch has to offer: :func:`onboard.core.filter.readings.reading`."""
     v, h, a = offered[0], offered[1], offered[2]
@@ -64,7 +65,7 @@ def _numbers(offered: Index) -> Index:
     return number
 
 
-@compiled("f8[:,::1](f8[:,::1], f8[::1])")
+@part
 def _sum(white: Array, more: Array) -> Array:
     """Variances (B, n) and what an epoch (n,) adds to them."""
     out = np.empty(white.shape)
@@ -74,7 +75,7 @@ def _sum(white: Array, more: Array) -> Array:
     return out
 
 
-@compiled("void(f8[:,:,::1], f8[:,::1], f8[::1], i8, f8[:,:,::1], f8[:,::1], f8[::1])")
+@part
 def _keep(W: Array, E: Array, det: Array, at: int, rows: Array, raw: Array, log_det: Array) -> None:
     """Write down the innovations of an epoch from row ``at`` on."""
     r, m1 = E.shape
@@ -88,7 +89,7 @@ def _keep(W: Array, E: Array, det: Array, at: int, rows: Array, raw: Array, log_
             raw[at + a, c] = E[a, c]
 
 
-@compiled("void(f8[:,:,::1], f8[:,::1], f8[:,::1], i8, f8[::1], f8[::1])")
+@part
 def _note(
     carried: Array, R_nb: Array, E: Array, velocities: int, theta: Array, state: Array
 ) -> None:

@@ -27,10 +27,13 @@ class ParametersInForce:
     """What was last reported for each parameter, and what follows from it."""
 
     values: dict[str, float] = field(default_factory=dict)
+    _sixes: dict[int, SixParameters] = field(default_factory=dict)
+    """By accelerometer, until another report: every inertial sample asks."""
 
     def set(self, name: str, value: float) -> None:
         """Take a report."""
         self.values[name] = value
+        self._sixes.clear()
 
     def get(self, *names: str, default: float) -> float:
         """First of ``names`` that is known."""
@@ -60,13 +63,17 @@ class ParametersInForce:
 
     def six(self, imu: int) -> SixParameters:
         """Scale and offset in force; one and zero where they were never reported."""
+        known = self._sixes.get(imu)
+        if known is not None:
+            return known
         names = parameter_names(imu)
         s = [self.values.get(n, 1.0) for n in names.scale]
         o = [self.values.get(n, 0.0) for n in names.offset]
-        return SixParameters(
+        known = self._sixes[imu] = SixParameters(
             vector3(x if x != 0.0 else 1.0 for x in s),
             vector3(o),
         )
+        return known
 
     @property
     def R_bs(self) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import (
     interpolate_rotation,
     rotation_from_vector,
@@ -95,6 +96,13 @@ class Segment:
         if len(t_k) < 2:
             return interpolate_rotation(at, t_k, R_k)
         at = np.clip(at, t_k[0], t_k[-1])
+        loops = compiled_loops()
+        if loops is not None:
+            between = np.empty((len(at), 3, 3))
+            rates = Hermite(self.t, self.w_b)
+            samples = plain(t_k), plain(R_k)
+            loops.attitudes(rates.t, rates.cubics, *samples, plain(at), delay, PARTS, between)
+            return between
         k = np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
         used, which = np.unique(k, return_inverse=True)
         start, end = t_k[used], t_k[used + 1]
@@ -124,7 +132,12 @@ class Segment:
         t, x = self.slow[name]
         if x.ndim == 1:
             return np.interp(at, t, x)
-        return np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=-1)
+        if len(t) < 2:
+            return np.broadcast_to(x[0], (*np.shape(at), x.shape[1]))
+        i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+        share = np.clip((at - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)[..., None]
+        out: Array = x[i] + share * (x[i + 1] - x[i])
+        return out
 
     def attitude_at(self, at: Array, delay: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it.

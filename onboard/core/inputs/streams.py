@@ -46,7 +46,7 @@ class Streams:
         track = self.imus.get(sample.imu)
         if track is None:
             track = self.imus[sample.imu] = ImuTrack()
-        orientation = parameters.get("AHRS_ORIENTATION", default=0.0)
+        orientation = parameters.values.get("AHRS_ORIENTATION", 0.0)
         if orientation != self._R_bs[0]:
             self._R_bs = (orientation, parameters.R_bs)
         self.over_mavlink = sample.source is not ImuSource.LOG

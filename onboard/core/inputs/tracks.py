@@ -5,6 +5,7 @@ Tracks refuse what is late, repeated or not finite, count it by name, and hand o
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -90,7 +91,7 @@ class ImuTrack:
             f[2] / s[2] + o[2],
             np.nan if sample.temperature is None else sample.temperature,
         )
-        if not np.isfinite(sum(row[:6])):
+        if not math.isfinite(sum(row[:6])):
             self.refused["imu_not_finite"] += 1
             return False
         self._t.append(t)
@@ -131,7 +132,7 @@ class SlowTrack:
 
     def add(self, t: float, x: tuple[float, ...]) -> bool:
         """Keep a value unless it is late or not finite."""
-        if not t > self.last or not np.isfinite(sum(x)):
+        if (self._t and not t > self._t[-1]) or not math.isfinite(t + sum(x)):
             return False
         self._t.append(t)
         self._x.append(x)

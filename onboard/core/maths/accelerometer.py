@@ -11,6 +11,7 @@ nowhere else: :func:`linear_of`, :func:`parameters_of` and :func:`parameters_jac
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ class ParameterNames:
         return self.scale + self.offset
 
 
+@cache
 def parameter_names(imu: int) -> ParameterNames:
     """Names for accelerometer 1 ... 5.
 

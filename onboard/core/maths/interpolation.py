@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 
 
 class Hermite:
@@ -17,11 +18,27 @@ class Hermite:
 
     __slots__ = ("_cubics", "_shape", "_t")
 
+    @property
+    def t(self) -> Array:
+        """(n,) times of the samples, s."""
+        return self._t
+
+    @property
+    def cubics(self) -> Array:
+        """(n - 1, 4, d) powers of the share of each interval."""
+        return self._cubics
+
     def __init__(self, t: Array, x: Array) -> None:
         """Take samples ``x`` (n, ...) at strictly increasing times ``t`` (n,), n >= 2."""
         self._t = t
         self._shape = x.shape[1:]
         flat = x.reshape(len(t), -1)
+        loops = compiled_loops()
+        if loops is not None:
+            self._t, flat = plain(t), plain(flat)
+            self._cubics = np.empty((len(t) - 1, 4, flat.shape[1]))
+            loops.cubics(self._t, flat, self._cubics)
+            return
         h = np.diff(t)[:, None]
         slope = np.gradient(flat, t, axis=0, edge_order=2 if len(t) > 2 else 1)
         start, end, rise = h * slope[:-1], h * slope[1:], np.diff(flat, axis=0)
@@ -32,7 +49,12 @@ class Hermite:
 
     def __call__(self, at: Array) -> Array:
         """Values (*at.shape, ...) at times ``at``; outside the samples the end cubic goes on."""
-        times = np.asarray(at).ravel()
+        times = np.asarray(at, np.float64).ravel()
+        loops = compiled_loops()
+        if loops is not None:
+            found = np.empty((len(times), self._cubics.shape[2]))
+            loops.values(self._t, self._cubics, plain(times), found)
+            return found.reshape(*np.shape(at), *self._shape)
         i = np.clip(np.searchsorted(self._t, times, side="right") - 1, 0, len(self._t) - 2)
         t0 = self._t[i]
         u = ((times - t0) / (self._t[i + 1] - t0))[:, None]

@@ -14,6 +14,7 @@ import numpy as np
 
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
 
 AROUND_SPAN_S = 0.44
@@ -76,6 +77,13 @@ class Intervals:
         Returns:
             Two arrays (K, 3, m) in the body axes of each interval's start.
         """
+        loops = compiled_loops()
+        if loops is not None:
+            K, _, _, m = x_b.shape
+            one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
+            weights = plain(self.weight), plain(self.weight_to_end)
+            loops.integrals(plain(self.P), *weights, plain(x_b), one, two)
+            return one, two
         turned = self.P @ x_b
         return (
             np.einsum("ki,kiam->kam", self.weight, turned),
@@ -178,6 +186,30 @@ def rotation_increments(w: Array, h: Array) -> Array:
     return out
 
 
+def turns_in_a_row(w_b: Array, h: Array, middle: int = 0) -> Array:
+    """Attitude at nodes against that of one of them.
+
+    Args:
+        w_b: (K, 2 M + 1, 3) rates at the nodes and half-way between them, rad/s.
+        h: (K,) from node to node, s.
+        middle: number of the node that the others are held against.
+
+    Returns:
+        (K, M + 1, 3, 3) body axes at the node to those at node ``middle``.
+    """
+    loops = compiled_loops()
+    if loops is not None:
+        P = np.empty((len(h), w_b.shape[1] // 2 + 1, 3, 3))
+        loops.turns_in_a_row(plain(w_b), plain(h), middle, P)
+        return P
+    turns = rotation_from_vector(rotation_increments(w_b, h))
+    after = _chain(turns[:, middle:])
+    if middle == 0:
+        return after
+    back = _chain(np.swapaxes(turns[:, :middle], -1, -2)[:, ::-1])
+    return np.concatenate([back[:, :0:-1], after], axis=1)
+
+
 def _chain(turns: Array) -> Array:
     """Running products (K, M + 1, 3, 3) of ``turns`` (K, M, 3, 3), the identity first."""
     K, M = turns.shape[:2]
@@ -235,7 +267,7 @@ class NodeMaker:
             R = self._attitude(coarse.t)
             P = np.swapaxes(R[:, :1], -1, -2) @ R
         else:
-            P = _chain(rotation_from_vector(rotation_increments(fine.w_b, T / M)))
+            P = turns_in_a_row(fine.w_b, T / M)
         weight = simpson_weights(M) * T[:, None]
         to_end = weight * (1.0 - share[::2]) * T[:, None]
         return Intervals(coarse, P, T, weight, to_end)
@@ -263,10 +295,7 @@ class NodeMaker:
             P = np.swapaxes(R[:, J : J + 1], -1, -2) @ R
         else:
             h = np.full(len(epoch), offset[1] - offset[0])
-            turns = rotation_from_vector(rotation_increments(fine.w_b, h))
-            after = _chain(turns[:, J:])
-            back = _chain(np.swapaxes(turns[:, :J], -1, -2)[:, ::-1])
-            P = np.concatenate([back[:, :0:-1], after], axis=1)
+            P = turns_in_a_row(fine.w_b, h, J)
         f_epoch = (P @ nodes.f_b[..., None])[..., 0]
         now = Signals(
             nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._segment

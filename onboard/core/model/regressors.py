@@ -189,8 +189,7 @@ class Model:
         K, M1 = intervals.signals.t.shape
         m, epochs = self.size, len(around.now.t)
         force = np.zeros((K, M1, 3, m))
-        rate = np.zeros((K, M1, 3, m))
-        turning = False
+        turning: list[tuple[slice, Array]] = []
         direct = {key: np.zeros((epochs, 3, m)) for key in ("vb", "vn", "pb", "pn", "ab", "an")}
         along = np.zeros((epochs, m))
         for family in self.families:
@@ -202,8 +201,7 @@ class Model:
                 force[..., s] = a
             w = family.rate(intervals.signals)
             if w is not None:
-                rate[..., s] = w
-                turning = True
+                turning.append((s, w))
             for key, d in (
                 ("v", family.velocity(around)),
                 ("p", family.position(around)),
@@ -216,7 +214,11 @@ class Model:
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
         force1, force2 = intervals.integrals(force)
-        turn = intervals.integrals(rate)[0] if turning else np.zeros((K, 3, m))
+        turn = np.zeros((K, 3, m))
+        if turning:  # of a few only
+            turned = intervals.integrals(np.concatenate([w for _, w in turning], axis=-1))[0]
+            places = np.concatenate([np.arange(s.start, s.stop) for s, _ in turning])
+            turn[..., places] = turned
         return SegmentRegressors(
             force1,
             force2,

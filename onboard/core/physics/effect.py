@@ -255,7 +255,7 @@ def on_axes(amount: Array) -> Array:
     """Regressors ``-amount_i e_i``: what each axis reads too much, taken off.
 
     Args:
-        amount: (..., 3).
+        amount: (..., 3), or (..., 1) where it is the same on every axis.
 
     Returns:
         (..., 3, 3) with regressor i along axis i.

@@ -23,6 +23,7 @@ from onboard.core.filter.noise import NoiseLevels, stencil
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from tests.core.estimate.test_simulated_flights import fed, flown
 
@@ -173,14 +174,14 @@ def test_a_covariance_that_is_none_is_an_error(who):
 @pytest.fixture
 def _preference_kept():
     yield
-    kernel.prefer_compiled()
+    prefer_compiled()
 
 
 def both_ways(what):
     """Something with numpy's arithmetic, then with the compiled."""
-    kernel.prefer_compiled(yes=False)
+    prefer_compiled(yes=False)
     one = what()
-    kernel.prefer_compiled()
+    prefer_compiled()
     return one, what()
 
 
@@ -318,7 +319,7 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
 @pytest.mark.slow
 def test_two_processes_may_fill_the_same_cache(tmp_path):
     code = """
-        from onboard.core.filter.loops import compiled
+        from onboard.core.maths.compiler import compiled
         @compiled("f8(f8)")
         def doubled(x):
             return 2.0 * x

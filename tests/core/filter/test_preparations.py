@@ -7,7 +7,7 @@ from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import through
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.filter.limits import MOST_PREPARED_BYTES
+from onboard.core.filter.limits import MOST_PREPARED_LIVE_BYTES
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -93,4 +93,4 @@ def test_five_minutes_with_every_effect_are_less_than_what_may_be_kept(batches, 
     kept = list(ready._kept.values())
     fixes = sum(len(k.ready.epochs) for k in kept)
     per_unknown = sum(k.ready.size for k in kept) / fixes / (model.size + 1)
-    assert per_unknown * 60 * 300 * 5 < MOST_PREPARED_BYTES
+    assert per_unknown * 60 * 300 * 5 < MOST_PREPARED_LIVE_BYTES

@@ -11,6 +11,7 @@ import numpy as np
 
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.model.quadrature import Signals
 from onboard.core.physics.effect import AXES, Bearing, Effect, Origin, on_axes
 
@@ -195,6 +196,11 @@ def _dragged(load: Array, followers: Array) -> Array:
         followers: (plays,) where they begin, m/s^2.
     """
     plays = np.array(PLAYS)
+    loops = compiled_loops()
+    if loops is not None:
+        out = np.empty((len(load), len(plays)))
+        loops.dragged(plain(load), plain(followers), plays, out)
+        return out
     low, high = load[:, None] - plays, load[:, None] + plays
     reach = 1
     while reach < len(load):

@@ -36,7 +36,7 @@ class BiasRamp(Effect):
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-(t - t0) e_i``."""
-        return on_axes(np.repeat((nodes.t - self.origin.t0)[..., None], 3, axis=-1))
+        return on_axes((nodes.t - self.origin.t0)[..., None])
 
     @classmethod
     def condition(cls, found: Finding, offset: float, change: float) -> str:

@@ -94,7 +94,7 @@ class BiasStep(Effect):
     def acceleration(self, nodes: Signals) -> Array:
         """``-e_i`` from the moment on."""
         after = (nodes.t >= self.moment).astype(np.float64)
-        return on_axes(np.repeat(after[..., None], 3, axis=-1))
+        return on_axes(after[..., None])
 
     @classmethod
     def size(cls, found: Finding) -> str:

@@ -52,7 +52,7 @@ class Empirical(Effect):
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-s e_i``."""
-        return on_axes(np.repeat(self.signal(nodes)[..., None], 3, axis=-1))
+        return on_axes(self.signal(nodes)[..., None])
 
     def formula(self, sizes: Sequence[float]) -> str:
         """The formula with its sizes: what each axis reads too much, m/s^2."""

@@ -44,7 +44,7 @@ class TemperatureDrift(Effect):
         """``-(T - T0) e_i``."""
         T = nodes.slow("temperature")
         excess = (np.zeros(nodes.t.shape) if T is None else T) - self.origin.temperature
-        return on_axes(np.repeat(excess[..., None], 3, axis=-1))
+        return on_axes(excess[..., None])
 
     @classmethod
     def condition(cls, found: Finding, offset: float, change: float) -> str:

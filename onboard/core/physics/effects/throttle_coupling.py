@@ -43,4 +43,4 @@ class ThrottleCoupling(Effect):
         """``-throttle e_i``."""
         throttle = nodes.slow("throttle")
         level = np.zeros(nodes.t.shape) if throttle is None else throttle
-        return on_axes(np.repeat(level[..., None], 3, axis=-1))
+        return on_axes(level[..., None])

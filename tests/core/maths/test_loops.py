@@ -1,0 +1,108 @@
+"""Compiled loops against numpy's way of doing the same."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from onboard.core.inputs.segments import Segment
+from onboard.core.maths.compiling import compiled_loops, prefer_compiled
+from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.maths.interpolation import Hermite
+from onboard.core.model.quadrature import NodeMaker
+from onboard.core.physics.effects.accelerometer_hysteresis import PLAYS, _dragged
+
+pytest.importorskip("numba", reason="numba is not installed")
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@pytest.fixture(autouse=True)
+def _preference_kept():
+    yield
+    prefer_compiled()
+
+
+def both_ways(what):
+    """Something with numpy, then with compiled loops."""
+    prefer_compiled(yes=False)
+    one = what()
+    prefer_compiled()
+    assert compiled_loops() is not None
+    return one, what()
+
+
+def uneven(rng, n, step=0.02):
+    """Times that wander about an even spacing."""
+    return np.cumsum(step * rng.uniform(0.5, 1.5, n))
+
+
+def segment(rng, *, samples=120, rate=2.0, turn=0.3):
+    """Samples of a vehicle that turns about every axis; attitudes that disagree with the rate."""
+    t = uneven(rng, samples)
+    t_attitude = uneven(rng, samples // 4, 0.08)
+    R = rotation_from_vector(turn * rng.normal(size=(len(t_attitude), 3)))
+    for k in range(1, len(R)):
+        R[k] = R[k - 1] @ R[k]
+    return Segment(
+        t,
+        rate * rng.normal(size=(samples, 3)),
+        10.0 * rng.normal(size=(samples, 3)),
+        t_attitude,
+        R,
+        np.eye(3),
+    )
+
+
+@given(SEEDS, st.integers(2, 40))
+@settings(max_examples=30, deadline=None)
+def test_the_interpolant_is_the_same(seed, n):
+    rng = np.random.default_rng(seed)
+    t, x = uneven(rng, n), rng.normal(size=(n, 4))
+    at = rng.uniform(t[0] - 0.1, t[-1] + 0.1, (7, 5))
+    one, other = both_ways(lambda: Hermite(t, x)(at))
+    scale = 1.0 + np.abs(one).max()
+    np.testing.assert_allclose(other, one, atol=1e-11 * scale)
+
+
+@given(SEEDS, st.sampled_from([0.01, 0.3, 1.7]), st.floats(-0.05, 0.05))
+@settings(max_examples=30, deadline=None)
+def test_attitude_between_samples_is_the_same(seed, turn, delay):
+    """Samples may contradict the gyroscope by up to a turn: every pivot of the quaternion."""
+    rng = np.random.default_rng(seed)
+    flown = segment(rng, turn=turn)
+    at = rng.uniform(flown.t_attitude[0] - 0.1, flown.t_attitude[-1] + 0.1, 50)
+    (one, near), (other, near_too) = both_ways(lambda: flown.attitude_at(at, delay))
+    # At half a turn the axis of what is missed has no sign: nothing is to be expected there.
+    angle = np.arccos(np.clip((np.trace(np.swapaxes(one, 1, 2) @ other, 0, 1, 2) - 1) / 2, -1, 1))
+    assert np.array_equal(near, near_too)
+    assert np.quantile(angle, 0.9) < 1e-6
+    np.testing.assert_allclose(other @ np.swapaxes(other, 1, 2), np.eye(3) + 0 * one, atol=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_nodes_and_integrals_are_the_same(seed):
+    rng = np.random.default_rng(seed)
+    flown = segment(rng)
+    six = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.3])
+    start = np.linspace(flown.t[10], flown.t[-20], 9)
+    x = rng.normal(size=3)
+
+    def made():
+        maker = NodeMaker(flown, np.array([0.01, -0.02, 0.03]), six)
+        inside = maker.intervals(start[:-1], start[1:])
+        around = maker.around(start, 0.2, np.array([0.1, 0.0, -0.2]))
+        force = inside.signals.f_b[..., None] * x
+        return (inside.P, *inside.integrals(force), around.f_antenna, around.swing)
+
+    for one, other in zip(*both_ways(made), strict=True):
+        np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))
+
+
+@given(SEEDS, st.integers(1, 300))
+@settings(max_examples=30, deadline=None)
+def test_what_is_dragged_is_the_same(seed, n):
+    rng = np.random.default_rng(seed)
+    load, start = np.cumsum(rng.normal(size=n)), rng.normal(size=len(PLAYS))
+    one, other = both_ways(lambda: _dragged(load, start))
+    np.testing.assert_array_equal(other, one)
