@@ -13,7 +13,6 @@ from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
@@ -52,13 +51,7 @@ def fitted(
             after = bool(batch.fixes.t[0] > last)
             far.append(_with_jumps(block, full, made.model, steps, after=after))
         else:
-            made.batches.append(batch)
-    # Gates and feedback follow what the whole flight says, as in the pass that gave its sums: what
-    # they would learn of a minute, beside a dozen jumps that are much alike, is worth less.
-    known = solve(
-        [_with_jumps(b, full, made.model, (), after=False) for b in full.blocks], made.model
-    )
-    made.once((known.theta, known.covariance))
+            made.add(batch)
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
