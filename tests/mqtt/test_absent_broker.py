@@ -16,6 +16,7 @@ class NoBroker:
     """In the place of aiomqtt's client: refuses until a time, then hangs on."""
 
     until = 0.0
+    overlong = False
 
     def __init__(self, *_args, **_keywords):
         self.messages = self._silence()
@@ -40,7 +41,7 @@ class NoBroker:
 @virtual_time
 async def test_an_absent_broker_is_one_warning_and_one_recovery(seconds, monkeypatch, caplog):
     caplog.set_level(logging.INFO)
-    monkeypatch.setattr(publisher_module.aiomqtt, "Client", NoBroker)
+    monkeypatch.setattr(publisher_module, "Client", NoBroker)
     monkeypatch.setattr(NoBroker, "until", seconds)
     clock = asyncio.get_running_loop().time
     publisher = Publisher(settings(), Obedient(), Notices(clock), clock=clock)
