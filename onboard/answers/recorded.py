@@ -23,9 +23,9 @@ from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.segments import Batch
+from onboard.core.maths.compiling import prefer_compiled
 
 PAUSE_S = 10.0
 """Between two recordings."""

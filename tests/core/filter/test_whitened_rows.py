@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from onboard.core.filter.innovations import Epoch, steps
-from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.model.linearisation import Linearisation
