@@ -107,6 +107,27 @@ def test_stale_value_in_the_middle_is_not_taken_for_a_change(world):
     assert finish(world).result is Result.COMPLETED
 
 
+def test_a_second_copy_of_what_was_written_is_no_change(world):
+    first = world.plan.write_order(world.plan.before)[0]
+    again = ValueReceived(first, world.plan.wanted[first])
+    when_written(world, 3, lambda: world.feed(again))
+    assert finish(world).result is Result.COMPLETED
+
+
+def test_a_written_value_that_a_station_sets_back_is_noticed_before_the_rest_is_written(world):
+    first = world.plan.write_order(world.plan.before)[0]
+
+    def set_back():
+        world.autopilot.ram[first] = world.plan.before[first]
+        world.feed(ValueReceived(first, world.plan.before[first]))
+
+    when_written(world, 3, set_back)
+    outcome = finish(world)
+    assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.CHANGED_BY_OTHER)
+    forwards = [e.name for _, e in world.journal.entries if isinstance(e, Writing) and not e.undo]
+    assert len(forwards) < 6
+
+
 def test_roll_back_is_the_plan_reversed(world):
     finish(world)
     back = PushWorld(world.path.with_name("second"), world.plan.reversed())
