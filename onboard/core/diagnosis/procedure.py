@@ -92,7 +92,12 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
 
 
 def _companions(calibrator: Calibrator, imu: int, full: Examination, *, latest: bool) -> Companions:
-    """All accelerometers of the vehicle; of this one what is examined."""
+    """All accelerometers of the vehicle; of this one what is examined.
+
+    Where the clock began anew within the flight, none: a moment of it is no one moment.
+    """
+    if len(since_reboot(full.batches)) < len(full.batches):
+        return Companions({})
     prior = full.model.prior_sigma[:6]
     everyone = {}
     for other, batches in calibrator.flown.items():

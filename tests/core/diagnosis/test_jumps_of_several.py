@@ -8,9 +8,12 @@ import pytest
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
-from sitl.recording import FlightSpec
+from sitl.recording import FlightSpec, fly_messages
 
 AT = 61.3
 SPEC = FlightSpec(vehicle="copter", seed=23, duration=130.0, imus=random_imus(23, 3))
@@ -62,3 +65,23 @@ def test_what_all_do_alike_is_said_to_be_common():
     diagnosis = judged(2, 1, imu=0, x=0.2, z=0.15).diagnosis()
     assert "bias_step" in {e.name for e in diagnosis.effects}
     assert "all accelerometers ask for the same jump" in diagnosis.note
+
+
+@pytest.mark.slow
+def test_where_the_clock_began_anew_no_moment_is_asked_of_the_others():
+    """Two boots in one recording: 61 s after the first is not 61 s after the second."""
+    spec = dataclasses.replace(SPEC, imus=SPEC.imus[:2], duration=90.0)
+    once, common = (
+        dataclasses.replace(spec, effects=(concealed.BiasStep(time=AT, imu=imu, x=0.2, z=0.15),))
+        for imu in (2, 0)
+    )
+    calibrator = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0))
+    for boot in (once, common):
+        decoder = Decoder()
+        for _, message in fly_messages(boot):
+            for sample in decoder.decode(message):
+                calibrator.feed(sample)
+    calibrator.finish()
+    judge = examine(calibrator, 2)
+    assert judge.choice.undecided is None
+    assert "this accelerometer jumped" not in judge.diagnosis().note
