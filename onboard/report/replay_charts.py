@@ -14,8 +14,9 @@ from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.report.chart import Band, Line, Ribbon, line_chart
 
 SIGMAS = 2.0
+"""Half of a band that is drawn: 95 % [probability]."""
 BEGINNING = 0.15
-"""Share of a course whose wide bands may leave the picture."""
+"""Share of a course whose wide bands may leave the picture [use]."""
 
 
 class Drawn(Protocol):
@@ -58,7 +59,7 @@ def six_charts(course: Course) -> list[Markup]:
 
 
 def shown_range(course: Course, i: int) -> tuple[float, float] | None:
-    """What of one number's course is shown: its wide beginning may leave the picture."""
+    """What of one number's course is shown: its wide beginning may leave the picture [use]."""
     spread = SIGMAS * course.sigma[:, i]
     every = (course.value[:, i] - spread, course.value[:, i] + spread, course.in_force[:, i])
     later = slice(int(BEGINNING * len(course.t)), None)

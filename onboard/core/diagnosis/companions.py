@@ -37,7 +37,8 @@ from onboard.core.physics.effects.bias_step import LARGEST, BiasStep, Witness
 TINY = 1e-12
 """(m/s^2)^2; a jump of nothing began at no time."""
 EDGE = 3
-"""Windows at either end of a flight in which no step is looked for: a level needs some [bound]."""
+"""Windows at either end of a flight in which no step is looked for: a level before it, the step and
+the window in which it begins are three unknowns [bound]."""
 
 
 @dataclass(frozen=True, slots=True)

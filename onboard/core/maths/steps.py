@@ -19,7 +19,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 
 SHARES = np.array([0.0, 0.1, 0.3, 0.6, 0.9, 0.97])
-"""Of the variance that wanders."""
+"""Of the variance that wanders [cost: neighbours differ by little in likelihood]."""
 CONSTANTS = 6
 """Time constants that are tried, between two samples and half of the series [cost]."""
 LONGEST = 1200

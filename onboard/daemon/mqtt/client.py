@@ -29,7 +29,8 @@ class Client(aiomqtt.Client):
                 raise ConnectionError(f"a packet of {bufsize} bytes")
             return receive(bufsize)
 
-        # What is left of a packet is asked for at once, so this is its length.
+        # What is left of a packet is asked for at once, so this is its length.  There is no public
+        # way in: the library makes room for it before it calls anybody.
         self._client._sock_recv = receive_within_limits  # type: ignore[method-assign]  # noqa: SLF001
 
     async def __aexit__(

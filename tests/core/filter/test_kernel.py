@@ -25,6 +25,7 @@ from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, MEASURED, STATES
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
+from tests.core.compiled import both_ways
 from tests.core.estimate.test_simulated_flights import fed, flown
 
 compiled = pytest.importorskip("onboard.core.filter.compiled", reason="numba is not installed")
@@ -175,14 +176,6 @@ def test_a_covariance_that_is_none_is_an_error(who):
 def _preference_kept():
     yield
     prefer_compiled()
-
-
-def both_ways(what):
-    """Something with numpy's arithmetic, then with the compiled."""
-    prefer_compiled(yes=False)
-    one = what()
-    prefer_compiled()
-    return one, what()
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.core.inputs.segments import Segment
-from onboard.core.maths.compiling import compiled_loops, prefer_compiled
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.physics.effects.accelerometer_hysteresis import PLAYS, _dragged
+from tests.core.compiled import both_ways
 
 pytest.importorskip("numba", reason="numba is not installed")
 SEEDS = st.integers(0, 2**32 - 1)
@@ -20,15 +21,6 @@ SEEDS = st.integers(0, 2**32 - 1)
 def _preference_kept():
     yield
     prefer_compiled()
-
-
-def both_ways(what):
-    """Something with numpy, then with compiled loops."""
-    prefer_compiled(yes=False)
-    one = what()
-    prefer_compiled()
-    assert compiled_loops() is not None
-    return one, what()
 
 
 def uneven(rng, n, step=0.02):

@@ -8,10 +8,8 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.plane_airframe import THROTTLE, PlaneAirframe
 
-THROTTLE = 0
-"""Column of the commands."""
 PLAUSIBLE = 0.02
 """Of a propeller that pulls no more at 50 m/s, s/m [physics]."""
 

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
-from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.plane_airframe import THROTTLE, PlaneAirframe
 
 FLOOR = 0.05
 """Of the logarithm: 5 % of the thrust [use]."""
-THROTTLE = 0
-"""Column of the commands."""
 
 
 class Propulsion(Effect):
