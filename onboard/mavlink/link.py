@@ -263,7 +263,7 @@ class Link:
             boot = boot_seconds(message)
         heard = self.presence.hear(source, way, message, boot, now)
         if heard.whose is Whose.VEHICLE:
-            peer.rise(Merit.VEHICLE, now)
+            self.connections[way[0]].peers.believe(peer, now)
         for event in heard.events:
             self._tell(event, peer, now)
         if heard.whose in {Whose.STANDBY, Whose.FOREIGN}:

@@ -106,6 +106,19 @@ class Peers:
         peer = self._table.get(address)
         return peer is not None and peer.merit is Merit.VEHICLE
 
+    def believe(self, vehicle: Peer, now: float) -> None:
+        """The vehicle was heard from this peer: whoever it was before is no more than the others.
+
+        A vehicle comes from another port whenever a router is restarted.  Ports that it had would
+        fill the table, for the vehicle never gives way, until it were not let in itself.
+        """
+        if vehicle.merit is Merit.VEHICLE:
+            return
+        for peer in self._table.values():
+            if peer.merit is Merit.VEHICLE:
+                peer.merit = Merit.SPEAKS
+        vehicle.rise(Merit.VEHICLE, now)
+
     def begin_anew(self) -> None:
         """The connection was made anew: half a packet from before means nothing."""
         if not self._addressed:

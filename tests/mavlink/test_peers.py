@@ -64,6 +64,20 @@ def test_the_vehicle_never_gives_way():
     assert len(peers.answered(599.0)) <= PEER_LIMIT
 
 
+def test_a_vehicle_that_moves_to_ever_other_ports_is_let_in():
+    """A router that is restarted every few hours for weeks."""
+    peers = table()
+    beat = SENDER.encode(heartbeat())
+    for number in range(3 * PEERS_KNOWN):
+        now = 2.0 * PEER_SILENCE_S * number
+        peer, frames = peers.feed(("vehicle", number), beat, now)
+        assert len(frames) == 1
+        peers.believe(peer, now)
+        assert peers.is_vehicle(("vehicle", number))
+        assert sum(p.merit is Merit.VEHICLE for p in peers) == 1
+    assert len(list(peers)) <= PEERS_KNOWN
+
+
 def test_a_flood_is_rationed_and_the_others_are_not():
     peers = table()
     frame = SENDER.encode(attitude(1))
