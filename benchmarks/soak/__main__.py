@@ -82,8 +82,8 @@ def fitted() -> Iterator[None]:
         yield
 
 
-async def soak(chosen: argparse.Namespace, flight: Path, folder: Path) -> list[Row]:
-    """The rows, printed as they come."""
+async def soak(chosen: argparse.Namespace, flight: Path, folder: Path) -> tuple[list[Row], int]:
+    """The rows, printed as they come, and how many flights the service has not heard to the end."""
     loop = asyncio.get_running_loop()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
@@ -109,15 +109,16 @@ async def soak(chosen: argparse.Namespace, flight: Path, folder: Path) -> list[R
                 await world.live(service, min(ROW_S, end - loop.time()))
                 rows.append(measured(service, folder, began))
                 print(rows[-1], flush=True)
-        print(dict(world.happened), service.snapshot().counters, sep="\n")
+        counters = service.snapshot().counters
+        print(dict(world.happened), counters, sep="\n")
     finally:
         service.stop()
         await task
-    return rows
+    return rows, world.happened["flight"] - counters.get("event_FlightEnded", 0)
 
 
 def main() -> int:
-    """Exit status 1 if something grows."""
+    """Exit status 1 if something grows, or a flight was not heard."""
     parser = argparse.ArgumentParser(prog="benchmarks.soak", description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
     parser.add_argument("--seed", type=int, default=1)
@@ -131,9 +132,10 @@ def main() -> int:
         in_a_process(record_landed, str(flight), FLIGHT_S, RATES).join()
         state = Path(folder) / "state"
         with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
-            rows = runner.run(soak(chosen, flight, state))
+            rows, missed = runner.run(soak(chosen, flight, state))
     print(f"{time.monotonic() - began:.0f} s")
-    return judge(rows)
+    print(f"{missed} flights were not heard")
+    return 1 if missed else judge(rows)
 
 
 if __name__ == "__main__":
