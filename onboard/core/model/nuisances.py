@@ -63,8 +63,8 @@ class GpsLatency(Family):
         self.taken = taken
 
     def velocity(self, around: Around) -> Direct:
-        """``-a = -(R f + g)``, at the antenna."""
-        body = -around.f_antenna_now[..., None]
+        """``-a = -(R f + g)``, at the antenna, averaged as the velocity is."""
+        body = -around.f_mean[..., None]
         ned = np.zeros_like(body)
         ned[:, 2, 0] = -STANDARD_GRAVITY
         return Direct(body=body, ned=ned)
@@ -108,13 +108,13 @@ class GpsSmoothing(Family):
         central moment would otherwise be taken for delay where the manoeuvre is quick.
         """
         slope = mean_slope(around.offset, self.taken)
-        third = second_difference(around.offset) / 6.0
+        third = second_difference(around.offset, self.taken) / 6.0
         return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_antenna))
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span."""
         body = np.zeros((len(around.now.t), 3, 2))
-        body[..., 0] = around.f_antenna_now / 24.0
+        body[..., 0] = around.f_mean / 24.0
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
         return Direct(body=body, ned=ned)

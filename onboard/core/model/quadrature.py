@@ -16,6 +16,7 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
+from onboard.core.model.smoothing import mean_now
 
 AROUND_SPAN_S = 0.44
 """Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s."""
@@ -101,6 +102,8 @@ class Around:
         f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
         f_antenna: (K, 2 J + 1, 3) the same at the antenna, whose velocity it is that a receiver
             averages and reports late.
+        f_mean: (K, 3) its mean over the span that the receiver averages: what the reported velocity
+            changes by, per s.
         now: signals at the epochs, S = (K,).
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
             span that it averages, body axes of the epoch, 1/s.
@@ -110,14 +113,9 @@ class Around:
     signals: Signals
     f_epoch: Array
     f_antenna: Array
+    f_mean: Array
     now: Signals
     swing: Array
-
-    @property
-    def f_antenna_now(self) -> Array:
-        """(K, 3) specific force at the antenna at the epochs, body axes."""
-        middle: Array = self.f_antenna[:, len(self.offset) // 2]
-        return middle
 
 
 def lever_velocity(w_b: Array) -> Array:
@@ -303,7 +301,8 @@ class NodeMaker:
         lever = self._segment.lever_arm_b + (0.0 if antenna is None else antenna)
         f_antenna = f_epoch + _second_derivative(offset, P) @ lever
         swing = _swing(offset, P, now.w_b, window)
-        return Around(offset, nodes, f_epoch, f_antenna, now, swing)
+        f_mean = np.einsum("j,kja->ka", mean_now(offset, window), f_antenna)
+        return Around(offset, nodes, f_epoch, f_antenna, f_mean, now, swing)
 
     def _attitude(self, t: Array) -> Array:
         flat = interpolate_rotation(t.ravel(), self._segment.t_attitude, self._segment.R_attitude)

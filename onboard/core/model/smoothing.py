@@ -53,14 +53,47 @@ def _mean_weights(first: float, last: float, count: int, window: float) -> Array
     return weights
 
 
-def second_difference(offset: Array) -> Array:
-    """Weights (n,) of the second derivative at zero over 0.12 s to either side, 1/s^2."""
-    n = len(offset)
-    weights = np.zeros(n)
-    middle = n // 2
-    reach = max(1, round(SECOND_DERIVATIVE_S / float(offset[1] - offset[0])))
-    h = offset[middle + reach]
-    weights[[middle - reach, middle, middle + reach]] = np.array([1.0, -2.0, 1.0]) / h**2
+def box_weights(offset: Array, centre: float, width: float) -> Array:
+    """Weights (n,) of the mean over ``width`` about ``centre`` of straight lines between nodes.
+
+    Args:
+        offset: (n,) equidistant s.
+        centre: s.
+        width: s; the span lies within that of ``offset``.
+    """
+    step = offset[1] - offset[0]
+    # Rounding: narrower than this, the ends differ by nothing but their last digits.
+    width = max(width, 1e-6 * float(step))
+    ends = np.array([[centre + 0.5 * width], [centre - 0.5 * width]])
+    u = np.clip((ends - offset) / step, -1.0, 1.0)
+    # Integral of the hat function of each node up to either end, in steps.
+    area = np.where(u < 0.0, 0.5 * (1.0 + u) ** 2, 1.0 - 0.5 * (1.0 - u) ** 2)
+    weights: Array = (area[0] - area[1]) * (step / width)
+    return weights
+
+
+def mean_now(offset: Array, window: float) -> Array:
+    """Weights (n,) of the derivative of a receiver's averaged velocity to its moment.
+
+    ``d/dt mean(V) = mean(a)``.  The acceleration *at* that moment is mostly vibration, which an
+    averaged velocity does not have: as a regressor of the latency it would be noise.
+    """
+    return box_weights(offset, 0.0, min(window, 2.0 * float(offset[-1])))
+
+
+def second_difference(offset: Array, window: float = 0.0) -> Array:
+    """Weights (n,) of the second derivative at zero over 0.12 s to either side, 1/s^2.
+
+    Args:
+        offset: (n,) equidistant s around zero.
+        window: s, over which the second derivative is averaged besides.
+    """
+    # Whole nodes: between them a parabola is not one.
+    step = float(offset[1] - offset[0])
+    h = step * max(1, round(SECOND_DERIVATIVE_S / step))
+    width = min(window, 2.0 * (float(offset[-1]) - h))
+    three = [box_weights(offset, centre, width) for centre in (-h, 0.0, h)]
+    weights: Array = (three[0] - 2.0 * three[1] + three[2]) / h**2
     return weights
 
 

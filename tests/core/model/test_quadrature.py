@@ -17,7 +17,13 @@ from onboard.core.model.quadrature import (
     rotation_increments,
     simpson_weights,
 )
-from onboard.core.model.smoothing import mean_slope, mean_weights, second_difference
+from onboard.core.model.smoothing import (
+    box_weights,
+    mean_now,
+    mean_slope,
+    mean_weights,
+    second_difference,
+)
 
 NOMINAL = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 YAW_RATE = 0.8
@@ -204,6 +210,43 @@ def test_smoothing_slope_of_a_short_window_is_the_second_derivative():
 def test_second_difference_is_exact_for_parabolas():
     offset = np.linspace(-0.25, 0.25, 17)
     assert second_difference(offset) @ (3.0 * offset**2 - offset + 7.0) == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("window", [0.2, 0.5])
+def test_second_difference_of_an_averaged_signal_is_the_average_of_its_own(window):
+    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
+    quartic = second_difference(offset, window) @ offset**4
+    narrow = second_difference(offset) @ offset**4
+    # Mean of 12 s^2 over the span, and what straight lines between nodes add to a curve.
+    step = offset[1] - offset[0]
+    assert quartic - narrow == pytest.approx(window**2 + 2.0 * step**2, rel=0.02)
+
+
+@pytest.mark.parametrize(("centre", "width"), [(0.0, 0.3), (0.1, 0.05), (-0.2, 0.013), (0.02, 0.0)])
+def test_box_weights_are_the_mean_of_straight_lines(centre, width):
+    offset = np.linspace(-0.44, 0.44, 29)
+    y = np.random.default_rng(1).normal(size=29)
+    fine = np.linspace(centre - width / 2, centre + width / 2, 200_001)
+    mean = float(np.mean(np.interp(fine, offset, y)))
+    assert box_weights(offset, centre, width) @ y == pytest.approx(mean, abs=1e-4)
+
+
+@pytest.mark.parametrize("window", [0.1, 0.35, 0.66])
+def test_an_averaged_velocity_changes_by_its_averaged_acceleration(window):
+    """Also where the acceleration is mostly vibration, of which the average knows nothing."""
+    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
+    a = np.sin(3.0 * offset) + 2.0 * np.random.default_rng(2).normal(size=len(offset))
+    fine = np.linspace(offset[0], offset[-1], 40_001)
+    step = fine[1] - fine[0]
+    v = np.concatenate([[0.0], np.cumsum(np.interp(0.5 * (fine[1:] + fine[:-1]), offset, a) * step)])
+
+    def mean(at):
+        s = np.linspace(at - window / 2, at + window / 2, 4001)
+        return np.trapezoid(np.interp(s, fine, v), s) / window
+
+    e = 1e-4
+    numeric = (mean(e) - mean(-e)) / (2.0 * e)
+    assert mean_now(offset, window) @ a == pytest.approx(numeric, abs=1e-3)
 
 
 @pytest.mark.parametrize("period", [0.1, 0.2, 0.125])

@@ -64,14 +64,14 @@ R, F, W = rotation(T), force(T), rates(T)
 TEMPERATURE, THROTTLE = 25.0 + 4.0 * T, 0.5 + 0.2 * np.sin(T)
 
 
-def nodes_of(f_read, told=(0.0, 0.0, 0.0), found=(0.0, 0.0, 0.0)):
+def nodes_of(f_read, told=(0.0, 0.0, 0.0), found=(0.0, 0.0, 0.0), averaged=0.0):
     slow = {"temperature": (T[::20], TEMPERATURE[::20]), "throttle": (T[::20], THROTTLE[::20])}
     step = slice(None, None, 10)  # 200 Hz
     segment = Segment(
         T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow, np.array(told)
     )
     made = NodeMaker(segment, np.zeros(3), NOMINAL)
-    around = made.around(EPOCHS, antenna=np.array(found))
+    around = made.around(EPOCHS, averaged, np.array(found))
     return made.intervals(EPOCHS[:-1], EPOCHS[1:]), around
 
 
@@ -213,6 +213,18 @@ def test_a_clock_that_runs_away_is_a_latency_that_grows(arm):
     late = e * (EPOCHS - ORIGIN.t0)
     numeric = (velocity_at(EPOCHS - late, **arm) - velocity_at(EPOCHS + late, **arm)) / (2 * e)
     got = columns_of(ClockSkew(ORIGIN), **arm)
+    np.testing.assert_allclose(direct(got, 0), numeric, atol=5e-3)
+
+
+@pytest.mark.parametrize("window", [0.1, 0.3])
+def test_a_late_receiver_that_averages_reads_the_average_of_before(window):
+    def mean(t):
+        s = np.linspace(-window / 2, window / 2, 401)
+        return np.trapezoid(velocity_at(t[:, None] + s), s, axis=1) / window
+
+    e = 2e-3
+    numeric = (mean(EPOCHS - e) - mean(EPOCHS + e)) / (2 * e)
+    got = columns_of(GpsLatency(0.0), averaged=window)
     np.testing.assert_allclose(direct(got, 0), numeric, atol=5e-3)
 
 

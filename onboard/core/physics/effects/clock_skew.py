@@ -33,9 +33,9 @@ class ClockSkew(Effect):
     response = curves.Response("time", "s", "GPS late by", "ms", curves.time, lambda x, _: 1e3 * x)
 
     def velocity(self, around: Around) -> Direct:
-        """``-a (t - t0)``, at the antenna."""
+        """``-a (t - t0)``, at the antenna, averaged as the velocity is."""
         age = around.now.t - self.origin.t0
-        body = -around.f_antenna_now[..., None] * age[:, None, None]
+        body = -around.f_mean[..., None] * age[:, None, None]
         ned = np.zeros_like(body)
         ned[:, 2, 0] = -STANDARD_GRAVITY * age
         return Direct(body=body, ned=ned)
