@@ -238,7 +238,8 @@ def test_an_averaged_velocity_changes_by_its_averaged_acceleration(window):
     a = np.sin(3.0 * offset) + 2.0 * np.random.default_rng(2).normal(size=len(offset))
     fine = np.linspace(offset[0], offset[-1], 40_001)
     step = fine[1] - fine[0]
-    v = np.concatenate([[0.0], np.cumsum(np.interp(0.5 * (fine[1:] + fine[:-1]), offset, a) * step)])
+    gained = np.interp(0.5 * (fine[1:] + fine[:-1]), offset, a) * step
+    v = np.concatenate([[0.0], np.cumsum(gained)])
 
     def mean(at):
         s = np.linspace(at - window / 2, at + window / 2, 4001)
