@@ -55,6 +55,12 @@ def said(judge: Judge) -> Said:
     for effect in diagnosis.effects:
         for key, q in effect.unknowns.items():
             numbers.setdefault(f"{effect.name}.{key}", (q.value, q.sigma))
+    for axis in "xyz":
+        # Of an antenna that is not named, what the nuisance has found is what is there already.
+        i = index.get(f"antenna_{axis}")
+        if i is not None:
+            place = (float(solution.theta[i]), float(sigma[i]))
+            numbers.setdefault(f"gps_lever_arm.{axis}", place)
     names = frozenset(e.name for e in diagnosis.effects)
     blind = frozenset(n.name for n in diagnosis.not_testable)
     smallest = {f"{u.name}.{key}": x for u in diagnosis.unseen for key, x in u.smallest.items()}
