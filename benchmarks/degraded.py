@@ -31,6 +31,8 @@ from onboard.core.maths.accelerometer import linear_of, parameters_of
 RECORDINGS = ("a02.tlog", "a05.tlog", "b02.tlog", "b05.tlog", "c01.BIN")
 """Two planes and two copters as telemetry, and a log: only logs have vertical velocity."""
 NOISE_M_S = 0.3
+ALIASED_M_S2 = np.array([0.25, 0.65, 0.20])
+"""As two real copters have it at 50 Hz, from sample to sample."""
 EARLY = 0.1
 """Of a step: stamps jitter, and a sample that comes a little early is taken."""
 
@@ -120,6 +122,17 @@ def _noisy(samples: Samples) -> Iterator[Sample]:
             yield s
 
 
+def _vibrating(samples: Samples) -> Iterator[Sample]:
+    """Vibration faster than half the sample rate, which samples fold into noise of all bands."""
+    rng = np.random.default_rng(6)
+    for s in samples:
+        if isinstance(s, ImuSample):
+            x, y, z = (float(a) for a in s.f_b + ALIASED_M_S2 * rng.standard_normal(3))
+            yield replace(s, f_b=(x, y, z))
+        else:
+            yield s
+
+
 def _old(sample: Sample) -> Sample:
     """MAVLink 1 has no extension fields: no temperature, no accuracy."""
     if isinstance(sample, ImuSample):
@@ -168,6 +181,7 @@ LOSSES = (
     _all("neither height nor vertical velocity", _changed(_no_height), _changed(_no_vertical)),
     _all("inertial data at 25 Hz", _thinned(ImuSample, 25.0)),
     _all("inertial data at 10 Hz", _thinned(ImuSample, 10.0)),
+    _all("vibration aliased into samples", _vibrating),
     _all("no EKF status", _without(EkfHealth)),
     _all("neither EKF status nor armed state", _without(EkfHealth, VehicleState)),
     _all("no word on GPS quality", _changed(_quiet_receiver)),
