@@ -243,7 +243,7 @@ def strength(delta_bic: float) -> str:
 def surely(effect: Finding, *, ambiguous: bool) -> str:
     """How sure one effect is, as a sentence."""
     if is_excluded(effect.name):
-        return "This is visible in the measurements themselves; those samples were left out of the fit."
+        return "It is visible in the measurements; those samples were left out of the fit."
     text = strength(effect.delta_bic).capitalize()
     before, after = effect.held_out_velocity_before, effect.held_out_velocity_after
     if math.isfinite(before) and math.isfinite(after) and before > 0.0:

@@ -16,7 +16,7 @@ from onboard.core.physics.effect import Bearing
 HEADLINES = {
     "clean": "Nothing is missing beyond the six numbers and the timing.",
     "explained": "The flight shows errors beyond the six numbers, and all of them were identified.",
-    "partly_explained": "The flight shows errors beyond the six numbers, and only a part was identified.",
+    "partly_explained": "The flight shows errors beyond the six numbers, and some were identified.",
     "unexplained": "The flight shows errors that no known effect explains.",
     "insufficient": "This flight shows too little to say whether anything is missing.",
 }

@@ -24,7 +24,8 @@ from onboard.core.physics.catalogue import title_of
 from onboard.errors import UsageError
 
 REAL32 = 9
-PX4 = "px4"
+ULOG = "ulog"
+"""Recordings that say what PX4 did to its accelerometer; its telemetry does not."""
 INTEGERS = {
     "GPS1_DELAY_MS": 4,
     "GPS_DELAY_MS": 4,
@@ -109,15 +110,17 @@ def replay_text(result: Replay, file: str | Path) -> str:
     """The parameter file of a replay, in the format that its name asks for.
 
     Raises:
-        UsageError: the recordings are of another autopilot.
+        UsageError: the recordings are of another autopilot, or telemetry of PX4.
     """
-    if result.autopilot == PX4:
+    if result.recordings[0].kind == ULOG:
         path, alone = result.recordings[0].path, len(result.recordings) == 1
         its = [px4_advice(a, path, result.parameters, alone=alone) for a in result.answers]
         return px4_text(result.answers, its, [r.path.name for r in result.recordings])
     advice = [its for its in result.advice if its is not None]
     if not advice:
-        raise UsageError(f"{file}: {result.recordings[0].path} is of neither ArduPilot nor PX4")
+        raise UsageError(
+            f"{file}: {result.recordings[0].path} is no ArduPilot's, and no ULog of PX4"
+        )
     names = [recording.path.name for recording in result.recordings]
     return calibration_text(result.answers, advice, names, qgc=is_qgc(str(file)))
 
@@ -126,14 +129,14 @@ def explanation_text(result: Explanation, file: str | Path) -> str:
     """The parameter file of an explanation, in the format that its name asks for.
 
     Raises:
-        UsageError: the recordings are of another autopilot.
+        UsageError: the recordings are of another autopilot, or telemetry of PX4.
     """
     recordings = result.source.recordings
-    if recordings[0].autopilot == PX4:
+    if recordings[0].kind == ULOG:
         its = px4_advice(result.answer, recordings[0].path, result.parameters)
         return px4_text([result.answer], [its], result.files)
     if result.advice is None:
-        raise UsageError(f"{file}: {recordings[0].path} is of neither ArduPilot nor PX4")
+        raise UsageError(f"{file}: {recordings[0].path} is no ArduPilot's, and no ULog of PX4")
     qgc = is_qgc(str(file))
     return parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
 

@@ -40,7 +40,11 @@ def raw_imu(t_us: int, z: int = -1000) -> object:
 
 
 def telemetry(
-    seconds: int = 4, system: int = 1, version: int = 2, writer: TelemetryWriter | None = None
+    seconds: int = 4,
+    system: int = 1,
+    version: int = 2,
+    writer: TelemetryWriter | None = None,
+    firmware: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
 ) -> TelemetryWriter:
     """RAW_IMU and ATTITUDE at 25 Hz, GPS at 5 Hz, heartbeat at 1 Hz, a parameter, some others."""
     log = writer or TelemetryWriter()
@@ -51,7 +55,7 @@ def telemetry(
     for k in range(25 * seconds):
         t = 10_000_000 + 40_000 * k
         if k % 25 == 0:
-            add(heartbeat())
+            add(heartbeat(firmware))
             log.add(heartbeat(mavlink.MAV_AUTOPILOT_INVALID), 255, 190, version)
         if k == 1:
             add(mavlink.MAVLink_param_value_message(b"INS_ACCSCAL_X", 1.01, 9, 1, 0))

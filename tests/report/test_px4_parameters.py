@@ -8,11 +8,12 @@ import pytest
 from onboard.answers.advice import advise
 from onboard.answers.answer import Answer
 from onboard.answers.px4 import px4_advice, sensor_of
+from onboard.cli.main import run
 from onboard.core.estimate.result import Status
 from onboard.core.maths.board_orientation import board_rotation
 from onboard.recordings.ulog_information import ulog_information
 from onboard.report.parameters import px4_text
-from tests.recordings.telemetry_writer import px4_log
+from tests.recordings.telemetry_writer import px4_log, telemetry
 from tests.report.diagnoses_by_hand import calibration, diagnosis
 
 FLEW, OTHER = 3_211_018, 2_818_058
@@ -121,3 +122,10 @@ def test_of_several_recordings_none_is_the_basis(tmp_path):
     its = px4_advice(answered(), path, ulog_information(path).parameters, alone=False)
     assert its.settings == ()
     assert its.reasons
+
+
+def test_telemetry_of_px4_does_not_say_what_px4_did_to_the_sensor(tmp_path, capsys):
+    path = tmp_path / "x.tlog"
+    path.write_bytes(bytes(telemetry(5, firmware=12)))
+    assert run(["replay", str(path), "--param", str(tmp_path / "p.params")]) == 2
+    assert "no ULog of PX4" in capsys.readouterr().err

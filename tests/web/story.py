@@ -228,7 +228,7 @@ def holding(held_back, *, approvable=False):
 DIAGNOSIS = {
     "schema": "onboard.explain/1",
     "verdict": "partly_explained",
-    "headline": "The flight shows errors beyond the six numbers, and only a part was identified.",
+    "headline": "The flight shows errors beyond the six numbers, and some were identified.",
     "severity": "warning",
     "recording": {"imu": 1},
     "mismatch": {
