@@ -37,7 +37,7 @@ THEIRS: Final = frozenset({Objection.PARAMETERS_UNKNOWN, Objection.ZERO_OFFSETS}
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One parameter of PX4: its value, the standard deviation of that, and what it is."""
+    """One parameter of PX4: its value, by how much another flight would differ, and what it is."""
 
     name: str
     value: float

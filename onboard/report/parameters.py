@@ -98,7 +98,7 @@ def px4_text(answers: Sequence[Answer], advice: Sequence[Px4Advice], files: Sequ
         lines.append(f"# accelerometer {given.imu}: {given.calibration.status.value}")
         lines += [f"# not to be set: {reason}" for reason in its.reasons]
         for setting in its.settings:
-            lines.append(f"# calibration: sigma {setting.sigma:.2g}")
+            lines.append(f"# calibration: {setting.words}, repeatable to {setting.sigma:.2g}")
             line = f"1\t1\t{setting.name}\t{setting.value:.7g}\t{REAL32}"
             lines.append(f"# not set: {line}" if its.reasons else line)
     lines.append("# Load it before the next flight: PX4 may learn offsets of its own after each")
@@ -186,7 +186,7 @@ def _six(advice: Advice) -> Iterator[Change]:
             continue
         reason = f"calibration: {words}"
         if math.isfinite(number.sigma):
-            reason += f", sigma {number.sigma:.2g}"
+            reason += f", repeatable to {number.sigma:.2g}"
         if number.name in advice.conditions:
             reason += f": {advice.conditions[number.name]}"
         yield Change(number.name, number.wanted, reason, withheld, words)

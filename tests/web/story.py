@@ -103,7 +103,7 @@ def _imu(number, second, *, done):
         else StateView(
             name="collecting",
             title="learning",
-            sentence=f"least of all the {SIX_NAMES[weakest]}",
+            sentence=f"least is known of the {SIX_NAMES[weakest]}",
             severity="info",
             next=advice,
         ),
