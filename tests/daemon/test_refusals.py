@@ -31,8 +31,7 @@ async def test_of_several_pushes_one_is_rolled_back_by_its_number(document, daem
         with pytest.raises(RefusedError, match="no push is in force"):
             await service.rollback((3,))
         vehicle.armed = True
-        await until(lambda: service.snapshot().link.armed)
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(8.0)  # arming and disarming at once would be a contradiction
         with pytest.raises(RefusedError, match="armed"):
             await service.rollback((2,))
         assert len(vehicle.sets) == sets
