@@ -18,6 +18,7 @@ from onboard.answers.calibration_document import (
     calibration_document,
 )
 from onboard.answers.document_numbers import Number, finite, timing_document
+from onboard.answers.json_file import indented
 from onboard.answers.verdict import unused_in_words
 from onboard.answers.words import DISTRUST
 from onboard.core.diagnosis.records import Ambiguity, Diagnosis, Mismatch, NotTestable, Rung, Unused
@@ -168,7 +169,7 @@ class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
 
     def to_json(self) -> bytes:
         """Indented, ends with a line feed."""
-        return msgspec.json.format(msgspec.json.encode(self), indent=2) + b"\n"
+        return indented(self)
 
 
 def explain_document(

@@ -19,6 +19,7 @@ from onboard.answers.explain_document import (
     where_document,
 )
 from onboard.answers.flown_again import FlownAgain
+from onboard.answers.json_file import indented
 from onboard.answers.match import Match
 from onboard.core.vehicle.records import AxisMismatch, Difference
 
@@ -116,7 +117,7 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
 
     def to_json(self) -> bytes:
         """Indented, ends with a line feed."""
-        return msgspec.json.format(msgspec.json.encode(self), indent=2) + b"\n"
+        return indented(self)
 
 
 def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDocument:

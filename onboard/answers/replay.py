@@ -301,8 +301,8 @@ class Vehicle:
         samples = f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples"
         if self.standing_s > 0.0:
             return (
-                f"{samples}, none of them in the air with trusted GPS: {self.standing_s:.0f} s of "
-                "standing teach nothing"
+                f"{samples}, none of them in the air with trusted GPS; "
+                f"the {self.standing_s:.0f} s on the ground are not used"
             )
         return f"{samples}, never at 10 a second or more together with attitude and trusted GPS"
 

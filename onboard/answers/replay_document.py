@@ -24,6 +24,7 @@ from onboard.answers.document_numbers import (
     timing_document,
 )
 from onboard.answers.flight_document import FlightsDocument
+from onboard.answers.json_file import indented
 from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.core.maths.accelerometer import SixParameters
 
@@ -183,7 +184,7 @@ class ReplayDocument(msgspec.Struct, frozen=True, kw_only=True):
         """Indented JSON, ``schema`` first, with a final newline."""
         fields = msgspec.to_builtins(self)
         ordered = {"schema": fields.pop("schema"), **fields}
-        return msgspec.json.format(msgspec.json.encode(ordered), indent=2) + b"\n"
+        return indented(ordered)
 
 
 def imu_document(

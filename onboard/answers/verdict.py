@@ -42,9 +42,9 @@ SAID_ABOVE = (
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict as one short sentence."""
     if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return "This flight cannot tell"
+        return "This flight shows too little to tell"
     if diagnosis.verdict is Verdict.CLEAN:
-        return "Nothing is missing" + (WHERE_BELIEVED if diagnosis.unused else "")
+        return "Nothing is missing from the model" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if is_named(e.name)]
     if not named:
         return "Something is missing, and no known effect explains it"
@@ -69,15 +69,15 @@ def missing(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         m = diagnosis.mismatch
         if not m.supported:
-            fit = f"Only {m.fixes} of {m.believed} GPS fixes fit one model of this flight"
-            return [f"{fit}: of more than half that do not, nothing tells which are false."]
+            fit = f"Only {m.fixes} of {m.believed} GPS fixes agree with one model of this flight."
+            return [f"{fit} Where fewer than half agree, it cannot be told which are false."]
         return ["There is too little motion with trusted GPS to say what is missing."]
     said = [sized(e) + "." for e in diagnosis.effects]
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
         more = "what is left is more than noise"
         if diagnosis.mismatch.held_out_after <= NOISE:
             more = "parts of this flight still contradict each other"
-        said.append(f"That is not all: {more}.")
+        said.append(f"These effects do not explain everything: {more}.")
     if said:
         return said
     if diagnosis.verdict is Verdict.CLEAN:
@@ -107,11 +107,12 @@ def proof(diagnosis: Diagnosis) -> str:
     if not (math.isfinite(before) and math.isfinite(after) and math.isfinite(noise)):
         return "The residual could not be judged on data not used in the fit."
     rests = f" ({m.fixes} of {m.believed} fixes)" if m.believed else ""
-    said = f"On flight not used in the fit{rests}, velocity is off by {number(after, 2)} m/s"
+    where = f"On parts of the flight that the fit did not use{rests}"
+    said = f"{where}, the predicted velocity differs from GPS by {number(after, 2)} m/s"
     if noise > NOISE:
         said += f", {noise:.1f} times what noise would leave"
     elif diagnosis.verdict in (Verdict.CLEAN, Verdict.EXPLAINED):
-        said += ", which is noise"
+        said += ", which is no more than noise"
     if diagnosis.verdict is not Verdict.CLEAN:
         said += f"; it was {number(before, 2)} m/s with scale and offset only"
         said += f" ({fall(before, after)})"
@@ -169,9 +170,9 @@ def about_six(advice: Advice) -> str:
 
 def _without_cure(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.effects:
-        return ["No parameter cures what was found."]
+        return ["No parameter can correct what was found."]
     if diagnosis.verdict is Verdict.CLEAN:
-        return ["Nothing beyond the calibration itself."]
+        return ["Nothing has to be changed beyond the calibration itself."]
     return ["Look for a cause where the residual is largest."]
 
 
@@ -242,7 +243,7 @@ def strength(delta_bic: float) -> str:
 def surely(effect: Finding, *, ambiguous: bool) -> str:
     """How sure one effect is, as a sentence."""
     if is_excluded(effect.name):
-        return "Seen in the measurements themselves; they were left out of the fit."
+        return "It is visible in the measurements; those samples were left out of the fit."
     text = strength(effect.delta_bic).capitalize()
     before, after = effect.held_out_velocity_before, effect.held_out_velocity_after
     if math.isfinite(before) and math.isfinite(after) and before > 0.0:

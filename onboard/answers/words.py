@@ -42,6 +42,7 @@ DISTRUST = {
     "gps_glitch": "velocity jumped (glitch)",
     "ekf_gps_glitch": "the autopilot reports a GPS glitch",
     "ekf_unhealthy": "the autopilot's state estimate is not ready",
+    "ekf_unknown": "the autopilot has not said yet whether its state estimate is ready",
     "stale": "no fresh GPS",
     "gps_gap": "a gap in GPS",
     "restarted": "the recording or the autopilot began anew",

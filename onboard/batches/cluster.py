@@ -64,7 +64,7 @@ def on_cluster(
             number, job = part[0]
             yield (
                 number,
-                (Outcome(error=f"{job.path}: {found}") if isinstance(found, str) else found[0]),
+                (Outcome(error=f"{job.file}: {found}") if isinstance(found, str) else found[0]),
             )
 
 

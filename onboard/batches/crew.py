@@ -86,7 +86,12 @@ class _Hand(threading.Thread):
                 number, job = self._waiting.get_nowait()
             except queue.Empty:
                 break
-            self._finished.put((number, self._done(number, job)))
+            try:
+                outcome = self._done(number, job)
+            except Exception as error:  # noqa: BLE001 - whoever waits for it would wait for ever
+                said = f"{type(error).__name__}: {error}"
+                outcome = Outcome(error=f"{job.file}: could not be handed over ({said})")
+            self._finished.put((number, outcome))
         self._dismiss()
 
     def end(self) -> None:
@@ -105,7 +110,7 @@ class _Hand(threading.Thread):
             if isinstance(outcome, Outcome):
                 return outcome
             why = outcome
-        return Outcome(error=f"{job.path}: the process that replayed it {why}")
+        return Outcome(error=f"{job.file}: the process that replayed it {why}")
 
     def _tried(self, number: int, job: Job) -> Outcome | str:
         """The outcome, or how the process ended."""

@@ -8,6 +8,7 @@ from typing import IO
 import msgspec
 
 from onboard.batches.job import Job, Outcome
+from onboard.printable import encodable
 
 _LENGTH = struct.Struct("<Q")
 
@@ -30,7 +31,11 @@ _JOB = msgspec.msgpack.Decoder(Job)
 
 def send(pipe: IO[bytes], message: Job | Share | Result) -> None:
     """Write one message."""
-    data = msgspec.msgpack.encode(message)
+    try:
+        data = msgspec.msgpack.encode(message)
+    except UnicodeEncodeError:  # a name that is no UTF-8
+        plain = msgspec.to_builtins(message, builtin_types=(bytes,))
+        data = msgspec.msgpack.encode(encodable(plain))
     pipe.write(_LENGTH.pack(len(data)) + data)
     pipe.flush()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import os
 from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
@@ -27,13 +28,21 @@ BLOCK = 1 << 20
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
-    """One recording; ``paged``: a report is wanted; ``store``: a folder, or empty."""
+    """One recording; ``paged``: a report is wanted; ``store``: a folder, or empty.
 
-    path: str
+    ``path`` is what the system calls it: bytes, which need not be text.
+    """
+
+    path: bytes
     imu: int | None = None
     paged: bool = False
     store: str = ""
     version: str = ""
+
+    @property
+    def file(self) -> Path:
+        """Where it is."""
+        return Path(os.fsdecode(self.path))
 
 
 class Outcome(msgspec.Struct, frozen=True, kw_only=True):
@@ -66,7 +75,7 @@ def done(job: Job, progress: Callable[[float], None] | None = None) -> Outcome:
     """
     if job.version and job.version != version():
         return Outcome(error=f"replayed by another version ({version()}, here {job.version})")
-    path = Path(job.path)
+    path = job.file
     try:
         return _done(job, path, progress)
     except OnboardError as error:
@@ -94,7 +103,8 @@ def _done(job: Job, path: Path, progress: Callable[[float], None] | None) -> Out
     if job.paged and recorded.chronicle is not None:
         from onboard.report.replay import replay_html  # noqa: PLC0415 - templates only when wanted
 
-        page = gzip.compress(replay_html(result, recorded.chronicle).encode(), mtime=0)
+        html = replay_html(result, recorded.chronicle)
+        page = gzip.compress(html.encode("utf-8", "replace"), mtime=0)
     if store is not None:
         store.keep(key, record, page if job.paged else None, notes)
     return Outcome(record=record, page=page, notes=tuple(notes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from onboard.answers.fleet.record import Flown
 from onboard.batches.cluster import PER_BATCH, on_cluster
 from onboard.batches.crew import Told, outcomes
 from onboard.batches.job import Job, Outcome, version
+from onboard.printable import encodable
 
 Paged = Callable[[str, bytes], None]
 """Told the name of a recording and its report, packed by gzip."""
@@ -81,7 +83,7 @@ def fly(
 def _job(path: Path, orders: Orders) -> Job:
     """Absolute paths: a process elsewhere has another working directory."""
     return Job(
-        path=str(path.absolute()),
+        path=os.fsencode(path.absolute()),
         imu=orders.imu,
         paged=orders.paged,
         store="" if orders.store is None else str(orders.store.absolute()),
@@ -91,4 +93,6 @@ def _job(path: Path, orders: Orders) -> Job:
 
 def _flown(path: Path, name: str, outcome: Outcome, job: Job) -> Flown:
     record = None if outcome.record is None else outcome.record.named(path)
-    return Flown(path, name, record, outcome.error.replace(job.path, str(path)), outcome.notes)
+    there = encodable(str(job.file))  # as it came back from another process
+    error = outcome.error.replace(str(job.file), str(path)).replace(there, str(path))
+    return Flown(path, name, record, error, outcome.notes)

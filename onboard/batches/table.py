@@ -19,6 +19,7 @@ from onboard.answers.fleet.vehicles import Flight
 from onboard.answers.knowledge import seen
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.errors import UsageError
+from onboard.printable import encodable
 
 TEXT, NUMBER, INTEGER, FLAG, TEXTS = "text", "number", "integer", "flag", "texts"
 ROWS_AT_ONCE = 10_000
@@ -143,7 +144,7 @@ def rows_of(
     """The rows of one recording: one for each accelerometer, or one with the error."""
     record = one.record
     if record is None:
-        yield {"file": str(one.path), "error": one.error}
+        yield {"file": encodable(str(one.path)), "error": one.error}
         return
     shared = _of_recording(one, record, history, flight)
     for imu in record.imus:
@@ -155,7 +156,7 @@ def _of_recording(
 ) -> dict[str, Value]:
     p, r = record.provenance, record.document.recording
     return {
-        "file": str(one.path),
+        "file": encodable(str(one.path)),
         "sha256": record.sha256,
         "vehicle": None if history is None else history.vehicle.name,
         "identified_by": None if history is None else history.vehicle.identified_by,

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
 
 from onboard.cli.demo_pace import Heard, keep
+from onboard.cli.terminal import Terminal
 from onboard.daemon.process.interrupts import stop_signals
 from onboard.errors import OnboardError
 
@@ -114,7 +114,7 @@ def demo(
     page stays until Ctrl-C.
     """
     logging.getLogger("onboard").addHandler(logging.NullHandler())
-    out = Console(stderr=json_file == "-", highlight=False)
+    out = Terminal(stderr=json_file == "-", highlight=False)
     options = Options(duration, port, speedup, seed, stays=sys.stdout.isatty() and not once)
     try:
         outcome = asyncio.run(_demonstrate(options, out, json_file))
@@ -124,7 +124,7 @@ def demo(
         raise DemoError("; ".join(outcome.shortcomings))
 
 
-def _tell(outcome: Outcome, out: Console, json_file: str | None) -> None:
+def _tell(outcome: Outcome, out: Terminal, json_file: str | None) -> None:
     """The result, for people and for programs."""
     from onboard.cli.demo_report import report
 
@@ -138,7 +138,7 @@ def _tell(outcome: Outcome, out: Console, json_file: str | None) -> None:
             Path(json_file).write_bytes(document)
 
 
-async def _demonstrate(options: Options, out: Console, json_file: str | None) -> Outcome:
+async def _demonstrate(options: Options, out: Terminal, json_file: str | None) -> Outcome:
     from onboard.cli.demo_report import Outcome
     from onboard.cli.demo_show import Show
     from onboard.daemon.process.service import Service
@@ -183,7 +183,7 @@ async def _demonstrate(options: Options, out: Console, json_file: str | None) ->
         return outcome
 
 
-async def _stay(out: Console, url: str) -> None:
+async def _stay(out: Terminal, url: str) -> None:
     """Keep the page for whoever looks, until Ctrl-C."""
     out.print(f"the status page stays at {url}; Ctrl-C ends it")
     asked = asyncio.Event()

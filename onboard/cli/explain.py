@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -18,6 +18,7 @@ from onboard.answers.knowledge import seen
 from onboard.answers.words import fixed, percent
 from onboard.cli.progress import reading
 from onboard.cli.replay import STANDARD_OUTPUT, write_bytes, write_json, write_text
+from onboard.cli.terminal import Terminal
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.finding import Finding
@@ -84,7 +85,7 @@ def explain(
     if mcap_file is not None:
         write_bytes(mcap(of_diagnosis(result.diagnosis)), mcap_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file, mcap_file):
-        console = Console(highlight=False)
+        console = Terminal(highlight=False)
         for part in summary(result):
             console.print(part)
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from rich.console import Console
 from rich.text import Text
 
 from onboard.answers.fleet.document import fleet_document
@@ -23,9 +22,12 @@ from onboard.batches.store import Store
 from onboard.cli.fleet_table import HEAD, lines, vehicle_lines
 from onboard.cli.progress import many
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.cli.terminal import Terminal
 from onboard.errors import UsageError
 
 INDEX = "index.html"
+LONGEST_NAME = 200
+"""Bytes of a page's name before ``.html``: file systems take 255."""
 EXAMPLES = """\
 \b
 onboard fleet logs/
@@ -133,7 +135,7 @@ def fleet(
         scheduler=scheduler,
         per_batch=per_batch,
     )
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal(highlight=False, soft_wrap=True)
     table = json_file != STANDARD_OUTPUT
     places_of, pages = pages_of([name for _, name in files]), dict[str, str]()
 
@@ -197,6 +199,7 @@ def pages_of(names: Sequence[str]) -> dict[str, str]:
     taken = {INDEX}
     for name in names:
         plain = "-".join(part for part in Path(name).parts if part != Path(name).anchor)
+        plain = plain.encode("utf-8", "replace")[-LONGEST_NAME:].decode("utf-8", "ignore")
         page, n = f"{plain}.html", 2
         while page in taken:
             page, n = f"{plain}-{n}.html", n + 1

@@ -18,6 +18,7 @@ import click
 from onboard import __version__
 from onboard.cli.simulator import make_importable
 from onboard.errors import OnboardError
+from onboard.printable import printable
 
 DONE, USAGE, INTERRUPTED = 0, 2, 130
 COMPLETION = "_ONBOARD_COMPLETE"
@@ -158,7 +159,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def _fail(message: str, status: int) -> int:
     try:
-        click.echo(f"onboard: {' '.join(message.split())}", err=True)
+        click.echo(f"onboard: {printable(' '.join(message.split()))}", err=True)
     except BrokenPipeError:
         _forget_output()
     return status

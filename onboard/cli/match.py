@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -19,6 +19,7 @@ from onboard.answers.match_files import frame_text, read_frame, settings_text
 from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
 from onboard.cli.progress import reading, waiting
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.cli.terminal import Terminal
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.recording import Recording
 from onboard.recordings.table import open_table
@@ -106,7 +107,7 @@ def match(
     if frame_file is not None:
         write_text(frame_text(result), frame_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file, frame_file):
-        console = Console(highlight=False)
+        console = Terminal(highlight=False)
         for part in summary(result):
             console.print(part)
         if verified is not None:

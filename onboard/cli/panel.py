@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from onboard.answers.words import DISTRUST
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.view.snapshot import ImuView, Snapshot, WrittenView
@@ -72,7 +73,8 @@ def gps(snapshot: Snapshot) -> Text:
     if trust.open:
         text.append("trusted", style="green")
     else:
-        why = ", ".join(trust.reasons) or trust.reason or "nothing heard yet"
+        reasons = trust.reasons or (trust.reason or "waiting",)
+        why = ", ".join(DISTRUST.get(reason, reason) for reason in reasons)
         text.append(f"not trusted: {why}", style="yellow")
     return text.append(f"; {duration(trust.trusted_s)} used so far", style="default")
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from onboard.answers.calibrated import calibrated
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
+from onboard.cli.terminal import Terminal
 from onboard.report.files import save
 
 STANDARD_OUTPUT = "-"
@@ -85,7 +85,7 @@ def replay(
     if json_file is not None:
         write_json(result.document().to_json(), json_file)
     if STANDARD_OUTPUT not in (json_file, report_file, param_file, mcap_file):
-        console = Console(highlight=False)
+        console = Terminal(highlight=False)
         for part in replay_report(result):
             console.print(part)
 
@@ -119,6 +119,7 @@ def write_text(text: str, file: str) -> None:
 
 def _write(content: str | bytes, file: str) -> None:
     if file == STANDARD_OUTPUT:
-        click.echo(content, nl=False)
+        data = content.encode("utf-8", "replace") if isinstance(content, str) else content
+        click.echo(data, nl=False)
     else:
         save(content, file)

@@ -160,12 +160,11 @@ def status(
     if as_json:
         click.echo(client.snapshot().to_json())
         return
-    from rich.console import Console
-
     from onboard.cli.compact import compact
     from onboard.cli.panel import panel
+    from onboard.cli.terminal import Terminal
 
-    console = Console(highlight=False)
+    console = Terminal(highlight=False)
     if not watch:
         console.print(panel(client.snapshot()))
         return
@@ -236,12 +235,11 @@ def rollback(
 
     Shows both first, and on a terminal asks.
     """
-    from rich.console import Console
-
     from onboard.cli.panel import changes
+    from onboard.cli.terminal import Terminal
 
     client = _client(url, config, token_file)
-    console = Console(highlight=False)
+    console = Terminal(highlight=False)
     snapshot = client.snapshot()
     in_force = [w for w in snapshot.push.written if w.in_force]
     chosen = [w for w in in_force if not imus or w.imu in imus]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -79,10 +80,16 @@ class Claim:
 
 
 class Claims:
-    """The claims that are followed: a bounded number, those that prove nothing give way."""
+    """The claims that are followed: a bounded number, and no address takes the others' places.
+
+    Where all places are taken, the address with the most claims loses one of its own, whatever
+    they have proven: it costs nothing to speak as forty autopilots.  Where each has one, those that
+    prove nothing give way.  The vehicle's own claim never does.
+    """
 
     def __init__(self) -> None:
         self._claims: dict[tuple[Source, Way], Claim] = {}
+        self._pinned: tuple[Source, Way] | None = None
 
     def __iter__(self) -> Iterator[Claim]:
         return iter(self._claims.values())
@@ -93,14 +100,26 @@ class Claims:
 
     def make(self, source: Source, way: Way, message: Message, now: float) -> Claim | None:
         """A new claim; None while all places are taken by better ones."""
-        if len(self._claims) >= limits.CLAIMS_KNOWN:
-            key = min(self._claims, key=lambda k: self._worth(self._claims[k], now))
-            if self._claims[key].proven and now - self._claims[key].heard < limits.PEER_SILENCE_S:
-                return None
-            del self._claims[key]
+        if len(self._claims) >= limits.CLAIMS_KNOWN and not self._make_room(way, now):
+            return None
         claim = Claim(source, way, message.type, message.autopilot, heard=now, beat=now)
         self._claims[source, way] = claim
         return claim
+
+    def _make_room(self, newcomers: Way, now: float) -> bool:
+        """Whether a claim has given way to one of ``newcomers``."""
+        loose = [key for key in self._claims if key != self._pinned]
+        crowd = Counter(way for _, way in loose)
+        crowd[newcomers] += 1
+        most = max(crowd.values())
+        if most > 1:
+            loose = [key for key in loose if crowd[key[1]] == most]
+        weakest = min(loose, key=lambda key: self._worth(self._claims[key], now))
+        claim = self._claims[weakest]
+        if most <= 1 and claim.proven and now - claim.heard < limits.PEER_SILENCE_S:
+            return False
+        del self._claims[weakest]
+        return True
 
     def least_tried(self, now: float) -> Claim | None:
         """Of those that were heard these seconds, the one whose turn is the longest ago."""
@@ -109,7 +128,8 @@ class Claims:
 
     def keep(self, pinned: Claim) -> None:
         """The vehicle's own claim is not given up."""
-        self._claims[pinned.source, pinned.way] = pinned
+        self._pinned = (pinned.source, pinned.way)
+        self._claims[self._pinned] = pinned
 
     @staticmethod
     def _worth(claim: Claim, now: float) -> tuple[bool, bool, float]:

@@ -15,6 +15,7 @@ from typing import TypeAlias
 
 from onboard.mavlink import limits
 from onboard.mavlink.codec import Codec, CodecStatistics, Frame
+from onboard.mavlink.decode import is_autopilot
 
 Address: TypeAlias = tuple[object, ...]
 """As the socket has it: host and port first."""
@@ -136,6 +137,9 @@ class Peers:
         before = peer.codec.statistics.frames + peer.codec.statistics.bad_signatures
         frames = peer.codec.feed(data)
         peer.heard = now
+        if known is None and any(_is_claim(frame) for frame in frames):
+            # Before its place is decided on: everybody speaks, not everybody is an autopilot.
+            peer.rise(Merit.CLAIMS, now)
         if peer.codec.statistics.frames + peer.codec.statistics.bad_signatures > before:
             peer.rise(Merit.SPEAKS, now)
         if known is None and not self._admit(peer, now):
@@ -186,3 +190,8 @@ class Peers:
             total = getattr(self.gone, name) + getattr(statistics, name)
             setattr(self.gone, name, total)
         self.gone.unknown += statistics.unknown
+
+
+def _is_claim(frame: Frame) -> bool:
+    """Whether it is a HEARTBEAT of an autopilot."""
+    return frame.message is not None and is_autopilot(frame.message)

@@ -15,13 +15,13 @@ from onboard.core.physics.effect import Bearing
 
 HEADLINES = {
     "clean": "Nothing is missing beyond the six numbers and the timing.",
-    "explained": "Something was missing from the model; it has been found.",
-    "partly_explained": "Something is missing from the model; a part of it has been found.",
-    "unexplained": "Something is missing, and no known effect explains it.",
-    "insufficient": "This flight cannot tell whether anything is missing.",
+    "explained": "The flight shows errors beyond the six numbers, and all of them were identified.",
+    "partly_explained": "The flight shows errors beyond the six numbers, and some were identified.",
+    "unexplained": "The flight shows errors that no known effect explains.",
+    "insufficient": "This flight shows too little to say whether anything is missing.",
 }
 KNOWN_ALREADY = (
-    "Nothing is missing. What was found is worth knowing; every calibration includes it."
+    "Nothing is missing. What was found is already taken into account by every calibration."
 )
 
 

@@ -1,4 +1,4 @@
-"""PX4 logs (.ulg): for advice only, since ArduPilot's parameters mean nothing there."""
+"""PX4 logs (.ulg): for advice only; what they hold is what PX4's own calibration has left."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def open_ulog(path: Path) -> Recording:
         counts={f"{n}[{i}]" if i else n: len(r) for (n, i), r in records.items()},
         read=read,
         damage=damage_of(index),
-        notes=("a PX4 recording: the result is advice, its parameters are ArduPilot's",),
+        notes=("a PX4 recording: its numbers are corrections on top of PX4's own calibration",),
     )
 
 

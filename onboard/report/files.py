@@ -15,7 +15,9 @@ def save(content: str | bytes, file: str | Path) -> Path:
     """
     path = Path(file)
     try:
-        path.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+        path.write_bytes(
+            content.encode("utf-8", "replace") if isinstance(content, str) else content
+        )
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror})") from None
     return path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import quote
 
 from onboard.answers.fleet.history import Accelerometer, History, Number
 from onboard.answers.fleet.record import Flown
@@ -145,9 +146,14 @@ def _flight(f: Flight, pages: Mapping[str, str]) -> dict[str, Any]:
     imus = [(i.calibration.imu, *STATES[i.calibration.status], i.why) for i in f.record.imus]
     return {
         "name": f.flown.name,
-        "page": pages.get(f.flown.name),
+        "page": _address(pages.get(f.flown.name)),
         "day": day(f),
         "minutes": f"{(f.record.document.recording.duration_s or 0.0) / 60.0:.1f}",
         "imus": imus,
         "why": f.why,
     }
+
+
+def _address(page: str | None) -> str | None:
+    """Of a page beside this one: a name like ``javascript:...`` or ``50%#2`` is a name."""
+    return None if page is None else "./" + quote(page)

@@ -92,4 +92,4 @@ def _bytes(data: bytes) -> bytes:
 
 
 def _text(text: str) -> bytes:
-    return _bytes(text.encode())
+    return _bytes(text.encode("utf-8", "replace"))

@@ -16,6 +16,7 @@ from pathlib import Path
 from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
 from onboard.answers.explain import Explanation
+from onboard.answers.px4 import Px4Advice, px4_advice
 from onboard.answers.replay import Replay
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES, Calibration
@@ -23,6 +24,8 @@ from onboard.core.physics.catalogue import title_of
 from onboard.errors import UsageError
 
 REAL32 = 9
+ULOG = "ulog"
+"""Recordings that say what PX4 did to its accelerometer; its telemetry does not."""
 INTEGERS = {
     "GPS1_DELAY_MS": 4,
     "GPS_DELAY_MS": 4,
@@ -88,15 +91,36 @@ def calibration_text(
     return _text([*lines, "# Compare with the parameters in force before loading."])
 
 
+def px4_text(answers: Sequence[Answer], advice: Sequence[Px4Advice], files: Sequence[str]) -> str:
+    """The parameter file of a PX4 log, as QGroundControl loads it."""
+    lines = [f"# onboard, PX4: {', '.join(files)}"]
+    for given, its in zip(answers, advice, strict=True):
+        lines.append(f"# accelerometer {given.imu}: {given.calibration.status.value}")
+        lines += [f"# not to be set: {reason}" for reason in its.reasons]
+        for setting in its.settings:
+            lines.append(f"# calibration: {setting.words}, repeatable to {setting.sigma:.2g}")
+            line = f"1\t1\t{setting.name}\t{setting.value:.7g}\t{REAL32}"
+            lines.append(f"# not set: {line}" if its.reasons else line)
+    lines.append("# Load it before the next flight: PX4 may learn offsets of its own after each")
+    lines.append("# (SENS_IMU_AUTOCAL). Compare with the parameters in force before loading.")
+    return _text(lines)
+
+
 def replay_text(result: Replay, file: str | Path) -> str:
     """The parameter file of a replay, in the format that its name asks for.
 
     Raises:
-        UsageError: the recordings are of another autopilot.
+        UsageError: the recordings are of another autopilot, or telemetry of PX4.
     """
+    if result.recordings[0].kind == ULOG:
+        path, alone = result.recordings[0].path, len(result.recordings) == 1
+        its = [px4_advice(a, path, result.parameters, alone=alone) for a in result.answers]
+        return px4_text(result.answers, its, [r.path.name for r in result.recordings])
     advice = [its for its in result.advice if its is not None]
     if not advice:
-        raise UsageError(f"{file}: {result.recordings[0].path} is not of an ArduPilot")
+        raise UsageError(
+            f"{file}: {result.recordings[0].path} is no ArduPilot's, and no ULog of PX4"
+        )
     names = [recording.path.name for recording in result.recordings]
     return calibration_text(result.answers, advice, names, qgc=is_qgc(str(file)))
 
@@ -105,10 +129,14 @@ def explanation_text(result: Explanation, file: str | Path) -> str:
     """The parameter file of an explanation, in the format that its name asks for.
 
     Raises:
-        UsageError: the recordings are of another autopilot.
+        UsageError: the recordings are of another autopilot, or telemetry of PX4.
     """
+    recordings = result.source.recordings
+    if recordings[0].kind == ULOG:
+        its = px4_advice(result.answer, recordings[0].path, result.parameters)
+        return px4_text([result.answer], [its], result.files)
     if result.advice is None:
-        raise UsageError(f"{file}: {result.source.recordings[0].path} is not of an ArduPilot")
+        raise UsageError(f"{file}: {recordings[0].path} is no ArduPilot's, and no ULog of PX4")
     qgc = is_qgc(str(file))
     return parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
 
@@ -158,7 +186,7 @@ def _six(advice: Advice) -> Iterator[Change]:
             continue
         reason = f"calibration: {words}"
         if math.isfinite(number.sigma):
-            reason += f", sigma {number.sigma:.2g}"
+            reason += f", repeatable to {number.sigma:.2g}"
         if number.name in advice.conditions:
             reason += f": {advice.conditions[number.name]}"
         yield Change(number.name, number.wanted, reason, withheld, words)

@@ -174,7 +174,7 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
         what = f"{words.capital(knowledge(c))}."
         if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
             what += (
-                f" Integrated for {FREE_S:.0f} s without GPS, velocity is off by "
+                f" When it is integrated for {FREE_S:.0f} s without GPS, the velocity is wrong by "
                 f"{c.velocity_rms_after:.2f} m/s; with the parameters in force, by "
                 f"{c.velocity_rms_before:.2f} m/s."
             )

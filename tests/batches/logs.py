@@ -16,7 +16,7 @@ import os, signal
 import onboard.batches.worker as worker
 plain = worker.done
 def done(job, progress=None):
-    if "killer" in job.path:
+    if "killer" in job.file.name:
         os.kill(os.getpid(), signal.SIGKILL)
     return plain(job, progress)
 worker.done = done
@@ -46,4 +46,4 @@ def write(folder: Path, seconds: dict[str, int]) -> list[Path]:
 
 def jobs(paths: list[Path], **more: object) -> list[Job]:
     """What is to be done with them."""
-    return [Job(path=str(p), version=version(), **more) for p in paths]
+    return [Job(path=os.fsencode(p), version=version(), **more) for p in paths]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import msgspec
 import pytest
 
@@ -29,11 +31,11 @@ def test_whatever_goes_wrong_is_the_outcome(tmp_path, monkeypatch):
     def broken(*_arguments, **_more):
         raise KeyError("a fault of ours")
 
-    assert "no such file" in done(Job(path=str(tmp_path / "absent"))).error
+    assert "no such file" in done(Job(path=os.fsencode(tmp_path / "absent"))).error
     monkeypatch.setattr("onboard.batches.job.replay", broken)
     (job,) = jobs([path])
     assert "could not be replayed (KeyError: 'a fault of ours')" in done(job).error
-    assert "another version" in done(Job(path=str(path), version="old")).error
+    assert "another version" in done(Job(path=os.fsencode(path), version="old")).error
 
 
 def test_the_hash_is_of_the_content(tmp_path):

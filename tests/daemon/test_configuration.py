@@ -47,7 +47,12 @@ def test_the_defaults_only_listen_on_this_machine_and_only_write_when_landed():
         ("[push]\noffset_max = 9.0\n", "[push] offset_max", "<= 3.5"),
         ("[http]\nport = 70000\n", "[http] port", "65535"),
         ("[http]\naddress = '0.0.0.0'\n", "[http]", "token"),
+        ("[http]\ntoken = 'a'\ntoken_file = 'b'\n", "[http]", "exclude each other"),
         ("[mqtt]\nca_file = 'x'\n", "[mqtt]", "tls"),
+        ("[mqtt]\ntls = true\ncertificate_file = 'x'\n", "[mqtt]", "belong together"),
+        ("[mqtt]\npassword_file = 'x'\n", "[mqtt]", "needs a username"),
+        ("[mqtt]\nprefix = 'a/+'\n", "[mqtt]", "must not contain"),
+        ("[mqtt]\ndiscovery = 'a/#'\n", "[mqtt]", "must not contain"),
         ("link = 3\n", "[link]", "a table"),
     ],
 )

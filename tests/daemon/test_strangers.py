@@ -101,6 +101,22 @@ async def test_eight_who_say_nothing_do_not_keep_the_vehicle_out(document, daemo
                 await until(lambda: in_force(vehicle) == pytest.approx(NEW, rel=1e-6))
 
 
+async def test_forty_who_speak_mavlink_do_not_keep_the_vehicle_out(document, daemon, port):
+    """They are ground stations, for all that they say, and were there before the vehicle."""
+    with contextlib.ExitStack() as stack:
+        crowd = [stack.enter_context(Stranger(port)) for _ in range(40)]
+
+        def greet():
+            for one in crowd:
+                one.beat(system=255, component=190, kind=6, firmware=8)
+
+        async with daemon(document) as service, repeated(greet, 1.0):
+            await asyncio.sleep(3.0)
+            async with Vehicle(port) as vehicle:
+                convinced(service, WANTED)
+                await until(lambda: in_force(vehicle) == pytest.approx(NEW, rel=1e-6))
+
+
 @pytest.mark.parametrize("source", [(42, 7), (1, 1), (255, 190)])
 async def test_nobody_on_the_wire_loosens_the_policy(source, document, daemon, port, stranger):
     async with daemon(document) as service, Vehicle(port) as vehicle:

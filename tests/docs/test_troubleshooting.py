@@ -9,6 +9,7 @@ from pathlib import Path
 from onboard.core.gps.distrust import Distrust
 from onboard.daemon.outlets.announcer import LINES
 from onboard.daemon.outlets.parameter_view import REASONS
+from onboard.daemon.view.trust import FILTER_UNKNOWN
 from onboard.push.policy import Objection
 from onboard.push.signals import Reason
 from tests.docs.messages_in_code import Message, objections, posted, raised, told
@@ -63,7 +64,7 @@ def test_every_reason_to_hold_back_has_an_entry_and_no_other():
 def test_every_reason_of_distrust_has_its_number():
     rows = re.findall(r"^\| (\d+) \| `(\w+)` \|", SECTIONS["GPS is not trusted"], re.MULTILINE)
     assert {name: int(number) for number, name in rows} == dict(REASONS)
-    assert set(REASONS) == {reason.value for reason in Distrust}
+    assert set(REASONS) == {reason.value for reason in Distrust} | {FILTER_UNKNOWN}
 
 
 def test_every_end_of_a_transaction_has_an_entry():

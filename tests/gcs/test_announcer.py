@@ -41,14 +41,14 @@ class Cockpit:
 
 def test_a_flight_as_the_pilot_hears_it():
     cockpit = Cockpit()
-    cockpit.post("window_opened", "GPS is trusted: learning")
+    cockpit.post("window_opened", "GPS is trusted: ready to learn in flight")
     cockpit.post("calibrated", "IMU 1 is calibrated", after=120.0)
     cockpit.post("window_closed", "GPS is not trusted: end of data", after=60.0)
     cockpit.post("push_begins", "IMU 1: push begins", after=10.0)
     cockpit.post("push_completed", "IMU 1: push completed: all six read back", after=5.0)
     cockpit.pass_time(10.0)
     assert cockpit.texts == [
-        "OBC: GPS trusted, learning",
+        "OBC: GPS trusted, learns in flight",
         "OBC: IMU 1 is calibrated",
         "OBC: GPS is not trusted: end of data",
         "OBC: IMU 1 writing calibration",
@@ -99,7 +99,7 @@ def test_the_worst_comes_first_and_the_pace_is_kept():
 def test_a_window_that_flaps_is_not_a_stream_of_messages():
     cockpit = Cockpit()
     for _ in range(300):
-        cockpit.post("window_opened", "GPS is trusted: learning", after=0.5)
+        cockpit.post("window_opened", "GPS is trusted: ready to learn in flight", after=0.5)
         cockpit.post("window_closed", "GPS is not trusted: hdop", after=0.5)
     cockpit.pass_time(60.0)
     assert len(cockpit.heard) <= 1 + 360.0 / FLAPPING_S
@@ -108,26 +108,26 @@ def test_a_window_that_flaps_is_not_a_stream_of_messages():
 
 def test_the_last_word_on_the_window_is_true():
     cockpit = Cockpit()
-    cockpit.post("window_opened", "GPS is trusted: learning")
+    cockpit.post("window_opened", "GPS is trusted: ready to learn in flight")
     cockpit.post("window_closed", "GPS is not trusted: hdop", after=20.0)
-    cockpit.post("window_opened", "GPS is trusted: learning", after=2.0)
+    cockpit.post("window_opened", "GPS is trusted: ready to learn in flight", after=2.0)
     cockpit.pass_time(60.0)
     # Said again although it has been said shortly before: something else was said between.
     assert cockpit.texts == [
-        "OBC: GPS trusted, learning",
+        "OBC: GPS trusted, learns in flight",
         "OBC: GPS is not trusted: hdop",
-        "OBC: GPS trusted, learning",
+        "OBC: GPS trusted, learns in flight",
     ]
 
 
 def test_what_is_over_before_it_could_be_said_is_not_said():
     cockpit = Cockpit()
-    cockpit.post("window_opened", "GPS is trusted: learning")
+    cockpit.post("window_opened", "GPS is trusted: ready to learn in flight")
     cockpit.pass_time(1.0)
     cockpit.post("window_closed", "GPS is not trusted: hdop")
-    cockpit.post("window_opened", "GPS is trusted: learning", after=1.0)
+    cockpit.post("window_opened", "GPS is trusted: ready to learn in flight", after=1.0)
     cockpit.pass_time(60.0)
-    assert cockpit.texts == ["OBC: GPS trusted, learning"]
+    assert cockpit.texts == ["OBC: GPS trusted, learns in flight"]
 
 
 def test_the_same_line_is_not_said_all_the_time():

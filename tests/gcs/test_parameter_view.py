@@ -21,6 +21,7 @@ from onboard.daemon.outlets.parameter_view import (
     parameter_values,
 )
 from onboard.daemon.view.state import NAMES
+from onboard.daemon.view.trust import FILTER_UNKNOWN
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.policy import Mode
 from tests.gcs.vehicles_state import accelerometer, seen
@@ -113,7 +114,7 @@ def test_trust_and_why_not():
 def test_tables_know_every_word_of_the_service():
     assert set(POLICIES) == {mode.value for mode in Mode}
     assert {status.value for status in Status} < set(STATUSES) == set(NAMES)
-    assert set(REASONS) == {reason.value for reason in Distrust}
+    assert set(REASONS) == {reason.value for reason in Distrust} | {FILTER_UNKNOWN}
     for table in (STATES, STATUSES, REASONS, FINDINGS):
         assert len(set(table.values())) == len(table)
 

@@ -3,7 +3,13 @@
 import pytest
 
 from onboard.mavlink.codec import Codec
-from onboard.mavlink.limits import PEER_BYTES_S, PEER_LIMIT, PEER_SILENCE_S, PEERS_KNOWN
+from onboard.mavlink.limits import (
+    PEER_BYTES_S,
+    PEER_LIMIT,
+    PEER_SILENCE_S,
+    PEERS_KNOWN,
+    PROOF_S,
+)
 from onboard.mavlink.peers import Merit, Peers
 from onboard.mavlink.twins import Twins
 from tests.mavlink.mavlink_peer import attitude, heartbeat
@@ -40,14 +46,27 @@ def test_who_is_no_better_comes_in_only_when_somebody_has_fallen_silent(data):
 
 
 def test_claims_that_prove_nothing_wear_off():
+    """They speak on, every second: it is not their silence that makes room."""
+    peers = table()
+    beat = SENDER.encode(heartbeat())
+    for now in (0.0, 1.0, 2.0):
+        for number in range(PEERS_KNOWN):
+            peers.feed(("claim", number), beat, now)
+    peer, frames = peers.feed(("vehicle", 1), beat, 2.5)
+    assert frames == []
+    for number in range(PEERS_KNOWN):
+        peers.feed(("claim", number), beat, PROOF_S + 0.5)
+    peer, frames = peers.feed(("vehicle", 1), beat, PROOF_S + 1.0)
+    assert len(frames) == 1
+    assert peer.merit is Merit.CLAIMS
+
+
+def test_a_crowd_that_speaks_and_claims_nothing_makes_room_for_an_autopilot():
     peers = table()
     for number in range(PEERS_KNOWN):
-        peer, _ = peers.feed(("claim", number), SENDER.encode(heartbeat()), 0.0)
-        peer.rise(Merit.CLAIMS, 0.0)
-    peer, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 1.0)
-    assert frames == []
-    peer, frames = peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 40.0)
-    assert len(frames) == 1
+        peers.feed(("crowd", number), SENDER.encode(attitude(1)), 1.0)
+    assert peers.feed(("late", 1), SENDER.encode(attitude(1)), 1.5)[1] == []
+    assert len(peers.feed(("vehicle", 1), SENDER.encode(heartbeat()), 1.5)[1]) == 1
 
 
 def test_the_vehicle_never_gives_way():

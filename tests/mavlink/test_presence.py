@@ -210,3 +210,40 @@ def test_of_the_claims_those_that_are_silent_give_way_first_whatever_they_proved
     assert claims.get(VEHICLE, HERE) is None
     assert len(list(claims)) == CLAIMS_KNOWN
     assert claims.get((2, 1), (0, ("x", 0))) is not None
+
+
+def many_names(wire, way):
+    """One address speaks as 40 autopilots, all with streams, for a second."""
+    for component in range(2, 2 + CLAIMS_KNOWN + 8):
+        wire.hear(way, (1, component), BEAT)
+        for tenth in range(3):
+            wire.hear(way, (1, component), boot=wire.now + 0.1 * tenth + 500.0)
+
+
+@pytest.mark.parametrize("committed", [False, True])
+def test_many_names_from_one_address_do_not_take_the_places_of_others(committed):
+    """The vehicle's router is restarted meanwhile, and sends from another port."""
+    wire = Wire(committed=committed)
+    wire.second(HERE)
+    for _ in range(5):
+        many_names(wire, THERE)
+        wire.second(HERE)
+    wire.silence(1.0)
+    many_names(wire, THERE)
+    moved = (0, ("c", 3))
+    for _ in range(3):
+        wire.second(moved)
+        many_names(wire, THERE)
+    assert wire.presence.way == moved
+    assert wire.presence.source == VEHICLE
+
+
+def test_the_vehicles_own_claim_is_kept_however_long_it_is_silent():
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    wire.silence(2.0 * PEER_SILENCE_S)
+    for port in range(2 * CLAIMS_KNOWN):
+        wire.second((0, ("d", port)), source=(77, 1))
+    wire.second(HERE)
+    assert wire.presence.way == HERE
+    assert wire.hear(HERE, message=BEAT) is Whose.VEHICLE

@@ -5,8 +5,10 @@ import gc
 import json
 import tracemalloc
 
+import aiomqtt
 import pytest
 
+from onboard.daemon.mqtt.publisher import _reason
 from onboard.daemon.view.snapshot import Snapshot
 from tests.mqtt.broker import Broker, Subscriber, free_port
 from tests.mqtt.published import Obedient, imu_view, journal_line, snapshot
@@ -95,6 +97,18 @@ async def test_a_broker_that_forgot_everything_has_it_back(tmp_path, publishing,
                 await station.payload("onboard/1/diagnosis")
         # A broker that comes and goes within seconds is one outage, told of once.
         assert sum(n.kind == "mqtt_lost" for n in publisher.kept) == 1
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        aiomqtt.MqttError("Disconnected during message iteration"),
+        aiomqtt.MqttCodeError(4),  # found while something was published
+        aiomqtt.MqttCodeError(7),
+    ],
+)
+def test_a_lost_connection_is_one_reason_whatever_was_under_way(error):
+    assert _reason(error) == "the connection was lost"
 
 
 async def test_events_of_an_outage_come_after_it(tmp_path, publishing):

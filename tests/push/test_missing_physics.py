@@ -177,7 +177,7 @@ def test_what_the_daemon_keeps_is_the_answer():
 def test_a_late_receiver_is_no_missing_physics(verdict, effects, severity):
     sentence, found = headline(verdict, effects)
     assert found == severity
-    assert ("missing from the model" in sentence) == (severity == "warning" and bool(effects))
+    assert ("beyond the six numbers, and" in sentence) == (severity == "warning" and bool(effects))
 
 
 def test_every_verdict_has_a_headline():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -39,7 +40,11 @@ def raw_imu(t_us: int, z: int = -1000) -> object:
 
 
 def telemetry(
-    seconds: int = 4, system: int = 1, version: int = 2, writer: TelemetryWriter | None = None
+    seconds: int = 4,
+    system: int = 1,
+    version: int = 2,
+    writer: TelemetryWriter | None = None,
+    firmware: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
 ) -> TelemetryWriter:
     """RAW_IMU and ATTITUDE at 25 Hz, GPS at 5 Hz, heartbeat at 1 Hz, a parameter, some others."""
     log = writer or TelemetryWriter()
@@ -50,7 +55,7 @@ def telemetry(
     for k in range(25 * seconds):
         t = 10_000_000 + 40_000 * k
         if k % 25 == 0:
-            add(heartbeat())
+            add(heartbeat(firmware))
             log.add(heartbeat(mavlink.MAV_AUTOPILOT_INVALID), 255, 190, version)
         if k == 1:
             add(mavlink.MAVLink_param_value_message(b"INS_ACCSCAL_X", 1.01, 9, 1, 0))
@@ -73,17 +78,27 @@ FORMATS = {
     "float hdop;uint64_t time_utc_usec;uint8_t fix_type;uint8_t satellites_used;"
     "uint8_t jamming_state;uint8_t spoofing_state;",
     "vehicle_status": "uint64_t timestamp;uint8_t arming_state;uint8_t vehicle_type;",
+    "sensor_selection": "uint64_t timestamp;uint32_t accel_device_id;uint32_t gyro_device_id;",
 }
 PACKING = {
     "sensor_combined": "<Q3fIi3f",
     "vehicle_attitude": "<Q4f",
     "sensor_gps": "<QdddfffffQBBBB",
     "vehicle_status": "<QBB",
+    "sensor_selection": "<QII",
 }
 
 
-def px4_log(seconds: int = 2) -> bytes:
-    """A ULog with the topics above at 50, 50, 5 and 1 Hz."""
+def px4_log(
+    seconds: int = 2,
+    parameters: Mapping[str, float] | None = None,
+    selected: Sequence[int] = (),
+) -> bytes:
+    """A ULog with the topics above at 50, 50, 5 and 1 Hz.
+
+    ``parameters``: those that end in ``_ID`` and ``_ROT`` are integers; ``selected``: which
+    accelerometer flies, each for an equal part of the log.
+    """
 
     def message(kind: str, body: bytes) -> bytes:
         return struct.pack("<HB", len(body), ord(kind)) + body
@@ -92,8 +107,11 @@ def px4_log(seconds: int = 2) -> bytes:
     out += message("B", bytes(40))
     for name, layout in FORMATS.items():
         out += message("F", f"{name}:{layout}".encode())
-    key = b"float CAL_ACC0_XOFF"
-    out += message("P", bytes((len(key),)) + key + struct.pack("<f", 0.125))
+    for name, value in (parameters or {"CAL_ACC0_XOFF": 0.125}).items():
+        whole = name.endswith(("_ID", "_ROT"))
+        key = f"{'int32_t' if whole else 'float'} {name}".encode()
+        packed = struct.pack("<i", int(value)) if whole else struct.pack("<f", value)
+        out += message("P", bytes((len(key),)) + key + packed)
     numbers = {name: k for k, name in enumerate(FORMATS)}
     for name, number in numbers.items():
         out += message("A", struct.pack("<BH", 0, number) + name.encode())
@@ -112,4 +130,7 @@ def px4_log(seconds: int = 2) -> bytes:
                         1_700_000_000_000_000 + t, 3, 15, 1, 1)  # fmt: skip
         if k % 50 == 0:
             out += data("vehicle_status", t + 11, 2, 2)
+        if selected and k % 10 == 0:
+            now = selected[k * len(selected) // (50 * seconds)]
+            out += data("sensor_selection", t + 12, now, 1)
     return bytes(out)

@@ -51,7 +51,9 @@ def test_the_most_urgent_is_first(html):
 def test_every_recording_is_there_with_its_page_and_the_bad_one_with_its_reason(fleet, html):
     page = Page.of(html)
     links = [a["href"] for tag, a in page.tags if tag == "a"]
-    assert sorted(links) == sorted(o.name.replace("/", "-") + ".html" for o in fleet if o.record)
+    assert sorted(links) == sorted(
+        "./" + o.name.replace("/", "-") + ".html" for o in fleet if o.record
+    )
     assert "<b>.BIN was killed & lost" in page.words
 
 

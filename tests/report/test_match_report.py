@@ -35,7 +35,7 @@ def test_every_part_of_the_story_is_there():
         "Laws and their data",
         "Settings for the simulator",
         "Could not be told apart",
-        "What this flight cannot tell",
+        "What this flight did not show",
         "Fly this to find out",
     ):
         assert heading in said, heading

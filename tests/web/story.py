@@ -103,7 +103,7 @@ def _imu(number, second, *, done):
         else StateView(
             name="collecting",
             title="learning",
-            sentence=f"least of all the {SIX_NAMES[weakest]}",
+            sentence=f"least is known of the {SIX_NAMES[weakest]}",
             severity="info",
             next=advice,
         ),
@@ -228,7 +228,7 @@ def holding(held_back, *, approvable=False):
 DIAGNOSIS = {
     "schema": "onboard.explain/1",
     "verdict": "partly_explained",
-    "headline": "Something is missing from the model; a part of it has been found.",
+    "headline": "The flight shows errors beyond the six numbers, and some were identified.",
     "severity": "warning",
     "recording": {"imu": 1},
     "mismatch": {

@@ -15,7 +15,7 @@ def test_one_glance_says_what_is_trusted_known_missing_and_next(browser, served)
     browser.open(served.url)
     assert browser.text("#glance-trust .headline") == "Trusted"
     assert browser.text("#glance-imu-1 .headline") == "Learning"
-    assert browser.text("#glance-imu-2 .detail") == "Least of all the z offset."
+    assert browser.text("#glance-imu-2 .detail") == "Least is known of the z offset."
     assert "Fly banked turns" in browser.text("#glance-next .headline")
     assert "SCALED_IMU2" in browser.text("#link-body")
     assert "slow" in browser.text("#link-body")

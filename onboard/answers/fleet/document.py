@@ -17,6 +17,7 @@ from onboard.answers.fleet.record import Flown
 from onboard.answers.fleet.severity import severity_of
 from onboard.answers.fleet.shared_numbers import Common, Comparison
 from onboard.answers.fleet.vehicles import Flight
+from onboard.answers.json_file import indented
 from onboard.answers.replay_document import ReplayDocument
 from onboard.core.fleet.course import Sized
 from onboard.core.fleet.limits import FALSE_ALARM, SHARED_FALSE_ALARM
@@ -189,7 +190,7 @@ class FleetDocument(msgspec.Struct, frozen=True, kw_only=True):
         """Indented JSON, ``schema`` first, with a final newline."""
         fields = msgspec.to_builtins(self)
         ordered = {"schema": fields.pop("schema"), **fields}
-        return msgspec.json.format(msgspec.json.encode(ordered), indent=2) + b"\n"
+        return indented(ordered)
 
 
 def fleet_document(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from onboard.errors import UsageError
+from onboard.printable import printable
 
 KINDS = (".bin", ".tlog", ".ulg")
 """Ends of the names of what is looked for in folders, in any case of letters."""
@@ -35,16 +36,20 @@ def found(places: Sequence[Path]) -> list[tuple[Path, str]]:
     return list(zip(files, _told_apart(list(files.values())), strict=True))
 
 
-def _told_apart(places: Sequence[tuple[Path, str]]) -> list[str]:
+def _told_apart(places: Sequence[tuple[Path, str]]) -> Iterator[str]:
     """Names within the folders; with the folder's where several folders have the same."""
-    names = [name for _, name in places]
+    names = [printable(name) for _, name in places]
     once = Counter(names)
     names = [
-        name if once[name] == 1 else str(Path(place.absolute().name) / name)
+        name if once[name] == 1 else printable(str(Path(place.absolute().name) / name))
         for name, (place, _) in zip(names, places, strict=True)
     ]
     twice = Counter(names)
-    return [
-        name if twice[name] == 1 else str(place.absolute() / inside)
+    last = [
+        name if twice[name] == 1 else printable(str(place.absolute() / inside))
         for name, (place, inside) in zip(names, places, strict=True)
     ]
+    counted: Counter[str] = Counter()
+    for name in last:  # names that differ in what cannot be shown
+        counted[name] += 1
+        yield name if counted[name] == 1 else f"{name} ({counted[name]})"

@@ -34,6 +34,7 @@ from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.meaning import all_in_force, carried, hand_on, matters
+from onboard.daemon.learning.opening import Opening
 from onboard.daemon.learning.proof import ProofFlight, answers
 from onboard.daemon.learning.shelf import Shelf
 from onboard.daemon.learning.store import Store
@@ -102,6 +103,7 @@ class Learner:
         self._in_air = False
         self._unjudged = False
         self._windows = 0
+        self._opening = Opening()
         self._answers: dict[int, Calibration] = {}
         self._calibrated: set[int] = set()
         self._stale = self._urgent = False
@@ -171,6 +173,7 @@ class Learner:
         self._calibrated.clear()
         self._answers = {}
         self._proof.drop()
+        self._opening.restarted()
         self._in_air = self._unjudged = False
         self._stale = self._urgent = True
 
@@ -191,6 +194,9 @@ class Learner:
                 self._parameter(sample)
             for event in self._calibrator.feed(sample):
                 self._note(event)
+            if self._opening.feed(sample):
+                self._windows += 1
+                self._tell("window_opened", "GPS is trusted: ready to learn in flight")
             if judging:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
@@ -256,7 +262,8 @@ class Learner:
         self._solve()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
-        trust = trust_view(self._calibrator.trust, windows=self._windows)
+        window, told = self._calibrator.trust, self._opening.told
+        trust = trust_view(window, told=told, windows=self._windows)
         return Learned(
             calibrations=known_now(
                 self._flight, self._answers, self._calibrator.parameters, unjudged=self._unjudged
@@ -290,12 +297,12 @@ class Learner:
     def _note(self, event: object) -> None:
         self._stale = True
         match event:
-            case WindowOpened():
-                self._windows += 1
-                self._tell("window_opened", "GPS is trusted: learning")
+            case WindowOpened(t):
+                self._opening.opened(t)
             case WindowClosed(_, reason):
-                why = reason.value.replace("_", " ")
-                self._tell("window_closed", f"GPS is not trusted: {why}")
+                if self._opening.closed():
+                    why = reason.value.replace("_", " ")
+                    self._tell("window_closed", f"GPS is not trusted: {why}")
             case Advanced():
                 # What was found of the flight before is not about this one.
                 if not self._in_air:
@@ -309,6 +316,8 @@ class Learner:
                 ):
                     self._in_air = False
                     self._examiner.landed(self._calibrator)
+                if isinstance(event, Restarted):
+                    self._opening.restarted()
                 self._urgent |= isinstance(event, FlightEnded)
                 self._counters[f"event_{type(event).__name__}"] += 1
 

@@ -25,6 +25,10 @@ STEP_LIMIT_S: Final = 120.0
 """s; a refinement or a diagnosis takes seconds, on a slow companion a minute, longer is a hang
 [cost]."""
 
+FILTER_SILENT_S: Final = 5.0
+"""s of an open window without a report of the autopilot's filter: it sends none.  Two a second are
+asked for, and a slow link brings one in two seconds [data]."""
+
 # How often is computed
 
 SOLVING_SHARE: Final = 0.005

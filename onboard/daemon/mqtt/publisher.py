@@ -42,6 +42,12 @@ library.setLevel(logging.CRITICAL)
 """The library's own log has a line for every attempt; what matters is told as a notice."""
 
 ONLINE, OFFLINE = b"online", b"offline"
+_LOST = (
+    "Disconnected during message iteration",
+    "The client is not currently connected.",
+    "The connection was lost.",
+)
+"""The libraries' words for one thing: which of them it is depends on what was under way."""
 _CODES = re.compile(r"^\[[^]]*\] | \(_ssl\.c:\d+\)$")
 """What is around the words of a system's or a broker's error: [Errno 111], [code:135]."""
 
@@ -319,7 +325,7 @@ class Publisher:
 
 def _reason(error: Exception) -> str:
     """Why there is no connection, in a few words."""
-    text = str(error) or type(error).__name__
+    text = _CODES.sub("", str(error) or type(error).__name__)
     if isinstance(error, aiomqtt.exceptions.MqttConnectError):
-        return f"it refuses: {_CODES.sub('', text)}"
-    return _CODES.sub("", text)
+        return f"it refuses: {text}"
+    return "the connection was lost" if text in _LOST else text

@@ -45,7 +45,7 @@ class Line:
 
 LINES: Final[Mapping[str, Line]] = MappingProxyType(
     {
-        "window_opened": Line(INFO, "GPS trusted, learning", "window", limits.FLAPPING_S),
+        "window_opened": Line(INFO, "GPS trusted, learns in flight", "window", limits.FLAPPING_S),
         "window_closed": Line(NOTICE, "", "window", limits.FLAPPING_S),
         "calibrated": Line(NOTICE),
         "invalid": Line(WARNING),

@@ -5,7 +5,7 @@ name               meaning
 =================  ==============================================================================
 ``OBC_STATE``      what the service is doing, see :data:`STATES`
 ``OBC_ADVISE``     1: advise-only, nothing is ever written to this autopilot
-``OBC_TRUST``      1: GPS is trusted now, and teaches
+``OBC_TRUST``      1: GPS is trusted now
 ``OBC_DISTRUST``   why it is not, see :data:`REASONS`
 ``OBC_TRUSTED``    seconds of trusted flight so far, in tens
 ``OBC_COVERAGE``   coverage of the worst accelerometer, percent
@@ -75,6 +75,7 @@ REASONS: Final[Mapping[str, int]] = MappingProxyType(
         "restarted": 12,
         "configured_end": 13,
         "end_of_data": 14,
+        "ekf_unknown": 15,
     }
 )
 

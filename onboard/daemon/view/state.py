@@ -171,7 +171,7 @@ def _so_far(c: Calibration) -> str:
         return f"not calibrated: {c.note.strip().rstrip('.')}"
     if not c.coverage.advice:
         return f"all six numbers are covered, {c.trusted_s:.0f} s of flight are not enough yet"
-    return f"{knowledge(c)}; least of all the {c.coverage.weakest}"
+    return f"{knowledge(c)}; least is known of the {c.coverage.weakest}"
 
 
 def _to_fly(c: Calibration) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from onboard.core.gps.trust import TrustWindow
+from onboard.core.gps.trust import Phase, TrustWindow
 from onboard.daemon.view.snapshot import (
     TrustView,
 )
@@ -12,8 +12,28 @@ NO_TRUST = TrustView(
 )
 
 
-def trust_view(window: TrustWindow, *, windows: int) -> TrustView:
-    """The trust window; ``windows``: how often it has opened."""
+FILTER_UNKNOWN = "ekf_unknown"
+"""Why a window that is open is not shown as open: the autopilot's filter has yet to be heard."""
+
+
+def trust_view(window: TrustWindow, *, told: bool, windows: int) -> TrustView:
+    """The trust window.
+
+    Args:
+        window: the estimator's.
+        told: whether it has been told as open.
+        windows: how often it was.
+    """
+    if window.is_open and not told:
+        return TrustView(
+            phase=Phase.WAITING.value,
+            open=False,
+            reason=FILTER_UNKNOWN,
+            reasons=(FILTER_UNKNOWN,),
+            windows=windows,
+            trusted_s=window.trusted_s,
+            rejected=window.rejected,
+        )
     return TrustView(
         phase=window.phase.value,
         open=window.is_open,

@@ -35,7 +35,7 @@ function proof(mismatch, found) {
   const after = mismatch?.held_out_velocity_rms_after_m_s;
   if (typeof after !== "number") return [];
   const was = found && typeof before === "number" ? `; it was ${brief(before, 2)} m/s with scale and offset only` : "";
-  return [h("p", { class: "soft", text: `On flight not used in the fit, velocity is off by ${brief(after, 2)} m/s${was}.` })];
+  return [h("p", { class: "soft", text: `On parts of the flight that the fit did not use, the predicted velocity differs from GPS by ${brief(after, 2)} m/s${was}.` })];
 }
 
 function effect(found) {

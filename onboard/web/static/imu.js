@@ -152,7 +152,7 @@ export class Imus {
           h("thead", {}, h("tr", {}, h("th", { scope: "col", text: `IMU ${view.imu}` }), h("th", { scope: "col", text: "in force" }), h("th", { scope: "col", text: "estimate" }), h("td", { class: "bars" }))),
           h("tbody", {}, ...rows.map((row, at) => residualRow(row, shown[at]))),
         )),
-        h("p", { class: "soft", text: "Both of what has been flown so far. In force: what the autopilot uses now. Estimate: what is known now." }),
+        h("p", { class: "soft", text: "Both columns are about the flight so far. In force: with the values that the autopilot uses now. Estimate: with the values that are known now." }),
       ];
       if (told) parts.push(h("p", { text: `Certificate: over ${told[1]} s the velocity residual is nowhere above ${told[0]} m/s (seen: ${told[2]} m/s).` }));
       return parts;
