@@ -105,6 +105,9 @@ HEADING_RAD: Final = 0.03
 """What a heading is good to that a compass holds, rad: at speed it is an error of the velocity
 across the way, wandering for as long as nobody turns [data sheet]."""
 
+PROPELLER_BEND: Final = 0.3
+"""Of the thrust at a standstill, by which that of a propeller is off a straight line over the
+advance ratio, at the ratio where it pulls nothing: standard deviation [data sheet]."""
 MOST_BY_GUSTS: Final = 0.95
 """Share of what tells an unknown that gusts may make; past it nothing is known [probability]."""
 TOLD_S: Final = 1.0
