@@ -118,10 +118,10 @@ def plane_flight(
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
-    ``ratio`` of the thrust, ``lost`` of it by m/s that the propeller meets, and a windmilling one's
-    share of what that brakes, and the ``bend`` of the line at its end; drag by the square of sideslip and by sideslip itself; standard
-    deviations of the throttle, of a slow error of the recorded heading, rad, and of the force's
-    noise, m/s^2.
+    ``ratio`` of the thrust, ``lost`` of it by m/s that the propeller meets, a windmilling one's
+    share of what that brakes, and the ``bend`` of that line at its end; drag by the square of
+    sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
+    recorded heading, rad, and of the force's noise, m/s^2.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
