@@ -86,6 +86,9 @@ STALL_SHARE: Final = 0.85
 FALSE_ALARM: Final = 1e-3
 """Probability that a recording of the nominal airframe shows any given effect by chance; divided
 by the number of effects that are tried [probability]."""
+CREDIT: Final = 2.0
+"""What each unknown takes off the fall of chi-square when effects of several are compared: one that
+it gains by chance, one that it loses on flight not used (Akaike, 1974) [probability]."""
 SURE: Final = 2.0
 """Sigmas by which a difference must exceed what matters [probability: one in 44]."""
 APART: Final = 3.0
