@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeAlias
 
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
-from sitl.course import Point
+from sitl.course import Course, Point
 
 GROUND_STATION = (255, 190)
 """MAV_GCS_SYSID: the only one whose stick inputs ArduPilot takes."""
@@ -17,6 +17,10 @@ GUIDED_VELOCITY_AND_YAW = 0b0000_1001_1100_0111
 """Type mask of SET_POSITION_TARGET_LOCAL_NED: velocity and yaw count, nothing else."""
 GUIDED_ALONG_A_COURSE = 0
 """Likewise: everything counts, and the acceleration is one."""
+READY_S = 6.0
+"""Simulated seconds to get to the start of a course, and to turn to where it looks."""
+SET_EVERY_S = 0.05
+"""Between two points of a course: as often as the attitude comes."""
 Plugin: TypeAlias = Any
 """Objects of MAVSDK, which has no types."""
 Vector: TypeAlias = tuple[float, float, float]
@@ -76,6 +80,18 @@ class Manoeuvres:
     async def set_velocity(self, velocity_n: tuple[float, float, float], yaw: float) -> None:
         """One velocity (NED, m/s) and heading (rad), for a copter in guided mode."""
         await self._guide(GUIDED_VELOCITY_AND_YAW, velocity=velocity_n, yaw=yaw)
+
+    async def follow(self, course: Course) -> tuple[float, float]:
+        """Along a course, from its start; when that began and ended, s on the boot clock."""
+        ready = self._seen.time + READY_S
+        while self._seen.time < ready:
+            await self.set_point(course.start)
+            await self._seen.wait(SET_EVERY_S)
+        begun = self._seen.time
+        while (flown := self._seen.time - begun) < course.seconds:
+            await self.set_point(course.at(flown))
+            await self._seen.wait(SET_EVERY_S)
+        return begun, begun + course.seconds
 
     async def set_point(self, point: Point) -> None:
         """Where to be now, and on the way to where, for a copter in guided mode."""

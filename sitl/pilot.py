@@ -37,10 +37,6 @@ INTERVALS = ((30, 50_000), (33, 100_000), (24, 200_000))
 REBOOT_TRIES, REBOOT_PAUSE = 60, 1.0
 FORCED, UNBELIEVING_S = 21196, 15
 """What makes an autopilot disarm in any case, and after how many seconds on the ground."""
-READY_S = 6.0
-"""Simulated seconds to get to the start of a course, and to turn to where it looks."""
-SET_EVERY_S = 0.05
-"""Between two points of a course: as often as the attitude comes."""
 
 
 class Pilot:
@@ -226,15 +222,7 @@ class Pilot:
         Returns:
             When that began and ended, s since the autopilot's boot.
         """
-        ready = self.time + READY_S
-        while self.time < ready:
-            await self._manoeuvres.set_point(course.start)
-            await self.wait(SET_EVERY_S)
-        begun = self.time
-        while (flown := self.time - begun) < course.seconds:
-            await self._manoeuvres.set_point(course.at(flown))
-            await self.wait(SET_EVERY_S)
-        return begun, begun + course.seconds
+        return await self._manoeuvres.follow(course)
 
     async def land(self) -> None:
         """Comes down and waits until it has disarmed."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from sitl.builtin.smoothing import DT
 from sitl.builtin.trajectory import Start
 from sitl.course import Course
 from sitl.errors import SitlError
+from sitl.manoeuvres import Manoeuvres
 
 
 def motion(seconds=60.0, top=30.0, climb_s=10.0):
@@ -50,3 +53,34 @@ def test_a_low_flight_is_followed_from_half_its_height():
 def test_what_hardly_leaves_the_ground_cannot_be_followed():
     with pytest.raises(SitlError, match="less than"):
         Course.of(motion(seconds=22.0))
+
+
+async def test_a_copter_is_told_where_the_course_is_now_by_its_own_clock():
+    class Vehicle:
+        time, yaw, height = 100.0, 0.0, 10.0
+
+        async def wait(self, seconds):
+            self.time += 1.5 * seconds  # a slow machine: later than was asked
+
+    class Radio:
+        def __init__(self):
+            self.told = []
+
+        async def send_message(self, message):
+            self.told.append((vehicle.time, json.loads(message.fields_json)))
+
+    vehicle, radio, course = Vehicle(), Radio(), Course.of(motion())
+    begun, ended = await Manoeuvres(vehicle, radio, seed=1).follow(course)
+    assert ended - begun == pytest.approx(course.seconds)
+    assert vehicle.time >= ended
+    along = [(t, m) for t, m in radio.told if t >= begun]
+    assert len(along) > 400
+    for t, m in along:
+        now = course.at(t - begun)
+        assert (m["x"], m["y"], m["z"]) == now.position
+        assert (m["vx"], m["vy"], m["vz"]) == now.velocity
+        assert (m["afx"], m["afy"], m["afz"]) == now.acceleration
+        assert m["type_mask"] == 0
+    before = [m for t, m in radio.told if t < begun]
+    assert {(m["x"], m["y"], m["z"]) for m in before} == {course.start.position}
+    assert {m["vx"] for m in before} == {0.0}
