@@ -95,7 +95,7 @@ def _has_ardupilot(result: Match, folder: Path | None) -> bool:
     if importlib.util.find_spec("mavsdk") is not None:
         return True
     if folder is not None:
-        raise UsageError("--ardupilot: needs pip install 'onboard-calibration[sitl]'")
+        raise UsageError("--ardupilot: MAVSDK is not installed, the extra sitl")
     return False
 
 
