@@ -109,7 +109,7 @@ def _by_ardupilot(result: Match, recording: Path, folder: Path, binary: Path | N
         before = fly_again(recording, nominal, folder=binary)
         after = fly_again(recording, found, airframe=result.frame, parameters=told, folder=binary)
     except (SitlError, ValueError) as error:
-        raise UsageError(f"--verify: ArduPilot's simulator: {error}") from None
+        raise UsageError(f"--verify: {error}") from None
     return Flights(nominal, found, ARDUPILOT, (before, after))
 
 
