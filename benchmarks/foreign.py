@@ -3,8 +3,8 @@
 JSBSim flies its Cessna 172P in a constant wind, through turns, climbs, changes of power and kicks
 of the rudder; what instruments would have seen is written as a laboratory's table, and ``onboard
 match`` is asked.  Coefficients are held against finite differences of JSBSim's own forces, the wind
-against what was set.  JSBSim is on the package registry (``pip install jsbsim``); without it there
-is nothing to do here.
+against what was set.  ``--without`` takes pieces of its physics out, alone or together.  JSBSim is
+on the package registry (``pip install jsbsim``); without it there is nothing to do here.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from benchmarks.foreign_plane import (
     flown,
     started,
 )
+from benchmarks.foreign_without import PIECES, airframes
 from onboard.cli.main import run
 
 MASS_KG = 2.0
@@ -64,13 +65,13 @@ altitude = 300.0
 """
 
 
-def truth(flight: Flown) -> dict[str, float]:
+def truth(flight: Flown, airframes: Path | None = None) -> dict[str, float]:
     """Coefficients as SITL's files have them, by finite differences of JSBSim's own forces.
 
     Lift and drag over the flight's angles of attack, with the elevator that went with them: SITL's
     plane has no lift of its elevator, and a trimmed one has less than the wing's.
     """
-    sim = started((0.0, 0.0))
+    sim = started((0.0, 0.0), airframes)
     low, middle, high = np.quantile(flight.alpha, [0.1, 0.5, 0.9])
     trim = np.polyfit(flight.alpha, flight.elevator, 1)
     cl, cd = np.array(
@@ -155,32 +156,39 @@ def main(arguments: list[str] | None = None) -> None:
     options = argparse.ArgumentParser(description="JSBSim's light plane, matched.")
     options.add_argument("--seconds", type=float, default=240.0)
     options.add_argument("--seeds", type=int, nargs="*", default=[1, 2, 3])
+    options.add_argument("--without", nargs="*", default=[], choices=sorted(PIECES))
     chosen = options.parse_args(arguments)
     if importlib.util.find_spec("jsbsim") is None:
         print("skipped: jsbsim is not installed")
         return
     print("| flight | number | truth | found | sigma | sigmas off | % off |\n" + "|---" * 7 + "|")
-    for seed in chosen.seeds:
-        rng = np.random.default_rng([seed, 30])
-        north, east = (float(x) for x in rng.uniform(-8.0, 8.0, 2))
-        flight = flown((north, east), seed, chosen.seconds)
-        with tempfile.TemporaryDirectory(prefix="foreign-") as folder:
-            document = answer(flight, Path(folder))
-        for name, true, found, sigma in compared(
-            document, truth(flight), (north, east), flight.rho
-        ):
-            off = found - true
-            print(
-                f"| {seed} | {name} | {true:.4f} | {found:.4f} | {sigma:.4f} "
-                f"| {off / sigma:.1f} | {100 * off / true:.1f} |"
-            )
-        names = ", ".join(e["name"] for e in document["effects"])
-        force = ", ".join(
-            f"{k} {v['before']:.2f} -> {v['after']:.2f}"
-            for k, v in document["mismatch"].items()
-            if k in ("x", "y", "z")
+    with airframes(chosen.without) as folder:
+        for seed in chosen.seeds:
+            for line in lines(seed, chosen.seconds, folder):
+                print(line, flush=True)
+
+
+def lines(seed: int, seconds: float, airframe: Path) -> Iterator[str]:
+    """A row for each number of one flight, and what the force says."""
+    rng = np.random.default_rng([seed, 30])
+    north, east = (float(x) for x in rng.uniform(-8.0, 8.0, 2))
+    flight = flown((north, east), seed, seconds, airframe)
+    with tempfile.TemporaryDirectory(prefix="foreign-") as folder:
+        document = answer(flight, Path(folder))
+    true = truth(flight, airframe)
+    for name, is_, found, sigma in compared(document, true, (north, east), flight.rho):
+        off = found - is_
+        yield (
+            f"| {seed} | {name} | {is_:.4f} | {found:.4f} | {sigma:.4f} "
+            f"| {off / sigma:.1f} | {100 * off / is_:.1f} |"
         )
-        print(f"flight {seed} is {document['verdict']} ({names}); m/s^2 {force}", flush=True)
+    names = ", ".join(e["name"] for e in document["effects"])
+    force = ", ".join(
+        f"{k} {v['before']:.2f} -> {v['after']:.2f}"
+        for k, v in document["mismatch"].items()
+        if k in ("x", "y", "z")
+    )
+    yield f"flight {seed} is {document['verdict']} ({names}); m/s^2 {force}"
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
+from benchmarks.foreign_without import AIRCRAFT, installed
 from onboard.core.maths.arrays import Array
 
-AIRCRAFT = "c172p"
 RATE_HZ = 200
 EVERY, SELDOM = 4, 20
 """Steps between rows, and between those with a velocity and an airspeed."""
@@ -60,11 +60,16 @@ class Flown:
     speed: float
 
 
-def started(wind: tuple[float, float]) -> Simulator:
-    """JSBSim's executive with its aircraft in level flight; wind towards north and east, m/s."""
+def started(wind: tuple[float, float], airframes: Path | None = None) -> Simulator:
+    """JSBSim's executive with its aircraft in level flight.
+
+    Args:
+        wind: towards north and east, m/s.
+        airframes: folder of another one of its name; JSBSim's own if None.
+    """
     os.environ.setdefault("JSBSIM_DEBUG", "0")  # it greets on the terminal
     jsbsim = importlib.import_module("jsbsim")
-    sim: Simulator = jsbsim.FGFDMExec(str(Path(str(jsbsim.__file__)).parent))
+    sim: Simulator = jsbsim.FGFDMExec(str(airframes or installed()))
     sim.set_debug_level(0)
     sim.load_model(AIRCRAFT)
     sim.set_dt(1.0 / RATE_HZ)
@@ -97,10 +102,12 @@ def commands(rng: np.random.Generator) -> Iterator[tuple[float, float, float, fl
         side = -side
 
 
-def flown(wind: tuple[float, float], seed: int, seconds: float) -> Flown:
+def flown(
+    wind: tuple[float, float], seed: int, seconds: float, airframes: Path | None = None
+) -> Flown:
     """A flight in a wind towards north and east, m/s."""
     rng = np.random.default_rng([seed, 31])
-    sim, told = started(wind), commands(rng)
+    sim, told = started(wind, airframes), commands(rng)
     until, bank, climb, throttle, rudder = next(told)
     rows, trim, place, level = [], [], np.zeros(3), 0.0
     for k in range(round((SETTLED_S + seconds) * RATE_HZ)):

@@ -9,12 +9,22 @@ from typing import Any, Protocol, TypeAlias
 
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
+from sitl.course import Course, Point
+
 GROUND_STATION = (255, 190)
 """MAV_GCS_SYSID: the only one whose stick inputs ArduPilot takes."""
 GUIDED_VELOCITY_AND_YAW = 0b0000_1001_1100_0111
 """Type mask of SET_POSITION_TARGET_LOCAL_NED: velocity and yaw count, nothing else."""
+GUIDED_ALONG_A_COURSE = 0
+"""Likewise: everything counts, and the acceleration is one."""
+READY_S = 6.0
+"""Simulated seconds to get to the start of a course, and to turn to where it looks."""
+SET_EVERY_S = 0.05
+"""Between two points of a course: as often as the attitude comes."""
 Plugin: TypeAlias = Any
 """Objects of MAVSDK, which has no types."""
+Vector: TypeAlias = tuple[float, float, float]
+STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Seen(Protocol):
@@ -69,25 +79,56 @@ class Manoeuvres:
 
     async def set_velocity(self, velocity_n: tuple[float, float, float], yaw: float) -> None:
         """One velocity (NED, m/s) and heading (rad), for a copter in guided mode."""
-        vx, vy, vz = velocity_n
+        await self._guide(GUIDED_VELOCITY_AND_YAW, velocity=velocity_n, yaw=yaw)
+
+    async def follow(self, course: Course) -> tuple[float, float]:
+        """Along a course, from its start; when that began and ended, s on the boot clock."""
+        ready = self._seen.time + READY_S
+        while self._seen.time < ready:
+            await self.set_point(course.start)
+            await self._seen.wait(SET_EVERY_S)
+        begun = self._seen.time
+        while (flown := self._seen.time - begun) < course.seconds:
+            await self.set_point(course.at(flown))
+            await self._seen.wait(SET_EVERY_S)
+        return begun, begun + course.seconds
+
+    async def set_point(self, point: Point) -> None:
+        """Where to be now, and on the way to where, for a copter in guided mode."""
+        await self._guide(
+            GUIDED_ALONG_A_COURSE,
+            position=point.position,
+            velocity=point.velocity,
+            acceleration=point.acceleration,
+            yaw=point.yaw,
+            yaw_rate=point.yaw_rate,
+        )
+
+    async def _guide(
+        self,
+        mask: int,
+        *,
+        position: Vector = STILL,
+        velocity: Vector = STILL,
+        acceleration: Vector = STILL,
+        yaw: float = 0.0,
+        yaw_rate: float = 0.0,
+    ) -> None:
         fields = {
             "time_boot_ms": 0,
             "target_system": 1,
             "target_component": 1,
             "coordinate_frame": 1,
-            "type_mask": GUIDED_VELOCITY_AND_YAW,
-            "x": 0.0,
-            "y": 0.0,
-            "z": 0.0,
-            "vx": vx,
-            "vy": vy,
-            "vz": vz,
-            "afx": 0.0,
-            "afy": 0.0,
-            "afz": 0.0,
+            "type_mask": mask,
             "yaw": math.remainder(yaw, 2.0 * math.pi),
-            "yaw_rate": 0.0,
+            "yaw_rate": yaw_rate,
         }
+        for names, values in (
+            (("x", "y", "z"), position),
+            (("vx", "vy", "vz"), velocity),
+            (("afx", "afy", "afz"), acceleration),
+        ):
+            fields |= dict(zip(names, values, strict=True))
         await self._direct.send_message(mavlink_message("SET_POSITION_TARGET_LOCAL_NED", fields))
 
     async def _stick_step(self) -> None:

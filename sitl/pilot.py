@@ -19,6 +19,7 @@ from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.logging import log_subscribe
 from mavsdk.plugins.param import ParamError
 
+from sitl.course import Course
 from sitl.errors import SitlError
 from sitl.manoeuvres import GROUND_STATION, Manoeuvres, Plugin, mavlink_message
 
@@ -34,6 +35,8 @@ ARM_DISARM, TAKE_OFF, SET_MODE, SET_INTERVAL, REBOOT = 400, 22, 176, 511, 246
 INTERVALS = ((30, 50_000), (33, 100_000), (24, 200_000))
 """Messages that it needs, by number, us."""
 REBOOT_TRIES, REBOOT_PAUSE = 60, 1.0
+FORCED, UNBELIEVING_S = 21196, 15
+"""What makes an autopilot disarm in any case, and after how many seconds on the ground."""
 
 
 class Pilot:
@@ -182,8 +185,11 @@ class Pilot:
         """Changes the mode, by the name in MODES."""
         await self.command(SET_MODE, 1, MODES[self.vehicle][mode])
 
-    async def take_off(self) -> None:
+    async def take_off(self, height: float = 25.0) -> None:
         """Waits until it may arm, arms and climbs to a safe height.
+
+        Args:
+            height: of a copter, m above the ground.
 
         Raises:
             SitlError: it refuses.
@@ -199,8 +205,8 @@ class Pilot:
         else:
             raise SitlError(f"does not arm: {self._state.get('STATUSTEXT', {}).get('text')}")
         if self.vehicle == "copter":
-            await self.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, 25.0)
-        safe = 20.0 if self.vehicle == "copter" else 45.0
+            await self.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, height)
+        safe = 0.8 * height if self.vehicle == "copter" else 45.0
         await self._until(lambda: self.height > safe, f"a height of {safe:.0f} m")
 
     async def manoeuvre(self, seconds: float) -> None:
@@ -210,6 +216,14 @@ class Pilot:
             await self.set_mode("fly by wire")
         await self._manoeuvres.fly(self.vehicle, end)
 
+    async def follow(self, course: Course) -> tuple[float, float]:
+        """Flies a copter along a course, from its start, by the autopilot's clock.
+
+        Returns:
+            When that began and ended, s since the autopilot's boot.
+        """
+        return await self._manoeuvres.follow(course)
+
     async def land(self) -> None:
         """Comes down and waits until it has disarmed."""
         if self.vehicle == "copter":
@@ -217,10 +231,12 @@ class Pilot:
             await self.wait(3.0)
         await self.set_mode("land")
         await self._until(lambda: not self.armed or self.standing, "the landing")
-        # Some versions of Plane leave the disarming to the pilot.
-        for _ in range(60):
+        # Some versions of Plane leave the disarming to the pilot; and a copter with another frame
+        # than the one that its landing detector is tuned for may stand there, and not believe it.
+        for k in range(60):
             await self.wait(1.0)
-            if not self.armed or (self.standing and await self.command(ARM_DISARM, 0)):
+            force = FORCED if k >= UNBELIEVING_S else 0
+            if not self.armed or (self.standing and await self.command(ARM_DISARM, 0, force)):
                 break
         await self._until(lambda: not self.armed, "disarming after the landing")
 

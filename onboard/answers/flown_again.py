@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -40,6 +40,10 @@ that stands [data sheet]."""
 FLOORS = {"wind": 0.15, "thrust_tilt": 0.005, "motor_lag": 0.01, "wind_profile": 0.05}
 """Differences that do not matter, in the unit of the effect's unknowns [use]."""
 AIR = ("wind", "wind_profile", "turbulence")
+BUILT_IN: Final = "built-in"
+ARDUPILOT: Final = "ArduPilot"
+Part: TypeAlias = tuple[float, float]
+"""From when to when, s on the clock of a recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +74,7 @@ class FlownAgain:
     numbers: Mapping[str, Twice]
     mismatch: Mapping[str, AxisMismatch]
     left: tuple[str, ...]
-    simulator: str = "built-in"
+    simulator: str = BUILT_IN
 
     @property
     def agrees(self) -> bool:
@@ -80,15 +84,35 @@ class FlownAgain:
 
 @dataclass(frozen=True, slots=True)
 class Courses:
-    """Means over STEP_S, FINE of them in it: v (n, 3) NED, f (n, 3) body, roll and pitch (n, 2)."""
+    """Means over STEP_S, FINE of them in it: v (n, 3) NED, f (n, 3) body, roll and pitch (n, 2).
+
+    ``start`` is the time of the first, s on the recording's clock.
+    """
 
     v_n: Array
     f_b: Array
     tilt: Array
+    start: float = 0.0
+
+    def between(self, part: Part | None) -> Courses:
+        """What lies in a part of the recording; all of it for None."""
+        if part is None:
+            return self
+        begin, end = (max(round((t - self.start) * FINE / STEP_S), 0) for t in part)
+        its = slice(begin, end)
+        start = self.start + begin * STEP_S / FINE
+        return Courses(self.v_n[its], self.f_b[its], self.tilt[its], start)
 
 
 def flown_again(
-    first: Match, second: Match, real: str | Path, nominal: str | Path, found: str | Path
+    first: Match,
+    second: Match,
+    real: str | Path,
+    nominal: str | Path,
+    found: str | Path,
+    *,
+    simulator: str = BUILT_IN,
+    parts: tuple[Part | None, Part | None] = (None, None),
 ) -> FlownAgain:
     """The record of a verification.
 
@@ -98,12 +122,17 @@ def flown_again(
         real: the recording.
         nominal: the simulator's recording with the nominal airframe in still air.
         found: the simulator's recording with what was handed back.
+        simulator: which one flew.
+        parts: of the simulator's two recordings that follow the real one; all of them for None.
 
     Raises:
         RecordingError: a file that cannot be used, or flights that do not fit together.
     """
     course = courses(real)
-    before, after = (beside(course, courses(path)) for path in (nominal, found))
+    before, after = (
+        beside(course, courses(path).between(part))
+        for path, part in zip((nominal, found), parts, strict=True)
+    )
     numbers = numbers_twice(first, second)
     told = {key.partition(".")[0] for key in numbers}
     apart = {key.partition(".")[0] for key, n in numbers.items() if not n.agrees}
@@ -112,6 +141,7 @@ def flown_again(
         numbers,
         {key: AxisMismatch(before[key], after[key]) for key in before},
         tuple(d.name for d in second.vehicle.effects if d.name not in same),
+        simulator,
     )
 
 
@@ -168,7 +198,7 @@ def courses(path: str | Path) -> Courses:
     if n < 2 * FINE:
         raise RecordingError(f"{path}: no motion to lay side by side")
     t = start + STEP_S / FINE * np.arange(n)
-    return Courses(_means(t, v), _means(t, f), _means(t, a))
+    return Courses(_means(t, v), _means(t, f), _means(t, a), start)
 
 
 def _means(t: Array, rows: Array) -> Array:

@@ -30,6 +30,7 @@ onboard match flight.BIN
 onboard match simulation.BIN flight.BIN --json result.json
 onboard match flight.BIN --report flight.html
 onboard match flight.BIN --verify
+onboard match flight.BIN --verify --ardupilot build/sitl/bin
 onboard match flight.csv --columns columns.toml
 onboard match flight.BIN --param sim.param --frame-out frame.json
 """
@@ -51,6 +52,13 @@ TABLE = ".csv"
     "--verify", "verifies", is_flag=True, help="Let the simulator fly it again with what was found."
 )
 @click.option(
+    "--ardupilot",
+    "ardupilot",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Of --verify: the folder of ArduPilot's SITL, which flies it then.",
+)
+@click.option(
     "--columns",
     "columns_file",
     metavar="FILE",
@@ -67,6 +75,7 @@ def match(
     frame_file: str | None,
     given_frame: str | None,
     columns_file: str | None,
+    ardupilot: Path | None,
     *,
     verifies: bool,
 ) -> None:
@@ -78,6 +87,8 @@ def match(
     """
     if len(logs) > TWO:
         raise UsageError("match takes one recording, or a simulation's and a real one")
+    if ardupilot is not None and not verifies:
+        raise UsageError("--ardupilot is for --verify")
     frame = None if given_frame is None else read_frame(given_frame)
     opened = [_opened(log, columns_file) for log in logs]
     simulation = opened[0] if len(logs) == TWO else None
@@ -94,7 +105,7 @@ def match(
         from onboard.cli.match_verify import verify
 
         with waiting("flying it again"):
-            verified = verify(result, logs[-1])
+            verified = verify(result, logs[-1], ardupilot)
     if json_file is not None:
         write_json(match_document(result, verified).to_json(), json_file)
     if report_file is not None:

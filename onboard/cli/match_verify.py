@@ -1,12 +1,14 @@
-"""``onboard match --verify``: the built-in simulator flies it again, with what was found."""
+"""``onboard match --verify``: a simulator flies it again, with what was found."""
 
 from __future__ import annotations
 
+import importlib.util
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from onboard.answers.flown_again import FlownAgain, flown_again
+from onboard.answers.flown_again import ARDUPILOT, BUILT_IN, FlownAgain, Part, flown_again
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.errors import RecordingError, UsageError
@@ -22,19 +24,18 @@ KINDS = ("tlog", "dataflash")
 """Recordings that the simulator can fly again."""
 
 
-def verify(result: Match, recording: Path) -> FlownAgain:
+def verify(result: Match, recording: Path, ardupilot: Path | None = None) -> FlownAgain:
     """Fly the recording's motion again, nominally and with what was found, and compare.
+
+    Args:
+        result: what was found.
+        recording: of which.
+        ardupilot: folder of ArduPilot's SITL.  Without it ARDUPILOT_SITL_DIR and PATH are looked
+            at, and the built-in simulator flies where there is none.
 
     Raises:
         UsageError: the recording cannot be flown again.
     """
-    # The simulator only when it is wanted: it is no part of what runs on a vehicle.
-    from sitl.again import fly_again
-    from sitl.builtin.airframe.air import Air
-    from sitl.builtin.airframe.frame import Airframe
-    from sitl.builtin.airframe.wing import Wing
-    from sitl.errors import SitlError
-
     kind = result.real.source.recordings[0].kind
     if kind not in KINDS:
         raise UsageError(
@@ -42,20 +43,94 @@ def verify(result: Match, recording: Path) -> FlownAgain:
         )
     if result.vehicle.series is None:
         raise UsageError(f"--verify: {recording}: there is nothing to verify")
-    plane = result.vehicle.vehicle == "plane"
+    fly = _by_ardupilot if _has_ardupilot(result, ardupilot) else _by_built_in
     with tempfile.TemporaryDirectory() as folder:
-        nominal, found = Path(folder) / "nominal.tlog", Path(folder) / "again.tlog"
+        flown = fly(result, recording, Path(folder), ardupilot)
         try:
-            air = air_of(result)
-            fly_again(recording, Wing() if plane else Airframe(), Air(), nominal, recorded_in=air)
-            fly_again(recording, craft_of(result), air, found)
-        except (SitlError, ValueError) as error:
-            raise UsageError(f"--verify: {error}") from None
-        try:
-            second = match_recordings(found, frame=dict(result.frame))
-            return flown_again(result, second, recording, nominal, found)
+            second = match_recordings(flown.found, frame=dict(result.frame))
+            return flown_again(
+                result,
+                second,
+                recording,
+                flown.nominal,
+                flown.found,
+                simulator=flown.simulator,
+                parts=flown.parts,
+            )
         except RecordingError as error:
             raise UsageError(f"--verify: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Flights:
+    """Two recordings of a simulator, by the nominal airframe and by what was found."""
+
+    nominal: Path
+    found: Path
+    simulator: str
+    parts: tuple[Part | None, Part | None] = (None, None)
+
+
+def _has_ardupilot(result: Match, folder: Path | None) -> bool:
+    """Whether ArduPilot's simulator flies it.
+
+    Raises:
+        UsageError: it was asked for and cannot.
+    """
+    from sitl.ardupilot.process import find_binary
+    from sitl.errors import NoBinaryError
+
+    if result.vehicle.vehicle == "plane":
+        if folder is not None:
+            raise UsageError(
+                "--ardupilot: planes are flown again by the built-in simulator alone, leave it out"
+            )
+        return False
+    try:
+        find_binary("copter", folder)
+    except NoBinaryError as error:
+        if folder is not None:
+            raise UsageError(f"--ardupilot: {error}") from None
+        return False
+    if importlib.util.find_spec("mavsdk") is not None:
+        return True
+    if folder is not None:
+        raise UsageError("--ardupilot: MAVSDK is not installed, the extra sitl")
+    return False
+
+
+def _by_ardupilot(result: Match, recording: Path, folder: Path, binary: Path | None) -> Flights:
+    from sitl.ardupilot.again import fly_again
+    from sitl.errors import SitlError
+
+    nominal, found = folder / "nominal.BIN", folder / "again.BIN"
+    told = {s.name: s.value for s in result.settings}
+    try:
+        before = fly_again(recording, nominal, folder=binary)
+        after = fly_again(recording, found, airframe=result.frame, parameters=told, folder=binary)
+    except (SitlError, ValueError) as error:
+        raise UsageError(f"--verify: {error}") from None
+    return Flights(nominal, found, ARDUPILOT, (before, after))
+
+
+def _by_built_in(result: Match, recording: Path, folder: Path, binary: Path | None) -> Flights:
+    # The simulator only when it is wanted: it is no part of what runs on a vehicle.
+    from sitl.again import fly_again
+    from sitl.builtin.airframe.air import Air
+    from sitl.builtin.airframe.frame import Airframe
+    from sitl.builtin.airframe.wing import Wing
+    from sitl.errors import SitlError
+
+    del binary
+    nominal, found = folder / "nominal.tlog", folder / "again.tlog"
+    plain = Wing() if result.vehicle.vehicle == "plane" else Airframe()
+    air = air_of(result)
+    try:
+        fly_again(recording, plain, Air(), nominal, recorded_in=air)
+        fly_again(recording, craft_of(result), air, found)
+    except (SitlError, ValueError) as error:
+        raise UsageError(f"--verify: {error}") from None
+    return Flights(nominal, found, BUILT_IN)
 
 
 def craft_of(result: Match) -> Airframe | Wing:

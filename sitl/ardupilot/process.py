@@ -27,13 +27,18 @@ PATIENCE = 30.0
 """Seconds for a binary to open its first port."""
 
 
-def find_binary(vehicle: str) -> Path:
-    """The binary in ARDUPILOT_SITL_DIR or on PATH.
+def find_binary(vehicle: str, folder: str | Path | None = None) -> Path:
+    """The binary in a folder; without one, in ARDUPILOT_SITL_DIR or on PATH.
 
     Raises:
         NoBinaryError: in neither.
     """
     name = f"ardu{vehicle}"
+    if folder is not None:
+        binary = Path(folder) / name
+        if os.access(binary, os.X_OK):
+            return binary.resolve()
+        raise NoBinaryError(f"no {name} binary in {folder}")
     folder = os.environ.get(DIRECTORY)
     if folder:
         binary = Path(folder) / name
@@ -54,6 +59,8 @@ class ArdupilotProcess:
         speedup: simulated seconds a second, as far as the machine can follow.
         parameters: beside the defaults that make it fly.
         airframe: keys of a frame or coefficient file; its own without.
+        folder: of the binary; where :func:`find_binary` looks without.
+        home: latitude and longitude, deg, altitude, m, heading, deg.
     """
 
     def __init__(
@@ -63,11 +70,14 @@ class ArdupilotProcess:
         speedup: float = 5.0,
         parameters: Mapping[str, float] | None = None,
         airframe: Mapping[str, object] | None = None,
+        folder: str | Path | None = None,
+        home: str = HOME,
     ) -> None:
         self._parameters = parameters or {}
         self._airframe = airframe
         self.vehicle = vehicle
-        self._binary = find_binary(vehicle)
+        self._binary = find_binary(vehicle, folder)
+        self._home = home
         self._speedup = speedup
         self._folder = tempfile.TemporaryDirectory(prefix="onboard-sitl-")
         self._process: asyncio.subprocess.Process | None = None
@@ -97,7 +107,7 @@ class ArdupilotProcess:
             self._process = await asyncio.create_subprocess_exec(
                 *(str(self._binary), "-w", "--model", model),
                 *("--speedup", f"{self._speedup:g}", "--defaults", str(defaults)),
-                *("--home", HOME, "-I", str(self._instance)),
+                *("--home", self._home, "-I", str(self._instance)),
                 cwd=folder,
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=output,

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from onboard.answers.flown_again import Courses, beside, flown_again, numbers_twice
+from onboard.cli import match_verify
 from onboard.cli.main import run
 from onboard.cli.match_verify import air_of, craft_of
 from onboard.core.vehicle.records import Compared, Difference
+from onboard.errors import UsageError
 from onboard.report.match import match_html
 from sitl.builtin.airframe.air import Air
 from sitl.builtin.airframe.aircraft import Aircraft
@@ -92,6 +94,83 @@ def test_a_recording_that_cannot_be_flown_again_is_named(tmp_path, capsys):
     columns.write_text("")
     assert run(["match", str(path), "--columns", str(columns), "--verify"]) == 2
     assert "[time] is missing" in capsys.readouterr().err
+
+
+def test_only_the_part_that_follows_the_recording_is_laid_beside_it():
+    whole = replace(course(), start=100.0)
+    part = whole.between((101.0, 103.0))
+    assert part.start == pytest.approx(101.0)
+    assert len(part.v_n) == round(2.0 / 0.02)
+    assert part.v_n == pytest.approx(whole.v_n[round(1.0 / 0.02) :][: len(part.v_n)])
+    assert whole.between(None) is whole
+
+
+@pytest.fixture
+def flight(tmp_path, monkeypatch):
+    """Asks ``verify`` of a copter that has been matched; returns what was flown, by whom."""
+    flown = []
+
+    def by(simulator):
+        def fly(result, recording, folder, binary):
+            flown.append((simulator, binary))
+            nominal, found = folder / "nominal", folder / "found"
+            return match_verify.Flights(nominal, found, simulator)
+
+        return fly
+
+    monkeypatch.delenv("ARDUPILOT_SITL_DIR", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path / "none"))
+    monkeypatch.setattr(match_verify, "_by_ardupilot", by("ArduPilot"))
+    monkeypatch.setattr(match_verify, "_by_built_in", by("built-in"))
+    monkeypatch.setattr(match_verify, "match_recordings", lambda *_, **__: None)
+    told = {}
+    monkeypatch.setattr(match_verify, "flown_again", lambda *_, **more: told.update(more) or told)
+
+    def ask(vehicle="copter", ardupilot=None):
+        kind = SimpleNamespace(recordings=[SimpleNamespace(kind="dataflash")])
+        result = SimpleNamespace(
+            real=SimpleNamespace(source=kind),
+            vehicle=SimpleNamespace(vehicle=vehicle, series=object()),
+            frame={},
+        )
+        return match_verify.verify(result, tmp_path / "x.BIN", ardupilot)["simulator"]
+
+    ask.flown = flown
+    return ask
+
+
+def binary(folder, vehicle="copter"):
+    folder.mkdir(exist_ok=True)
+    made = folder / f"ardu{vehicle}"
+    made.write_text("#!/bin/sh\n")
+    made.chmod(0o755)
+    return folder
+
+
+def test_without_ardupilots_simulator_the_built_in_one_flies(flight):
+    assert flight() == "built-in"
+
+
+def test_ardupilots_simulator_flies_where_it_is(flight, tmp_path, monkeypatch):
+    folder = binary(tmp_path / "bin")
+    assert flight(ardupilot=folder) == "ArduPilot"
+    assert flight.flown == [("ArduPilot", folder)]
+    monkeypatch.setenv("ARDUPILOT_SITL_DIR", str(folder))
+    assert flight() == "ArduPilot"
+    assert flight("plane") == "built-in"
+
+
+def test_what_was_asked_for_and_is_not_there_is_no_other_simulators_flight(flight, tmp_path):
+    with pytest.raises(UsageError, match="no arducopter binary"):
+        flight(ardupilot=tmp_path)
+    with pytest.raises(UsageError, match="planes"):
+        flight("plane", ardupilot=binary(tmp_path / "bin", "plane"))
+    assert flight.flown == []
+
+
+def test_ardupilots_simulator_is_for_verify(capsys):
+    assert run(["match", __file__, "--ardupilot", "x"]) == 2
+    assert "--ardupilot is for --verify" in capsys.readouterr().err
 
 
 @pytest.mark.slow

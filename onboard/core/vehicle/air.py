@@ -24,7 +24,8 @@ class Air:
             plane: throttle and rudder.  None where they were not recorded.
         volts: (n,) of the battery; None where it was not recorded.
         power: (n,) mean over the motors of the thrust's share of the largest; by thrust_curve.
-        thrust: (n,) specific force of the rotors from the commands, m/s^2; None without commands.
+        thrust: (n,) specific force of the rotors, or of a plane's propeller at a standstill, from
+            the commands, m/s^2; None without commands.
         pull: (n,) specific force of the rotors from the accelerometer and z drag, m/s^2.
         force_b: (n, 3 or 4) predicted specific force, m/s^2, and airspeed where there is one, m/s.
         alpha, pressure, lift: (n,) of a plane: angle of attack (rad), specific force by coefficient

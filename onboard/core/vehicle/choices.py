@@ -15,7 +15,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.fit import BlockSums, Fit
-from onboard.core.vehicle.limits import AMBIGUOUS, FALSE_ALARM, FOLDS, SURE, TESTABLE
+from onboard.core.vehicle.limits import AMBIGUOUS, CREDIT, FALSE_ALARM, FOLDS, SURE, TESTABLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +150,8 @@ def choose(choices: Choices) -> Chosen:
         passing = [n for n in passing if _passes(choices, chosen, n, gains[n], level)]
         if not passing:
             break
-        chosen.append(max(passing, key=lambda n: gains[n] / len(fit.model.indices(n))))
+        chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, level)
-    better = _exchanged(choices, chosen, candidates)
-    if better != chosen:
-        chosen, gains = _pruned(choices, better, level)
     rivals = {n: _rivals(choices, chosen, n, candidates) for n in chosen}
     return Chosen(tuple(sorted(chosen, key=lambda n: -gains[n])), gains, rivals, untestable)
 
@@ -203,27 +200,6 @@ def _pruned(
         chosen = [
             c for c in chosen if c != weakest and _needs(c, [k for k in chosen if k != weakest])
         ]
-
-
-def _exchanged(choices: Choices, chosen: list[str], candidates: Sequence[str]) -> list[str]:
-    """With rivals that differ beside everything, for effects that then do not.
-
-    Alone, one of two that act alike takes what is the other's; with all effects free it is as the
-    nominal airframe has it, and that is the number which people are shown.
-    """
-    fit = choices.fit
-    full = choices.solved(choices.names)
-    apart = {n for n in candidates if _matters(fit, fit.model.indices(n), full)}
-    out = list(chosen)
-    for name in chosen:
-        if name in apart:
-            continue
-        better = [n for n in _rivals(choices, out, name, candidates) if n in apart]
-        if better:
-            rest = [c for c in out if c != name]
-            best = min(better, key=lambda n: choices.solved([*rest, n]).chi2)
-            out = [best if c == name else c for c in out]
-    return out
 
 
 def _rivals(

@@ -86,6 +86,9 @@ STALL_SHARE: Final = 0.85
 FALSE_ALARM: Final = 1e-3
 """Probability that a recording of the nominal airframe shows any given effect by chance; divided
 by the number of effects that are tried [probability]."""
+CREDIT: Final = 2.0
+"""What each unknown takes off the fall of chi-square when effects of several are compared: one that
+it gains by chance, one that it loses on flight not used (Akaike, 1974) [probability]."""
 SURE: Final = 2.0
 """Sigmas by which a difference must exceed what matters [probability: one in 44]."""
 APART: Final = 3.0
@@ -105,6 +108,9 @@ HEADING_RAD: Final = 0.03
 """What a heading is good to that a compass holds, rad: at speed it is an error of the velocity
 across the way, wandering for as long as nobody turns [data sheet]."""
 
+PROPELLER_BEND: Final = 0.3
+"""Of the thrust at a standstill, by which that of a propeller is off a straight line over the
+advance ratio, at the ratio where it pulls nothing: standard deviation [data sheet]."""
 MOST_BY_GUSTS: Final = 0.95
 """Share of what tells an unknown that gusts may make; past it nothing is known [probability]."""
 TOLD_S: Final = 1.0

@@ -14,6 +14,7 @@ from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import gust_doubt
 from onboard.core.vehicle.limits import MOST_OUTLYING, OUTLYING
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.propeller_doubt import propeller_doubt
 from onboard.core.vehicle.remainder import Remainder, left_out, remainders
 from onboard.core.vehicle.turbulence import Turbulence, turbulence_of
 
@@ -56,8 +57,9 @@ def matched(model: ForceModel) -> Matched:
         model = replace(model, flight=_cut(model.flight, kept))
         fit = fitted(model, fit.theta)
     turbulence = turbulence_of(fit)
+    fit = replace(fit, doubt=np.hypot(fit.doubt, propeller_doubt(fit)))
     if AirspeedScale.name in {e.name for e in model.effects} and turbulence.seen:
-        fit = replace(fit, doubt=gust_doubt(fit, turbulence.rms))
+        fit = replace(fit, doubt=np.hypot(fit.doubt, gust_doubt(fit, turbulence.rms)))
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)

@@ -105,15 +105,23 @@ def plane_flight(
     c_lift_0=0.56,
     c_drag_p=0.1,
     c_y_b=-0.98,
+    ratio=1.0,
     reading=None,
     lost=0.0,
     slip_drag=0.0,
+    slip_straight=0.0,
+    braking=1.0,
+    bend=0.0,
+    throttle_swing=0.15,
     heading_off=0.0,
+    noise=0.05,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
-    ``lost`` of the thrust by m/s that the propeller meets; drag by the square of sideslip; standard
-    deviation of a slow error of the recorded heading, rad.
+    ``ratio`` of the thrust, ``lost`` of it by m/s that the propeller meets, a windmilling one's
+    share of what that brakes, and the ``bend`` of that line at its end; drag by the square of
+    sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
+    recorded heading, rad, and of the force's noise, m/s^2.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -130,7 +138,8 @@ def plane_flight(
     q = 0.5 * rho * rho / 1.225 * speed**2 * 0.45 / 2.0
     lift = c_lift_0 + 6.9 * alpha
     drag = c_drag_p + lift**2 / (np.pi * 0.9 * 1.88**2 / 0.45) + slip_drag * beta**2
-    throttle = 0.5 + np.clip(smooth(rng, n, 0.15), -0.4, 0.4)
+    drag = drag + slip_straight * np.abs(beta)
+    throttle = 0.5 + np.clip(smooth(rng, n, throttle_swing), -0.48, 0.48)
     rudder = smooth(rng, n, 0.15)
     decay = np.exp(-STEP / 0.14)
     late = np.empty((2, n))
@@ -142,16 +151,17 @@ def plane_flight(
             slope = (command[k] - before) / STEP
             state = decay * (state - before + slope * 0.14) + command[k] - slope * 0.14
             row[k] = state
+    pull = ratio * late[0] - lost * np.sqrt(np.clip(late[0], 0.0, None)) * x
+    pull = np.where(pull < 0.0, braking * pull, pull) - bend * (lost * x) ** 2
     f_b = np.stack(
         [
-            G / 0.7 * (late[0] - lost * np.sqrt(np.clip(late[0], 0.0, None)) * x)
-            + q * (lift * np.sin(alpha) - drag * np.cos(alpha)),
+            G / 0.7 * pull + q * (lift * np.sin(alpha) - drag * np.cos(alpha)),
             q * (c_y_b * beta - 0.2 * late[1]),
             -q * (lift * np.cos(alpha) + drag * np.sin(alpha)),
         ],
         axis=1,
     )
-    f_b = f_b + np.stack([smooth(rng, n, 0.05, 1.0) for _ in range(3)], axis=1)
+    f_b = f_b + np.stack([smooth(rng, n, noise, 1.0) for _ in range(3)], axis=1)
     airspeed = None
     if reading is not None:
         airspeed = reading * speed * np.sqrt(rho / 1.225) + 0.2 * rng.normal(size=n)

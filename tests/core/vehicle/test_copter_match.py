@@ -77,6 +77,14 @@ def test_a_battery_that_gives_way_is_seen_in_the_thrust():
     within(match, "voltage_sag.share", 1.0)
 
 
+def test_a_voltage_that_falls_by_little_is_not_left_to_the_thrust():
+    """By 3 % in a whole flight, and 7 % below the full one: thrust that would be 14 % too small."""
+    match = matched(copter_flight(volts=(11.9, 11.5), sag=1.0, expo=0.3, seed=12))
+    assert names(match) == {"voltage_sag", "thrust_curve"}
+    within(match, "thrust_curve.expo", 0.3)
+    within(match, "voltage_sag.share", 1.0)
+
+
 def test_without_outputs_the_sides_are_told_and_the_thrust_is_not_tested():
     flight = copter_flight(wind=(4.0, 0.0), seed=9)
     match = matched(flight.kept(np.ones(len(flight), dtype=bool)).__class__(

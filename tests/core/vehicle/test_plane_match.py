@@ -69,6 +69,64 @@ def test_drag_of_sideslip_is_no_other_drag():
     assert abs(slip.real - 1.5) < 3.0 * slip.sigma
 
 
+def test_drag_that_grows_with_sideslip_itself_is_no_other_drag():
+    match = matched(plane_flight(seed=9, slip_straight=0.25))
+    assert names(match) == set()
+    drag, slip = match.numbers["drag.c_drag_p"], match.numbers["slip_drag_straight"]
+    assert abs(drag.real - 0.1) < 3.0 * drag.sigma
+    assert abs(slip.real - 0.25) < 3.0 * slip.sigma
+
+
+def test_a_windmill_that_brakes_less_than_its_line_says_is_no_lack_of_drag():
+    """In a glide the straight line would brake twice as hard: drag would be taken off for it."""
+    match = matched(plane_flight(seed=12, lost=0.02, braking=0.5, throttle_swing=0.3))
+    assert "drag" not in names(match)
+    drag, less = match.numbers["drag.c_drag_p"], match.numbers["propeller_braking"]
+    assert abs(drag.real - 0.1) < 3.0 * drag.sigma
+    assert abs(less.real - 0.5) < 3.0 * less.sigma
+    assert less.real > 3.0 * less.sigma
+
+
+@pytest.mark.parametrize(
+    ("seed", "c_drag_p", "swing", "noise"),
+    [(317, 0.05, 0.07, 0.18), (321, 0.05, 0.11, 0.29), (316, 0.03, 0.108, 0.223)],
+)
+def test_of_two_that_act_alike_the_one_that_differs_beside_all_others_is_named(
+    seed, c_drag_p, swing, noise
+):
+    """Hardly moved, the throttle tells no thrust from drag; alone, thrust takes what is drag's.
+
+    With both free the thrust is as it should be, and the drag is not.
+    """
+    found = matched(
+        plane_flight(seed=seed, c_drag_p=c_drag_p, throttle_swing=swing, noise=noise, seconds=150.0)
+    )
+    assert names(found) == {"drag"}
+    number = found.numbers["drag.c_drag_p"]
+    assert abs(number.real - c_drag_p) < 3.0 * number.sigma
+
+
+def test_thrust_that_differs_is_not_exchanged_for_drag():
+    for seed in (317, 321):
+        match = matched(
+            plane_flight(seed=seed, ratio=0.7, throttle_swing=0.1, noise=0.2, seconds=150.0)
+        )
+        assert names(match) == {"thrust_scale"}
+
+
+def test_drag_is_known_no_better_than_the_law_of_the_propeller():
+    """What bends the line is drag to the fit: its sigma says so, where there is such a line."""
+    straight, bent = (
+        matched(plane_flight(seed=13, lost=0.02, bend=bend)).numbers["drag.c_drag_p"]
+        for bend in (0.0, 0.3)
+    )
+    shift = 0.3 * 0.02**2 * 9.80665 / 0.7 / (0.5 * 1.14 * (1.14 / 1.225) * 0.45 / 2.0)
+    assert bent.real - straight.real == pytest.approx(shift, rel=0.2)
+    assert shift == pytest.approx(bent.sigma, rel=0.3)
+    none = matched(plane_flight(seed=13)).numbers["drag.c_drag_p"]
+    assert none.sigma < 0.3 * shift
+
+
 def test_a_heading_that_is_as_good_as_compasses_are_leaves_nothing_unexplained():
     good, bad = (matched(plane_flight(seed=10, heading_off=off)) for off in (0.02, 0.1))
     assert names(good) == set()

@@ -28,7 +28,8 @@ class Propulsion(Effect):
         """Add the thrust."""
         if air.commands is not None:
             scale = self._full * math.exp(min(values[0], 5.0))
-            air.force_b[:, 0] += scale * air.commands[:, THROTTLE]
+            air.thrust = scale * air.commands[:, THROTTLE]
+            air.force_b[:, 0] += air.thrust
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """The ratio to the simulator's thrust by mass."""

@@ -11,20 +11,28 @@ from onboard.core.vehicle.effects.effect import Effect, Unknown
 
 PLAUSIBLE = 0.5
 """Of light planes and models, by the square of a radian [physics]."""
+STRAIGHT = 0.2
+"""Likewise by a radian: of light planes in simulators that take it so [data sheet]."""
 
 
 class SlipDrag(Effect):
-    """``coefficient beta^2``, along the flow; beside the effects, after the lift.
+    """``square beta^2 + straight |beta|``, along the flow; beside the effects, after the lift.
 
     The simulator's plane has none.  Left to the drag of the profile it would be taken for what the
-    throttle does in turns.
+    throttle does in turns.  A body that the air follows has drag by the square; one with edges,
+    from which the air parts on the lee side at once, nearly by the angle itself.
     """
 
     def __init__(self) -> None:
         """Nominally none, as the simulator's."""
-        super().__init__([Unknown("slip_drag", 0.0, PLAUSIBLE, 0.0, "1")])
+        super().__init__(
+            [
+                Unknown("slip_drag", 0.0, PLAUSIBLE, 0.0, "1"),
+                Unknown("slip_drag_straight", 0.0, STRAIGHT, 0.0, "1"),
+            ]
+        )
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag."""
-        slip = np.arctan2(air.u_b[:, 1], air.u_b[:, 0])
-        air.force_b[:, 0] -= air.pressure * values[0] * slip**2
+        slip = np.abs(np.arctan2(air.u_b[:, 1], air.u_b[:, 0]))
+        air.force_b[:, 0] -= air.pressure * (values[0] * slip + values[1]) * slip

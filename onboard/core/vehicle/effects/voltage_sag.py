@@ -11,8 +11,9 @@ from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
 FLOOR = 0.2
 """Of the share of the voltage's square [use]."""
-LEAST_FALL = 0.01
-"""Relative scatter of the voltage without which it shows nothing [data sheet]."""
+LEAST_FALL = 0.002
+"""Relative scatter of the voltage without which it shows nothing: what a converter of 12 bits and
+its supply are good for.  Of what falls by more the fit says how well it is known [data sheet]."""
 
 
 class VoltageSag(Effect):
