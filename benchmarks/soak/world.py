@@ -53,6 +53,8 @@ class World:
         for visitor in self._visitors:
             visitor.close()
         self._visitors.clear()
+        # The vehicle notes every message that it hears, for tests: that memory is not the service's.
+        self.vehicle.heard.clear()
         await asyncio.sleep(0.1)
 
     async def _incident(self, service: Service) -> None:
