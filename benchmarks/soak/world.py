@@ -53,7 +53,7 @@ class World:
         for visitor in self._visitors:
             visitor.close()
         self._visitors.clear()
-        # The vehicle notes every message that it hears, for tests: that memory is not the service's.
+        # The vehicle notes what it hears, for tests: that memory is not the service's.
         self.vehicle.heard.clear()
         await asyncio.sleep(0.1)
 
