@@ -128,12 +128,15 @@ class Chosen:
         gains: fall of chi-square by each, beside the others.
         rivals: for each, effects that would do as well in its place.
         untestable: effects that this flight could not have shown at any plausible size.
+        suspected: those of them that explain more than chance all the same: something is there,
+            and gusts may have made the numbers what they are.
     """
 
     effects: tuple[str, ...]
     gains: dict[str, float]
     rivals: dict[str, tuple[str, ...]]
     untestable: tuple[str, ...]
+    suspected: tuple[str, ...] = ()
 
 
 def choose(choices: Choices) -> Chosen:
@@ -153,7 +156,19 @@ def choose(choices: Choices) -> Chosen:
         chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, level)
     rivals = {n: _rivals(choices, chosen, n, candidates) for n in chosen}
-    return Chosen(tuple(sorted(chosen, key=lambda n: -gains[n])), gains, rivals, untestable)
+    suspected = tuple(n for n in untestable if _explains(choices, chosen, n, level))
+    effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
+    return Chosen(effects, gains, rivals, untestable, suspected)
+
+
+def _explains(choices: Choices, chosen: Sequence[str], name: str, level: float) -> bool:
+    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are."""
+    if not _needs(name, chosen):
+        return False
+    gain = choices.solved(chosen).chi2 - choices.solved([*chosen, name]).chi2
+    if survival(gain, len(choices.fit.model.indices(name))) > level:
+        return False
+    return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
 
 def _needs(name: str, chosen: Sequence[str]) -> bool:

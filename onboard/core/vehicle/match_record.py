@@ -10,6 +10,7 @@ import numpy as np
 from onboard.core.diagnosis.records import Ambiguity, NotTestable
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN
+from onboard.core.physics.wording import listed
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.matching import Matched, held_out
@@ -196,6 +197,9 @@ def is_explained(m: Matched) -> bool:
         return False
     if m.turbulence.found:
         return True
+    if m.chosen.suspected:
+        # No gust was shown that could have made it.
+        return False
     unclear = m.model.unclear(m.fit.theta)
     return all(
         rms(m.held[:, k]) < rms(unclear[:, k])
@@ -206,8 +210,23 @@ def is_explained(m: Matched) -> bool:
 
 def note_of(m: Matched) -> str:
     """What a person must know of flight that is not described or was not used; may be empty."""
-    said = remainder_sentence(m.remainders), left_out_sentence(m.left_out)
+    said = (
+        "" if m.turbulence.found else suspected_sentence(m.chosen.suspected),
+        remainder_sentence(m.remainders),
+        left_out_sentence(m.left_out),
+    )
     return "; ".join(s for s in said if s)
+
+
+def suspected_sentence(names: tuple[str, ...]) -> str:
+    """Of effects that explain more than chance and whose numbers are not known."""
+    if not names:
+        return ""
+    its = "its" if len(names) == 1 else "their"
+    return (
+        f"{listed(list(names))} would explain a part of what is left, but gusts may have distorted "
+        f"{its} numbers: fly again in calm air"
+    )
 
 
 def _drift(model: ForceModel, theta: Array, residual: Array) -> Array:

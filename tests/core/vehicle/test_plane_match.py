@@ -132,3 +132,20 @@ def test_a_heading_that_is_as_good_as_compasses_are_leaves_nothing_unexplained()
     assert names(good) == set()
     assert good.explained
     assert not bad.explained
+
+
+@pytest.mark.parametrize(("c_lift_0", "explained"), [(0.4, False), (0.56, True)])
+def test_a_difference_whose_size_nobody_knows_is_not_called_none(monkeypatch, c_lift_0, explained):
+    """Its number may be anything; that the force is not that of the nominal airframe stays."""
+
+    def doubt(fit):
+        out = np.zeros(len(fit.theta))
+        out[fit.model.indices("lift")] = 100.0
+        return out
+
+    monkeypatch.setattr("onboard.core.vehicle.matching.propeller_doubt", doubt)
+    match = matched(plane_flight(seed=5, c_lift_0=c_lift_0))
+    assert "lift" in {n.name for n in match.not_testable}
+    assert "lift" not in names(match)
+    assert match.explained is explained
+    assert ("lift would explain" in match.note) is not explained
