@@ -87,7 +87,7 @@ def test_each_recording_can_have_a_page(fleet, tmp_path, capsys):
     pages = sorted(p.name for p in (tmp_path / "new" / "pages").iterdir())
     assert pages == ["a.BIN.html", "b.tlog.html", "index.html"]
     index = (tmp_path / "new" / "pages" / "index.html").read_text(encoding="utf-8")
-    assert 'href="a.BIN.html"' in index
+    assert 'href="./a.BIN.html"' in index
     assert "http" not in index
 
 
