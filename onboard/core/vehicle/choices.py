@@ -128,8 +128,8 @@ class Chosen:
         gains: fall of chi-square by each, beside the others.
         rivals: for each, effects that would do as well in its place.
         untestable: effects that this flight could not have shown at any plausible size.
-        suspected: those of them that explain more than chance all the same: something is there,
-            and gusts may have made the numbers what they are.
+        suspected: those of them that explain more than chance all the same: something is there, of
+            which nobody knows the numbers.
     """
 
     effects: tuple[str, ...]
@@ -156,19 +156,12 @@ def choose(choices: Choices) -> Chosen:
         chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, level)
     rivals = {n: _rivals(choices, chosen, n, candidates) for n in chosen}
-    suspected = tuple(n for n in untestable if _explains(choices, chosen, n, level))
+    asked = [n for n in untestable if _needs(n, chosen)]
+    left = choices.solved(chosen).chi2
+    would = {n: left - choices.solved([*chosen, n]).chi2 for n in asked}
+    suspected = tuple(n for n in asked if _no_chance(choices, chosen, n, would[n], level))
     effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
     return Chosen(effects, gains, rivals, untestable, suspected)
-
-
-def _explains(choices: Choices, chosen: Sequence[str], name: str, level: float) -> bool:
-    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are."""
-    if not _needs(name, chosen):
-        return False
-    gain = choices.solved(chosen).chi2 - choices.solved([*chosen, name]).chi2
-    if survival(gain, len(choices.fit.model.indices(name))) > level:
-        return False
-    return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
 
 def _needs(name: str, chosen: Sequence[str]) -> bool:
@@ -177,13 +170,20 @@ def _needs(name: str, chosen: Sequence[str]) -> bool:
 
 
 def _passes(choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float) -> bool:
-    places = choices.fit.model.indices(name)
-    if survival(gain, len(places)) > level:
+    if not _no_chance(choices, chosen, name, gain, level):
         return False
+    places = choices.fit.model.indices(name)
     with_it = choices.solved([*chosen, name])
     if not _matters(choices.fit, places, with_it):
         return False
-    if not choices.lasting([*chosen, name], places, with_it):
+    return choices.lasting([*chosen, name], places, with_it)
+
+
+def _no_chance(
+    choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float
+) -> bool:
+    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are."""
+    if survival(gain, len(choices.fit.model.indices(name))) > level:
         return False
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 

@@ -224,8 +224,8 @@ def suspected_sentence(names: tuple[str, ...]) -> str:
         return ""
     its = "its" if len(names) == 1 else "their"
     return (
-        f"{listed(list(names))} would explain a part of what is left, but gusts may have distorted "
-        f"{its} numbers: fly again in calm air"
+        f"{listed(list(names))} would explain a part of what is left, but this flight does not "
+        f"determine {its} numbers (see what was not tested)"
     )
 
 

@@ -12,7 +12,8 @@ from onboard.core.vehicle.effects.effect import Effect, Unknown
 PLAUSIBLE = 0.5
 """Of light planes and models, by the square of a radian [physics]."""
 STRAIGHT = 0.2
-"""Likewise by a radian: of light planes in simulators that take it so [data sheet]."""
+"""Likewise by a radian: a light plane's in simulators that take it so (JSBSim's c172p: 0.17)
+[data sheet]."""
 
 
 class SlipDrag(Effect):
