@@ -26,7 +26,16 @@ import numpy as np
 
 from onboard.core.filter.innovations import Epoch, Step
 from onboard.core.filter.readings import Reading
-from onboard.core.filter.state import BIAS, ERRORS, MEASURED, PSI, STATES, H
+from onboard.core.filter.state import (
+    BIAS,
+    ERRORS,
+    HEADING,
+    MEASURED,
+    PSI,
+    RATE,
+    STATES,
+    H,
+)
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import prefer_compiled, preferred
 
@@ -39,12 +48,15 @@ class Process(NamedTuple):
     Attributes:
         fall: (MEASURED,) what is added to the states at ``theta = 0``.
         decay: (MEASURED,) factors that the slow errors decay by.
+        swing: (3,) what the rate of the heading's error adds to it, what that error leaves of the
+            rate, and what the rate leaves of itself.
         before: (B, STATES) process noise before the transition, unit of the state squared.
         after: (B, STATES) the same after it.
     """
 
     fall: Array
     decay: Array
+    swing: Array
     before: Array
     after: Array
 
@@ -150,9 +162,16 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     var = diagonal(carried, m1)
     var += process.before
     carried[:, :MEASURED] = F @ carried[:, :ERRORS]
-    carried[:, ERRORS:] *= process.decay[:, None]
+    added, back, kept = process.swing.tolist()
+    rate = back * carried[:, HEADING] + kept * carried[:, RATE]
+    carried[:, ERRORS:RATE] *= process.decay[:, None]
+    carried[:, HEADING] += added * carried[:, RATE]
+    carried[:, RATE] = rate
     P[..., :MEASURED] = P[..., :ERRORS] @ F.T
-    P[..., ERRORS:] *= process.decay
+    rate = back * P[..., HEADING] + kept * P[..., RATE]
+    P[..., ERRORS:RATE] *= process.decay
+    P[..., HEADING] += added * P[..., RATE]
+    P[..., RATE] = rate
     var += process.after
     carried[:, :MEASURED, :m1] += stack_to_ned(R_nb, step.columns)
     carried[:, :MEASURED, 0] += process.fall

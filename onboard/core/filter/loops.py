@@ -3,7 +3,7 @@
 Equal to that of :mod:`onboard.core.filter.kernel` to rounding (no fast-math), without what numpy's
 calls cost, and with what is known of the matrices: most of a transition is zero or one, and a
 covariance is symmetric.  Rows of a state are 0 to 2 velocity, 3 height, 4 to 6 attitude, 7 to 9
-bias, then the slow errors (:mod:`onboard.core.filter.state`).
+bias, 10 to 16 the slow errors, 17 the rate of the last (:mod:`onboard.core.filter.state`).
 
 Compiled code is kept on disk (:mod:`onboard.core.maths.compiler`).  numba notices changes of this
 file alone: whoever changes the order of the states has to touch it.
@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.filter.readings import Index
-from onboard.core.filter.state import ERRORS, MEASURED, STATES
+from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled, part
 
@@ -77,25 +77,31 @@ def _from_the_left(F: Array, C: Array) -> None:
 
 
 @part
-def _from_the_right(F: Array, decay: Array, P: Array) -> None:
-    """``P F^T`` in place; rows below are those beside, for the matrix will be symmetric."""
+def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
+    """``P F^T`` in place.
+
+    Of all rows, though half of a symmetric matrix says it all: what is mirrored is symmetric to the
+    last digit, the rest is not, and where angles are read to a tenth of a milliradian the rounding
+    errors of the noise in the regressors then grow twofold with each step.
+    """
     for i in range(STATES):
-        for j in range(MEASURED):
-            P[i, ERRORS + j] *= decay[j]
-    for i in range(MEASURED):
         row = P[i]
+        error, rate = row[HEADING], row[RATE]
+        for j in range(MEASURED):
+            row[ERRORS + j] *= decay[j]
+        row[HEADING] += swing[0] * rate
+        row[RATE] = swing[1] * error + swing[2] * rate
         for j in (3, 0, 1, 2, 4, 5, 6):
             x = row[j]
             for k in range(ERRORS):
                 if k != j:
                     x += F[j, k] * row[k]
             row[j] = x
-        for j in range(MEASURED, STATES):
-            P[j, i] = row[j]
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])"
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1],"
+    " f8[:,::1])"
 )
 def predict(
     carried: Array,
@@ -105,6 +111,7 @@ def predict(
     stack: Array,
     fall: Array,
     decay: Array,
+    swing: Array,
     before: Array,
     after: Array,
 ) -> None:
@@ -118,10 +125,15 @@ def predict(
         for i in range(STATES):
             C[i, m1 + i] += before[b, i]
         _from_the_left(F, C)
-        for i in range(MEASURED):
+        angle, rate = C[HEADING], C[RATE]
+        for c in range(columns):
+            x, u = angle[c], rate[c]
+            angle[c] = decay[MEASURED - 1] * x + swing[0] * u
+            rate[c] = swing[1] * x + swing[2] * u
+        for i in range(MEASURED - 1):
             C[ERRORS + i] *= decay[i]
         for at in range(m1, columns, STATES):
-            _from_the_right(F, decay, C[:, at : at + STATES])
+            _from_the_right(F, decay, swing, C[:, at : at + STATES])
         for i in range(STATES):
             C[i, m1 + i] += after[b, i]
         _drive(R_nb, stack, C)

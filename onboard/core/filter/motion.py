@@ -92,14 +92,18 @@ def carry(
     fall[2], fall[3] = gravity * T, -0.5 * T * T * gravity
     decay[0] = decay[1] = decay[2] = math.exp(-T / times[0])
     decay[4] = decay[5] = math.exp(-T / times[1])
-    decay[6] = math.exp(-T / times[2])
+    swing = np.empty(3)
+    x = T / times[2]
+    shrunk = math.exp(-x)
+    decay[6] = (1.0 + x) * shrunk
+    swing[0], swing[1], swing[2] = T * shrunk, -x / times[2] * shrunk, (1.0 - x) * shrunk
     before, after = np.empty(walk.shape), np.empty(walk.shape)
     for b in range(len(walk)):
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
-        for i in range(MEASURED):
+        for i in range(MEASURED - 1):
             after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[i] * decay[i])
-    predict(carried, R_nb, T, moved, columns, fall, decay, before, after)
+    predict(carried, R_nb, T, moved, columns, fall, decay, swing, before, after)
     for i in range(3):
         a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]
         for j in range(3):

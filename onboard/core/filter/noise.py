@@ -35,7 +35,7 @@ class NoiseLevels:
         bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
         attitude: Gauss-Markov error of the recorded tilt (correlation time
             :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
-        heading: the same of the recorded heading (correlation time
+        heading: smooth error of the recorded heading (its time:
             :data:`~onboard.core.filter.limits.HEADING_TIME_S`), rad.
         attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.

@@ -12,7 +12,20 @@ from onboard.core.filter.limits import (
     UNKNOWN_HEIGHT_VAR,
 )
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.state import BIAS, CH, CV, ERRORS, MEASURED, PSI, STATES, H, V
+from onboard.core.filter.smooth_error import RATE_WALK, SETTLED_RATE
+from onboard.core.filter.state import (
+    BIAS,
+    CH,
+    CV,
+    ERRORS,
+    HEADING,
+    MEASURED,
+    PSI,
+    RATE,
+    STATES,
+    H,
+    V,
+)
 from onboard.core.maths.arrays import Array
 
 
@@ -47,6 +60,7 @@ class Variances:
                 self.walk[i, PSI] = q.tilt_walk**2
                 self.walk[i, BIAS] = q.bias_walk**2
                 self.settled[i, PSI] = (q.attitude**2, q.attitude**2, q.heading**2)
+                self.walk[i, RATE] = RATE_WALK * q.heading**2
 
     def at_start(
         self, tilt_sigma: float, heading_sigma: float, *, down: bool, height: bool
@@ -69,7 +83,8 @@ class Variances:
         if self._attitude:
             var[:, PSI] = (tilt_sigma**2, tilt_sigma**2, heading_sigma**2)
             var[:, BIAS] = BIAS_START_RAD_S**2
-        var[:, ERRORS:] = self.settled
+        var[:, ERRORS:RATE] = self.settled
+        var[:, RATE] = SETTLED_RATE * self.settled[:, -1]
         var[:, V] += colour
         P = np.zeros((B, STATES, STATES))
         P[:, range(STATES), range(STATES)] = var
@@ -82,8 +97,9 @@ class Variances:
     def over(self, duration: float, decay: Array) -> tuple[Array, Array]:
         """Process noise of a step, what acts before and what after its transition.
 
-        A random walk acts along the step: half of it before, half after the transition.  What
-        decays (Gauss-Markov) has its exact share after it.
+        A random walk acts along the step: half of it before, half after the transition, and so does
+        what drives the rate of a smooth error.  What decays (Gauss-Markov) has its exact share
+        after it.
 
         Args:
             duration: s.
@@ -94,5 +110,5 @@ class Variances:
         """
         before = self.walk * (0.5 * duration)
         after = before.copy()
-        after[:, ERRORS:] += self.settled * (1.0 - decay * decay)
+        after[:, ERRORS:HEADING] += (self.settled * (1.0 - decay * decay))[:, :-1]
         return before, after

@@ -6,7 +6,7 @@ give.  The filter runs over the measurement *and over every regressor* at once, 
 
 Attitude is carried by the *gyroscope* and corrected by the filter's own estimate after each
 epoch.  The recorded attitude, an EKF's, errs with the manoeuvre and with the very accelerometer
-that is calibrated; it only enters as a loose measurement with a Gauss-Markov error.  With all
+that is calibrated; it only enters as a loose measurement with a slow error.  With all
 noise but the GPS's set to zero and the recorded attitude taken as it is, the innovations are those
 of the published integral criterion with V(0) eliminated.
 
@@ -36,7 +36,6 @@ from onboard.core.filter.limits import (
     ANYTHING,
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
-    HEADING_TIME_S,
     RENEWED,
     RENEWED_ATTITUDE_VAR,
     RENEWED_HEIGHT_VAR,
@@ -45,6 +44,7 @@ from onboard.core.filter.limits import (
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
 from onboard.core.filter.refused import Refused
+from onboard.core.filter.smooth_error import moved
 from onboard.core.filter.state import ATT, BIAS, CH, PSI, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
@@ -191,10 +191,10 @@ class WhiteningFilter:
             north, east, more = carried.tolist()
             down += more
         fall = np.array([north * T, east * T, down * T, -0.5 * T * T * down, 0.0, 0.0, 0.0])
-        times = (COLOUR_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S)
-        cv, tilt, heading = (math.exp(-T / time) for time in times)
+        cv, tilt = math.exp(-T / COLOUR_TIME_S), math.exp(-T / ATTITUDE_TIME_S)
+        heading, swing = moved(T)
         decay = np.array([cv, cv, cv, 1.0, tilt, tilt, heading])
-        process = Process(fall, decay, *self.variances.over(T, decay))
+        process = Process(fall, decay, swing, *self.variances.over(T, decay))
         self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R

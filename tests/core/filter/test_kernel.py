@@ -22,7 +22,7 @@ from onboard.core.filter.kernel import NUMPY, Process
 from onboard.core.filter.noise import NoiseLevels, stencil
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
-from onboard.core.filter.state import ERRORS, MEASURED, STATES
+from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from tests.core.compiled import both_ways
@@ -60,6 +60,7 @@ def process_of(rng, members):
     return Process(
         np.append(rng.normal(size=4), np.zeros(3)),
         rng.uniform(0.5, 1.0, size=MEASURED),
+        rng.uniform(-1.0, 1.0, size=3),
         *(rng.uniform(0.0, 0.1, size=(2, members, STATES))),
     )
 
@@ -94,7 +95,8 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     R, step, process = turned(rng), step_of(rng, m), process_of(rng, bank[0])
     F = np.eye(STATES)
     F[:MEASURED, :ERRORS] = kernel.transition(R, step)
-    F[range(ERRORS, STATES), range(ERRORS, STATES)] = process.decay
+    F[range(ERRORS, RATE), range(ERRORS, RATE)] = process.decay
+    F[HEADING, RATE], F[RATE, HEADING], F[RATE, RATE] = process.swing
     X, P = parts(before, m)
     first, then = (np.stack([np.diag(q) for q in x]) for x in (process.before, process.after))
     grown = np.zeros_like(P)
@@ -166,7 +168,7 @@ def test_what_an_epoch_measures_is_the_same_of_both(seed, m):
 @KERNELS
 def test_a_covariance_that_is_none_is_an_error(who):
     all_ = carried(np.random.default_rng(0), 2, 3, noise=False)
-    all_[1, 0, 4] = -1.0
+    all_[1, 0, 4] = -100.0
     all_[1, 0, 5:] = 0.0
     with pytest.raises(np.linalg.LinAlgError):
         who.whiten(all_, np.zeros((MEASURED, 4)), reading("vvv"), np.zeros((2, MEASURED)))

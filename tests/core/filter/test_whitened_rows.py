@@ -168,6 +168,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     bias = 0.01 * normal(size=3)
     slow = np.array([levels.attitude, levels.attitude, levels.heading])
     error, colour, wander = slow * normal(size=3), levels.velocity_colour * normal(size=3), 0.0
+    turning = slow[2] / HEADING_TIME_S * normal()  # rad/s, of the error of the heading
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
     theta = np.ones(1)
@@ -211,8 +212,13 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             to_end = to_end + (T - (i + 0.5) * DT) * (middle @ f_read) * DT
             P = P @ rotation_from_vector(w_read * DT)
             bias = bias + levels.bias_walk * np.sqrt(DT) * normal(size=3)
-        keep = np.exp(-T / np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S]))
-        error = keep * error + np.sqrt(1 - keep**2) * slow * normal(size=3)
+        keep = np.exp(-T / ATTITUDE_TIME_S)
+        error[:2] = keep * error[:2] + np.sqrt(1 - keep**2) * slow[:2] * normal(size=2)
+        for _ in range(SUB):
+            # Critically damped, and driven: in steps so small that Euler's are good enough.
+            driven = 2.0 * (1.0 / HEADING_TIME_S) ** 1.5 * slow[2] * normal() * np.sqrt(DT)
+            turning += driven - (2.0 * turning / HEADING_TIME_S + error[2] / HEADING_TIME_S**2) * DT
+            error[2] += turning * DT
         keep = np.exp(-T / COLOUR_TIME_S)
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
         wander += levels.height_walk * np.sqrt(T) * normal()
