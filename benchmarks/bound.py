@@ -21,7 +21,10 @@ V, H, PSI, BIAS = slice(0, 3), 3, slice(4, 7), slice(7, 10)
 ATT, WANDER, COLOUR = slice(10, 13), 13, slice(14, 17)
 SCALE, BETA = slice(17, 20), slice(20, 23)
 DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
-GYRO_SCALE, ROLL, PITCH, YAW, ARM, SIZE = slice(29, 32), 32, 33, 34, slice(35, 38), 38
+GYRO_SCALE, ROLL, PITCH, YAW, ARM = slice(29, 32), 32, 33, 34, slice(35, 38)
+TURNING, SIZE = 38, 39
+"""The rate of the smooth error of the heading is the last state."""
+_K = 1.0 / HEADING_TIME_S
 
 PRIOR = (
     (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
@@ -55,6 +58,9 @@ def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
             R, f = path.R_nb[m], path.f_b[m]
             F[:] = eye
             F[range(10, 17), range(10, 17)] = keep
+            F[ATT.stop - 1, TURNING] = step
+            F[TURNING, ATT.stop - 1] = -step * _K**2
+            F[TURNING, TURNING] = 1.0 - 2.0 * step * _K
             turn = _turn(R, path.w_b[m], rates[m]) * step
             lean = -cross_matrix(R @ f) * step
             push = np.hstack([R * f, R]) * step
@@ -73,6 +79,7 @@ def _start(q: NoiseLevels) -> Array:
         sigma[where] = value
     sigma[PSI] = (0.06, 0.06, 0.2)
     sigma[ATT] = (q.attitude, q.attitude, q.heading)
+    sigma[TURNING] = _K * q.heading
     sigma[COLOUR] = q.velocity_colour
     return np.diag(sigma**2)
 
@@ -80,13 +87,13 @@ def _start(q: NoiseLevels) -> Array:
 def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
     """Noise added in a step, and what is kept of states 10 to 16."""
     keep = np.ones(7)
-    keep[:2], keep[2] = np.exp(-step / ATTITUDE_TIME_S), np.exp(-step / HEADING_TIME_S)
+    keep[:2] = np.exp(-step / ATTITUDE_TIME_S)
     keep[4:] = np.exp(-step / COLOUR_TIME_S)
     var = np.zeros(SIZE)
     var[V], var[PSI] = q.force_walk**2 * step, q.tilt_walk**2 * step
     var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
-    slow = np.array([q.attitude, q.attitude, q.heading])
-    var[ATT] = slow**2 * (1.0 - keep[:3] ** 2)
+    var[ATT] = q.attitude**2 * (1.0 - keep[:3] ** 2)
+    var[TURNING] = 4.0 * _K**3 * q.heading**2 * step
     var[COLOUR] = q.velocity_colour**2 * (1.0 - keep[4] ** 2)
     return np.diag(var), keep
 

@@ -44,8 +44,8 @@ from onboard.core.filter.limits import (
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
 from onboard.core.filter.refused import Refused
-from onboard.core.filter.smooth_error import moved
-from onboard.core.filter.state import ATT, BIAS, CH, PSI, STATES, H, V
+from onboard.core.filter.smooth_error import SETTLED_RATE, moved
+from onboard.core.filter.state import ATT, BIAS, CH, PSI, RATE, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
 from onboard.core.maths.arrays import Array
@@ -333,3 +333,5 @@ class WhiteningFilter:
             var[:, CH] += RENEWED_HEIGHT_VAR
         else:
             var[:, _SLOW_ERROR[reference]] += RENEWED_ATTITUDE_VAR
+        if reference == "heading":
+            var[:, RATE] += SETTLED_RATE * RENEWED_ATTITUDE_VAR
