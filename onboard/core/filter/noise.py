@@ -50,7 +50,7 @@ class NoiseLevels:
     tilt_walk: float = 3e-4
     bias_walk: float = 3e-5
     attitude: float = 0.02
-    heading: float = 0.03
+    heading: float = 0.06
     attitude_white: float = 5e-4
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
