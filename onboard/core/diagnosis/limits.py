@@ -35,9 +35,9 @@ MOST_EFFECTS: Final = 5
 
 # Jumps (jumps, selection).
 
-FORGOTTEN_S: Final = 25.0
-"""s after which a filter that GPS corrects has forgotten a jump of the accelerometer, and an EKF
-has settled [tuned]."""
+FORGOTTEN_S: Final = 35.0
+"""s after which a filter that GPS corrects has forgotten nine tenths of what tells a jump of the
+accelerometer, and an EKF has settled [simulated planes and copters: 0.88 to 0.92]."""
 FURTHEST: Final = 3
 """Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
