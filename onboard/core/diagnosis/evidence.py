@@ -35,6 +35,7 @@ from onboard.core.diagnosis.regimes import (
 )
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fit
+from onboard.core.estimate.calibration_record import too_far
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
@@ -170,6 +171,10 @@ class Judge:
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (
                 "a formula of measured signals describes what no effect of the catalogue explains. "
                 + note
+            )
+        if too_far(self.engine, self.final.solution):
+            return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, (
+                "what is found makes up for what is not in the model. " + note
             )
         if effects:
             if left:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from onboard.core.estimate.limits import (
     ATTITUDE_DELAY_RANGE_S,
+    BEYOND,
     DELAY_RANGE_S,
     HEADING_RANGE_RAD,
     LONGEST_WINDOW_S,
@@ -84,6 +87,45 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,
     )
+
+
+def beyond_range(point: Linearisation, model: Model, theta: Array, covariance: Array) -> list[str]:
+    """What would have to be further off than it is looked for, by :data:`BEYOND` of its sigmas.
+
+    Its clipped value is then none that the flight asks for, and everything else makes up for it.
+
+    Args:
+        point: the linearisation that the estimate is about.
+        model: its model.
+        theta: (m,) estimate.
+        covariance: (m, m) of it.
+
+    Returns:
+        In words; empty if all is where the flight wants it.
+    """
+    ranges = (
+        ("the latency of GPS", "gps_delay", point.delay, DELAY_RANGE_S),
+        (
+            "the receiver's averaging",
+            "window_squared",
+            point.window**2,
+            (-np.inf, LONGEST_WINDOW_S**2),
+        ),
+        (
+            "the lateness of the attitude",
+            "attitude_delay",
+            point.attitude_delay,
+            ATTITUDE_DELAY_RANGE_S,
+        ),
+        ("the error of the heading", "heading", point.heading, HEADING_RANGE_RAD),
+    )
+    out = []
+    for words, name, taken, (low, high) in ranges:
+        i = model.index[name]
+        asked, margin = taken + theta[i], BEYOND * math.sqrt(covariance[i, i])
+        if asked < low - margin or asked > high + margin:
+            out.append(words)
+    return out
 
 
 def _antenna(model: Model) -> slice:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from onboard.core.estimate.calibration_model import beyond_range
 from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
 from onboard.core.estimate.determined import determine, flown_loads, force_moments
@@ -260,7 +261,17 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
             "the flight contradicts itself: something is missing from the model, "
             "see onboard explain"
         )
+    if beyond := too_far(engine, solution):
+        return (
+            f"{' and '.join(beyond)} would have to be further off than on any vehicle: something "
+            "is missing from the model, see onboard explain"
+        )
     return ""
+
+
+def too_far(engine: Engine, solution: Solution) -> list[str]:
+    """What the flight wants further off than anything of it can be, in words."""
+    return beyond_range(engine.point, engine.model, solution.theta, solution.covariance)
 
 
 def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Calibration:

@@ -20,6 +20,9 @@ ATTITUDE_DELAY_RANGE_S: Final = (-0.15, 0.15)
 """Lateness of the recorded attitude, s [physics: beyond it streams are not of one vehicle]."""
 HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 """Error of the recorded heading, rad [physics: past it an EKF does not align]."""
+BEYOND: Final = 3.0
+"""Sigmas outside of a range: the flight wants what nothing of it can be [probability: 0.1 % where
+it is at the very end]."""
 
 # Refinement (engine).
 

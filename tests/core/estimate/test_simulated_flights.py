@@ -379,3 +379,15 @@ def test_a_hover_is_never_called_calibrated():
     got = made.calibration(1)
     assert got.status is Status.INSUFFICIENT
     assert got.note
+
+
+@pytest.mark.slow
+def test_a_latency_that_no_receiver_has_is_not_believed(copter):
+    """GPS that is stamped a third of a second before it is true: another clock, not a receiver."""
+    early = [
+        dataclasses.replace(s, t=s.t - 0.35, t_message=None) if isinstance(s, GpsFix) else s
+        for s in copter
+    ]
+    got = calibrated(early)
+    assert got.status is Status.INSUFFICIENT
+    assert "the latency of GPS would have to be further off" in got.note
