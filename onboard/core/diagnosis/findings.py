@@ -18,6 +18,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
 from onboard.core.physics.effect import Cure, Effect, NuisanceFit
+from onboard.core.physics.effects.bias_step import SHARED_CURE
 from onboard.core.physics.finding import Confounder, Finding, Quantity
 
 
@@ -92,7 +93,9 @@ class Findings:
             }
         values = {k: q.value for k, q in quantities.items()}
         held = final.engine.absent
-        made = self._record(f.effect, quantities, index, held, f.cured(values))
+        common = self._choice.common
+        cure = f.cured(values) if common is None or f.onset != common.onset else SHARED_CURE
+        made = self._record(f.effect, quantities, index, held, cure)
         made = replace(
             made,
             confounders=self._confounders(f),

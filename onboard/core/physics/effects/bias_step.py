@@ -12,12 +12,17 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics import response_curves as curves
-from onboard.core.physics.effect import Bearing, Effect, on_axes
+from onboard.core.physics.effect import Bearing, Cure, Effect, on_axes
 from onboard.core.physics.finding import Finding
 from onboard.core.physics.wording import each
 
 LARGEST = 3.0
 """m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
+
+SHARED_CURE = Cure(
+    "look first at what all accelerometers share, for each asks for this jump: the mount of "
+    "the autopilot, GPS, the compass, a blow"
+)
 
 
 @dataclass(frozen=True, slots=True)
