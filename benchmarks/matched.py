@@ -40,8 +40,8 @@ LEVELS = NoiseLevels(
     force_walk=0.03,
     tilt_walk=4e-4,
     bias_walk=4e-5,
-    attitude=0.015,
-    heading=0.03,
+    attitude=0.03,
+    heading=0.08,
 )
 """A common receiver and common MEMS; none of the values the search for levels begins with."""
 
@@ -120,6 +120,18 @@ def _mean(x: Array, window_s: float) -> Array:
     )
 
 
+def _smooth(rng: np.random.Generator, n: int, step: float, time: float) -> Array:
+    """(n,) of unit variance: critically damped, driven by white noise, in small steps."""
+    x, u, k = float(rng.standard_normal()), float(rng.standard_normal()) / time, 1.0 / time
+    kicks = 2.0 * k**1.5 * np.sqrt(step) * rng.standard_normal(n)
+    out = np.empty(n)
+    for i in range(n):
+        u += kicks[i] - (2.0 * k * u + k * k * x) * step
+        x += u * step
+        out[i] = x
+    return out
+
+
 def _gauss_markov(rng: np.random.Generator, n: int, step: float, time: float | Array) -> Array:
     """(n, 3) stationary, unit variance; ``time`` for all or (3,)."""
     keep = np.exp(-step / time)
@@ -182,10 +194,9 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
     """White noise is that of the epochs: samples between two share that of the nearest."""
     t, epochs = path.t[path.imu], path.t[path.epochs]
     nearest = np.clip(np.round((t - START_S) * GPS_HZ), 0, len(epochs) - 1).astype(int)
-    white = q.attitude * rng.standard_normal((len(epochs), 3))[nearest]
-    times = np.array([ATTITUDE_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S])
-    slow = _gauss_markov(rng, len(t), 1.0 / IMU_HZ, times)
-    slow *= (q.attitude, q.attitude, q.heading)
+    white = q.attitude_white * rng.standard_normal((len(epochs), 3))[nearest]
+    tilt = q.attitude * _gauss_markov(rng, len(t), 1.0 / IMU_HZ, ATTITUDE_TIME_S)[:, :2]
+    slow = np.column_stack([tilt, q.heading * _smooth(rng, len(t), 1.0 / IMU_HZ, HEADING_TIME_S)])
     body = np.array([*TILT_OFFSET * rng.standard_normal(2), 0.0])
     heading = np.array([0.0, 0.0, HEADING_OFFSET * rng.standard_normal()])
     R = path.R_nb[path.imu] @ rotation.from_vector(np.tile(body, (len(t), 1)))
