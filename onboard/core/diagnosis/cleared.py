@@ -13,6 +13,8 @@ from onboard.core.diagnosis.screening import false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
+from onboard.core.filter.limits import LIMITS
+from onboard.core.inputs.expected_force import expected
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
@@ -23,7 +25,8 @@ from onboard.core.physics.finding import Finding
 class Cleared:
     """A flight without what must not be fitted, with every effect that it can be asked for.
 
-    ``clipped`` if the accelerometer was at its rail all the time, and nothing was left out.
+    ``clipped`` if the accelerometer was at its rail all the time, and nothing was left out;
+    ``sampled`` is the flight before anything was expected of its samples.
     """
 
     full: Examination
@@ -32,6 +35,7 @@ class Cleared:
     rail: Finding | None
     fault: Finding | None
     clipped: bool
+    sampled: Sequence[Batch]
 
 
 def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin: Origin) -> Cleared:
@@ -47,8 +51,9 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     if rail is not None:
         absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
         testable = [f for f in testable if not f.bent_by_clipping]
+    clipped, sampled = rail is not None and batches is flight, batches
+    batches = expected(batches, LIMITS["force_walk"][0])
     full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
-    clipped = rail is not None and batches is flight
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
@@ -60,7 +65,7 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         full = Examination(
             engine, testable, t0=origin.t0, batches=batches, refused=refused
         ).with_noise()
-    return Cleared(full, testable, absent, rail, fault, clipped)
+    return Cleared(full, testable, absent, rail, fault, clipped, sampled)
 
 
 def since_reboot(batches: Sequence[Batch]) -> list[Batch]:

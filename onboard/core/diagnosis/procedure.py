@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
 
-from onboard.core.diagnosis.cleared import cleared, since_reboot
+from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
@@ -63,7 +63,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     flight = since_reboot(engine.batches) if latest else list(engine.batches)
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
-    companions = _companions(calibrator, imu, clear.full, latest=latest)
+    companions = _companions(calibrator, imu, clear, latest=latest)
     full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
     rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
@@ -91,17 +91,17 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
     )
 
 
-def _companions(calibrator: Calibrator, imu: int, full: Examination, *, latest: bool) -> Companions:
+def _companions(calibrator: Calibrator, imu: int, clear: Cleared, *, latest: bool) -> Companions:
     """All accelerometers of the vehicle; of this one what is examined.
 
     Where the clock began anew within the flight, none: a moment of it is no one moment.
     """
-    if len(since_reboot(full.batches)) < len(full.batches):
+    if len(since_reboot(clear.sampled)) < len(clear.sampled):
         return Companions({})
-    prior = full.model.prior_sigma[:6]
+    prior = clear.full.model.prior_sigma[:6]
     everyone = {}
     for other, batches in calibrator.flown.items():
-        own = full.batches if other == imu else since_reboot(batches) if latest else batches
+        own = clear.sampled if other == imu else since_reboot(batches) if latest else batches
         before = calibrator.parameters.six(other).as_linear()
         everyone[other] = Companion(own, before, prior)
     return Companions(everyone)

@@ -82,3 +82,14 @@ REWEIGHTINGS: Final = 4
 """Rounds of the robust fit [cost]."""
 BEFORE_NEXT_S: Final = 1e-3
 """s; a time that must not move stays at least so far before the next [cost]."""
+
+# Noise in samples (expected_force).
+
+RESOLVED_S: Final = 20.0
+"""s; stretches of which spectra are made: a manoeuvre's falls by half within a tenth of a Hertz
+[cost: longer, and a short flight has too few]."""
+SPECTRUM_BINS: Final = 3
+"""Frequencies over which a spectrum is averaged [cost: as above]."""
+FLOOR_BINS: Final = 21
+"""The same where the least of it is looked for: the least of many is too small by chance, by a
+tenth [cost]."""

@@ -1,0 +1,108 @@
+"""What an accelerometer felt, as its noisy samples let one expect it.
+
+Vibration that is sampled too slowly is white noise in the samples.  In what the samples are
+integrated to it is a random walk, which the filter knows; but the regressors are made of them, too,
+and noise in regressors is no noise of the measurement.  It speaks for whatever makes the prediction
+quieter: an average that no receiver takes, an antenna that is not where it is, a loop that lags.
+What has no such preference is the expectation of the force given its samples, for what is then left
+of the force is in no sum of samples (regression calibration: Carroll et al., *Measurement Error in
+Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples with the density
+``S`` of each frequency it is the zero-phase filter ``1 - q / S`` (Wiener 1949, non-causal).
+
+``S`` is measured over the flight.  ``q`` is the least of it at any frequency: white noise has no
+more than that, so a tone adds nothing, and vibration that a low-pass has shaped is left as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from onboard.core.inputs.limits import FLOOR_BINS, RESOLVED_S, SPECTRUM_BINS
+from onboard.core.inputs.segments import Batch, Segment
+from onboard.core.maths.arrays import Array
+
+
+def expected(batches: Sequence[Batch], least: float) -> list[Batch]:
+    """The same flight with the expectation of the force in the place of its samples.
+
+    Args:
+        batches: the flight.
+        least: velocity random walk, m/s/sqrt(s), below which noise in samples matters to nobody.
+
+    Returns:
+        The very batches where the samples have no more noise than that, or are too few to tell.
+    """
+    runs = list(_runs(batches))
+    joined = [_joined(run) for run in runs]
+    step = float(np.median(np.concatenate([np.diff(t) for t, _ in joined] or [np.ones(1)])))
+    found = [p for _, raw in joined for p in _periodograms(raw, step)]
+    if not found:
+        return list(batches)
+    gain = _gain(np.mean(found, axis=0), least)
+    if gain is None:
+        return list(batches)
+    made: dict[int, Segment] = {}
+    for run, (t, raw) in zip(runs, joined, strict=True):
+        felt = _filtered(raw, gain)
+        for s in (batch.segment for batch in run):
+            made[id(s)] = replace(s, raw_s=felt[np.searchsorted(t, s.t)])
+    return [Batch(made[id(b.segment)], b.fixes, b.trusted, b.fresh) for b in batches]
+
+
+def _runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:
+    """Batches whose samples follow on each other."""
+    run: list[Batch] = []
+    for batch in batches:
+        t = batch.segment.t
+        if run and not (run[-1].segment.t[0] <= t[0] <= run[-1].segment.t[-1]):
+            yield run
+            run = []
+        run.append(batch)
+    if run:
+        yield run
+
+
+def _joined(run: Sequence[Batch]) -> tuple[Array, Array]:
+    """Samples of all segments, each once: times (n,), s, and raw force (n, 3)."""
+    t, index = np.unique(np.concatenate([b.segment.t for b in run]), return_index=True)
+    return t, np.concatenate([b.segment.raw_s for b in run])[index]
+
+
+def _periodograms(raw: Array, step: float) -> Iterator[Array]:
+    """Two-sided densities (bins, 3), (m/s^2)^2 s, of stretches that overlap by half (Welch)."""
+    n = 2 * round(RESOLVED_S / step / 2.0)
+    window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
+    for i in range(0, len(raw) - n + 1, max(n // 2, 1)):
+        piece = raw[i : i + n] - raw[i : i + n].mean(axis=0)
+        yield np.abs(np.fft.rfft(piece * window, axis=0)) ** 2 * (step / np.sum(window**2))
+
+
+def _gain(density: Array, least: float) -> Array | None:
+    """(bins, 3) of the filter; None where the noise is less than ``least``."""
+    q = _averaged(density, FLOOR_BINS).min(axis=0)
+    if np.all(q < least**2):
+        return None
+    gain: Array = np.clip(1.0 - q / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
+    gain[0] = 1.0  # of the mean
+    return gain
+
+
+def _averaged(density: Array, bins: int) -> Array:
+    """The mean over an odd number of bins, at either end of those that there are."""
+    padded = np.pad(density, ((bins // 2, bins // 2), (0, 0)), mode="reflect")
+    out: Array = np.lib.stride_tricks.sliding_window_view(padded, bins, axis=0).mean(axis=-1)
+    return out
+
+
+def _filtered(raw: Array, gain: Array) -> Array:
+    """The filter over samples (n, 3), mirrored at either end."""
+    n = len(raw)
+    mean = raw.mean(axis=0)
+    spectrum = np.fft.rfft(np.concatenate([raw, raw[::-1]]) - mean, axis=0)
+    at, of = np.linspace(0.0, 1.0, len(spectrum)), np.linspace(0.0, 1.0, len(gain))
+    spectrum *= np.stack([np.interp(at, of, g) for g in gain.T], axis=-1)
+    out: Array = np.fft.irfft(spectrum, 2 * n, axis=0)[:n] + mean
+    return out

@@ -1,0 +1,99 @@
+"""The expectation of a force given noisy samples: what is left of it is in no sum of samples."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.expected_force import expected
+from onboard.core.inputs.segments import Batch, Fixes, Segment
+
+STEP, SECONDS = 0.02, 240.0
+T = np.arange(0.0, SECONDS, STEP)
+LEAST = 0.01
+
+
+def manoeuvre(seed=0):
+    """(n, 3) m/s^2: smooth noise below half a Hertz, as large as a copter's."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.fft.rfft(rng.normal(size=(len(T), 3)), axis=0)
+    f = np.fft.rfftfreq(len(T), STEP)[:, None]
+    x = np.fft.irfft(spectrum / (1.0 + (f / 0.3) ** 4), len(T), axis=0)
+    return 2.0 * x / x.std(axis=0) + [0.0, 0.0, -9.8]
+
+
+def batches(raw, pieces=8, gap=()):
+    """A flight in segments that overlap by half a second."""
+    edges, out = np.linspace(0, len(T), pieces + 1).astype(int).tolist(), []
+    for k, (i, j) in enumerate(pairwise(edges)):
+        first = i if k in gap else max(i - 25, 0)
+        last = j if k + 1 in gap else min(j + 25, len(T))
+        cut = slice(first, last)
+        segment = Segment(
+            T[cut],
+            np.zeros((len(T[cut]), 3)),
+            raw[cut],
+            np.zeros(0),
+            np.zeros((0, 3, 3)),
+            np.eye(3),
+        )
+        fixes = Fixes(T[i:j:10], np.zeros((len(T[i:j:10]), 3)), *np.zeros((2, len(T[i:j:10]))))
+        out.append(Batch(segment, fixes, np.ones(len(fixes), bool), fresh=k == 0 or k in gap))
+    return out
+
+
+def felt(made):
+    """(n, 3) of all segments, each time once."""
+    out = np.full((len(T), 3), np.nan)
+    for b in made:
+        out[np.round(b.segment.t / STEP).astype(int)] = b.segment.raw_s
+    return out
+
+
+def test_what_is_left_is_in_no_sum_of_what_is_expected():
+    """Of samples it is: their noise times itself.  At lags that a latency or an average reaches."""
+    rng = np.random.default_rng(1)
+    f, sigma = manoeuvre(), np.array([0.25, 0.65, 0.2])
+    samples = f + sigma * rng.normal(size=f.shape)
+    got = felt(expected(batches(samples), LEAST))
+    for lag in (0, 5, 10, 25):
+        left = (f - got)[lag:] * (got - got.mean(axis=0))[: len(got) - lag]
+        bias = left.mean(axis=0) / sigma**2
+        assert np.abs(bias).max() < 0.1, lag
+    assert np.allclose(
+        ((f - samples) * (samples - f.mean(axis=0))).mean(axis=0) / sigma**2, -1.0, atol=0.1
+    )
+    assert np.all((f - got).std(axis=0) < 0.5 * sigma)
+
+
+def test_quiet_samples_are_left_as_they_are():
+    flight = batches(manoeuvre() + 0.005 * np.random.default_rng(2).normal(size=(len(T), 3)))
+    made = expected(flight, LEAST)
+    assert all(a is b for a, b in zip(made, flight, strict=True))
+
+
+def test_a_tone_is_no_white_noise():
+    """A rotor's beat at 7 Hz, strong as it is, takes nothing from the manoeuvre."""
+    f = manoeuvre()
+    tone = 1.5 * np.sin(2.0 * np.pi * 7.0 * T)[:, None]
+    noise = 0.15 * np.random.default_rng(3).normal(size=f.shape)
+    got = felt(expected(batches(f + tone + noise), LEAST))
+    smooth = [np.convolve(x[:, 0], np.ones(50) / 50.0, "valid") for x in (got, f)]
+    assert np.std(smooth[0] - smooth[1]) < 0.05
+
+
+@pytest.mark.parametrize("gap", [(), (3,), (3, 4)])
+def test_segments_that_overlap_have_the_same_force_where_they_do(gap):
+    samples = manoeuvre() + 0.4 * np.random.default_rng(4).normal(size=(len(T), 3))
+    made = expected(batches(samples, gap=gap), LEAST)
+    for a, b in pairwise(made):
+        both, i, j = np.intersect1d(a.segment.t, b.segment.t, return_indices=True)
+        np.testing.assert_array_equal(a.segment.raw_s[i], b.segment.raw_s[j])
+        assert len(both) or b.fresh
+
+
+def test_a_flight_too_short_for_a_spectrum_is_left_as_it_is():
+    samples = manoeuvre() + np.random.default_rng(5).normal(size=(len(T), 3))
+    flight = batches(samples, pieces=24)[:1]
+    assert expected(flight, LEAST)[0] is flight[0]
+    assert expected([], LEAST) == []
