@@ -86,6 +86,12 @@ class Match:
     frame: Mapping[str, float | list[float]] = field(default_factory=dict)
 
     @property
+    def damage(self) -> list[str]:
+        """What was skipped of damaged files, in sentences."""
+        both = (self.simulation, self.real)
+        return [note for flown in both if flown is not None for note in flown.source.damage]
+
+    @property
     def silent(self) -> bool:
         """Whether the recording says nothing; the vehicle's note says why."""
         return self.vehicle.series is None and self.verdict is Verdict.INSUFFICIENT

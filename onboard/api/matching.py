@@ -20,6 +20,7 @@ from onboard.api.result import Result
 from onboard.api.sources import Source, opened
 from onboard.core.physics.finding import Quantity
 from onboard.errors import RecordingError, UsageError
+from onboard.recordings.recording import because_of
 from onboard.report.files import save
 from onboard.report.match import match_html
 
@@ -100,6 +101,7 @@ class MatchResult(Result):
         against = " against ".join(self.files)
         lines = [
             f"{against}: {self.vehicle}, {self.flight_s:.0f} s in the air",
+            *(f"damage: {note}" for note in self._match.damage),
             f"{self.headline}.",
         ]
         for effect in self._match.effects:
@@ -148,7 +150,8 @@ def match(
         raise UsageError(f"frame: no frame of a simulator ({error})") from None
     vehicle = made.vehicle
     if made.silent:
-        raise RecordingError(f"{made.real.source.recordings[0].path}: {vehicle.note}")
+        path, why = made.real.source.recordings[0].path, because_of(made.damage)
+        raise RecordingError(f"{path}: {vehicle.note}{why}")
     return MatchResult(
         verdict=made.verdict.value,
         headline=match_words.headline(made),

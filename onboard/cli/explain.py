@@ -94,6 +94,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     """What a pilot reads in ten seconds, and then the numbers."""
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
+    yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
     if d.verdict is Verdict.INSUFFICIENT:

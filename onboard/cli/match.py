@@ -21,7 +21,7 @@ from onboard.cli.progress import reading, waiting
 from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.errors import RecordingError, UsageError
-from onboard.recordings.recording import Recording
+from onboard.recordings.recording import Recording, because_of
 from onboard.recordings.table import open_table
 
 EXAMPLES = """\
@@ -98,7 +98,7 @@ def match(
     except ValueError as error:
         raise UsageError(f"{given_frame}: no frame of a simulator ({error})") from None
     if result.silent:
-        raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
+        raise RecordingError(f"{logs[-1]}: {result.vehicle.note}{because_of(result.damage)}")
     verified = None
     if verifies:
         # The simulator only when it is wanted.
@@ -145,6 +145,7 @@ def summary(result: Match) -> Iterator[RenderableType]:
     if result.simulation is not None:
         names.insert(0, result.simulation.name)
     yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
+    yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
     if result.effects:
         yield from ("", _effects(result))

@@ -62,7 +62,7 @@ def test_a_flight_in_wind_with_another_frame_as_the_nominal_one(recordings, tmp_
     assert max(map(len, out.splitlines())) <= 80
     document = json.loads(answer.read_text())
     assert document["schema"] == "onboard.match/1"
-    assert document["recordings"] == {"simulation": None, "real": "e02.BIN"}
+    assert document["recordings"] == {"simulation": None, "real": "e02.BIN", "damage": []}
     # What differs from *this* frame: the drag, too.
     assert {e["name"] for e in document["effects"]} == {"wind", "rotor_drag", "body_drag"}
     assert document["wind"]["north"] == pytest.approx(-3.0, abs=0.15)
@@ -86,7 +86,11 @@ def test_two_recordings_differ_only_in_what_differs(recordings, tmp_path):
     answer = tmp_path / "a.json"
     assert run(["match", str(simulation), str(real), "--json", str(answer)]) == 0
     document = json.loads(answer.read_text())
-    assert document["recordings"] == {"simulation": "e03.BIN", "real": "e11.BIN"}
+    assert document["recordings"] == {
+        "simulation": "e03.BIN",
+        "real": "e11.BIN",
+        "damage": [],
+    }
     found = {e["name"]: e for e in document["effects"]}
     assert set(found) == {"gps_latency", "rotor_drag", "body_drag"}
     value = found["rotor_drag"]["values"]["mcoef"]
