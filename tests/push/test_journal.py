@@ -1,5 +1,6 @@
 import errno
 import os
+import shutil
 
 import pytest
 from hypothesis import given, settings
@@ -207,6 +208,49 @@ def test_full_disk_is_reported_and_the_file_stays_whole(path, monkeypatch):
         journal.append(entries[2], 3.0)
     found, (recovery,), damaged = read(path)
     assert (found, recovery.transaction, damaged) == ([entries[0], entries[2]], "a", 0)
+
+
+def moved_and_linked(directory):
+    """As somebody does who wants the state on another disk: moved, and a link in its place."""
+    elsewhere = directory.with_name("elsewhere")
+    shutil.copytree(directory, elsewhere)
+    shutil.rmtree(directory)
+    directory.symlink_to(elsewhere)
+
+
+def older_put_back(directory):
+    (directory / "journal.jsonl").replace(directory / "of today")
+    (directory / "journal.jsonl").write_bytes(b"")
+
+
+def deleted(directory):
+    shutil.rmtree(directory)
+
+
+@pytest.mark.parametrize("change", [moved_and_linked, older_put_back, deleted])
+def test_what_the_next_start_would_not_read_is_not_called_written(path, change):
+    first, second = story("a"), story("b")
+    with Journal(path) as journal:
+        for entry in first:
+            journal.append(entry, 1.0)
+        change(path.parent)
+        with pytest.raises(StateError, match="not the journal that was opened"):
+            journal.append(second[0], 2.0)
+        assert [e for _, e in journal.entries] == first
+    with Journal(path) as journal:
+        assert journal.recover() == ()
+        journal.append(second[0], 3.0)
+        assert [found.transaction for found in journal.recover()] == ["b"]
+
+
+def test_a_directory_that_is_reached_by_another_way_is_the_same(path):
+    entries = story("a")
+    with Journal(path) as journal:
+        journal.append(entries[0], 1.0)
+        path.parent.rename(path.parent.with_name("moved"))
+        path.parent.symlink_to("moved")
+        journal.append(entries[1], 2.0)
+    assert read(path)[0] == entries[:2]
 
 
 class TestSize:
