@@ -12,7 +12,7 @@ from onboard.answers import match_words
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import MatchDocument, match_document
-from onboard.answers.match_files import frame_text, read_frame, settings_text
+from onboard.answers.match_files import checked_frame, frame_text, read_frame, settings_text
 from onboard.answers.replay import Progress
 from onboard.api.accelerometer import Row
 from onboard.api.figures import draw_forces
@@ -143,11 +143,11 @@ def match(
         raise UsageError("match takes one recording, or a simulation's and a real one")
     given = opened(recordings)
     simulation = given[0] if len(given) > 1 else None
-    keys = read_frame(frame) if isinstance(frame, str | os.PathLike) else frame
-    try:
-        made = match_recordings(given[-1], simulation, frame=keys, progress=progress)
-    except ValueError as error:
-        raise UsageError(f"frame: no frame of a simulator ({error})") from None
+    if isinstance(frame, str | os.PathLike):
+        keys = read_frame(frame)
+    else:
+        keys = checked_frame(frame or {}, "frame")
+    made = match_recordings(given[-1], simulation, frame=keys, progress=progress)
     vehicle = made.vehicle
     if made.silent:
         path, why = made.real.source.recordings[0].path, because_of(made.damage)
