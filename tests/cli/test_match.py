@@ -49,8 +49,9 @@ def test_three_recordings_are_one_too_many(log, capsys):
         ('{"battCapacityAh": ' + "9" * 400 + "}", "battCapacityAh is too large"),
         ('{"mass": 0}', "mass must be positive"),
         ('{"refAngle": 120}', "nothing flies with these numbers"),
-        ('{"refSpd": 1e-300}', "nothing flies with these numbers"),
-        ('{"oswald": 1e-300, "b": 1e-300}', "nothing flies with these numbers"),
+        ('{"refSpd": 1e-300}', "refSpd is too small"),
+        ('{"mass": 1e30}', "mass is too large"),
+        ('{"refAngle": 90.5, "mdrag_coef": 1}', "nothing flies with these numbers"),
         ('{"x": "' + "y" * 1_000_000 + '"}', "longer than"),
     ],
 )

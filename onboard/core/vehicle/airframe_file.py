@@ -14,8 +14,9 @@ DIGITS: Final = 6
 """Of a number in a file: as many as single precision surely keeps, which the simulator reads it
 with [data sheet]."""
 
-LARGEST: Final = 3.4e38
-"""What single precision holds, which the simulator reads it with [data sheet]."""
+LARGEST: Final = 1e6
+"""Of any unit that a file has: nothing that flies has a million kilograms, metres per second or
+volts, or a millionth of what it divides by [physics]."""
 
 A = TypeVar("A", bound="DataclassInstance")
 
@@ -48,6 +49,8 @@ def with_numbers(
     for name in positive:
         if not getattr(made, name) > 0.0:
             raise ValueError(f"{name} must be positive")
+        if getattr(made, name) < 1.0 / LARGEST:
+            raise ValueError(f"{name} is too small a number")
     for name in derived:
         try:
             value = getattr(made, name)
