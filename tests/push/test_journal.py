@@ -260,6 +260,8 @@ class TestSize:
                 journal.append(entry, 1.0)
             for entry in story("open", imu=3)[:-1]:
                 journal.append(entry, 1.0)
+            for entry in story("in vain", result=Result.ROLLED_BACK):
+                journal.append(entry, 1.0)
             for i in range(200):
                 for entry in story(f"t{i}"):
                     journal.append(entry, float(i))
@@ -269,6 +271,9 @@ class TestSize:
             assert [r.transaction for r in journal.recover()] == ["open"]
             assert journal.last_completed(2).transaction == "first-of-imu-2"
             assert journal.last_completed(1).transaction == "t199"
+            # What calibrating was good for is told by the first that succeeded.
+            assert {"t0", "t199"} <= {e.transaction for _, e in journal.entries}
+            assert "in vain" not in {e.transaction for _, e in journal.entries}
         assert [p.name for p in path.parent.iterdir()] == [path.name]
 
     def test_shrinking_keeps_no_descriptor(self, path):
@@ -290,6 +295,7 @@ class TestSize:
             raise OSError(errno.EIO, "Input/output error")
 
         expected = read(path)
+        there = len(os.listdir("/proc/self/fd"))
         with monkeypatch.context() as patch:
             if call == "rename":
                 patch.setattr("pathlib.Path.rename", fail)
@@ -303,6 +309,7 @@ class TestSize:
 
                 patch.setattr(os, "fsync", fsync)
             journal = Journal(path, limit_bytes=10, keep=1)
+        assert len(os.listdir("/proc/self/fd")) == there + 1
         journal.append(story("d")[0], 9.0)
         journal.close()
         found, _, _ = read(path)
