@@ -48,6 +48,7 @@ FLAGS = (
     "--headless",
     "--no-sandbox",
     "--disable-gpu",
+    "--disable-background-networking",
     "--disable-dev-shm-usage",
     "--hide-scrollbars",
 )
