@@ -1,10 +1,11 @@
 """Makes the pictures that the README shows: the status page during the demo, and reports.
 
-    python docs/screenshots.py [FOLDER]
+    python docs/screenshots.py [--reports] [FOLDER]
 
 The demo runs in real time, so that charts have as many points as they have in a real flight: it
-takes about ten minutes.  Needs a checkout with the development extras, chromium and chromedriver
-on PATH, and Pillow.
+takes about ten minutes, on a computer that has nothing else to do.  ``--reports``: without it.
+
+Needs a checkout with the development extras, chromium and chromedriver on PATH, and Pillow.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ FLAGS = (
     "--headless",
     "--no-sandbox",
     "--disable-gpu",
+    "--disable-background-networking",
     "--disable-dev-shm-usage",
     "--hide-scrollbars",
 )
@@ -66,9 +68,23 @@ MATCHED: tuple[tuple[Shot, str], ...] = (
 """And the part of the page that is at the top of the picture."""
 
 
-def main(folder: Path) -> None:
-    """Run the demo, look at its page in flight and after the values are written."""
+def main(folder: Path, *, demo: bool) -> None:
+    """The status page during the demo, if that is wanted, and reports."""
     folder.mkdir(parents=True, exist_ok=True)
+    if demo:
+        _take_demo(folder)
+    with _browser() as browser, tempfile.TemporaryDirectory() as scratch:
+        for command, effects, shot in (
+            ("replay", (), REPORT),
+            ("explain", (TemperatureDrift(x=0.02, y=-0.015, z=0.008),), EXPLAINED),
+        ):
+            browser.get(_report(Path(scratch), command, effects).as_uri())
+            _take(browser, folder, shot)
+        _take_match(browser, folder, _matched(Path(scratch)))
+
+
+def _take_demo(folder: Path) -> None:
+    """Run the demo, look at its page in flight and after the values are written."""
     port = _free_port()
     url = f"http://127.0.0.1:{port}"
     with _demo(port) as demo, _browser() as browser:
@@ -82,14 +98,6 @@ def main(folder: Path) -> None:
         _until(demo, lambda: _trusted(url) > landed + FLOWN_AGAIN_S)
         for shot in WRITTEN:
             _take(browser, folder, shot)
-        with tempfile.TemporaryDirectory() as scratch:
-            for command, effects, shot in (
-                ("replay", (), REPORT),
-                ("explain", (TemperatureDrift(x=0.02, y=-0.015, z=0.008),), EXPLAINED),
-            ):
-                browser.get(_report(Path(scratch), command, effects).as_uri())
-                _take(browser, folder, shot)
-            _take_match(browser, folder, _matched(Path(scratch)))
 
 
 def _report(scratch: Path, verb: str, effects: tuple[Effect, ...]) -> Path:
@@ -212,4 +220,8 @@ def _browser() -> Iterator[webdriver.Chrome]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "pictures")
+    given = [word for word in sys.argv[1:] if word != "--reports"]
+    main(
+        Path(given[0]) if given else Path(__file__).parent / "pictures",
+        demo="--reports" not in sys.argv,
+    )

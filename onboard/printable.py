@@ -24,6 +24,11 @@ def printable(text: str, keep: str = "") -> str:
     )
 
 
+def in_ascii(line: str) -> str:
+    """One line of printable ASCII: ground stations differ in what encoding they expect."""
+    return "".join(c if " " <= c <= "~" or c == "\t" else "?" for c in line)
+
+
 def encodable(data: Any) -> Any:  # noqa: ANN401 - whatever JSON has
     """The same dictionaries, lists and texts, which UTF-8 can say."""
     match data:

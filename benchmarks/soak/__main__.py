@@ -4,8 +4,9 @@ The whole service on an event loop whose clock jumps, with real sockets on loopb
 stands and says what a standing vehicle says; a few times a day it flies a recorded flight.
 Meanwhile, at random, every few minutes: it reboots, falls silent, is heard on another
 port, has its parameters set by others; strangers speak in its name and rubbish; visitors read the
-page, follow it live, or come and say nothing.  Every simulated hour: resident memory, objects,
-descriptors, tasks, bytes on disk; at the end the slope of each with its sigma.
+page, follow it live, or come and say nothing.  Every simulated hour: resident memory, what is held
+of it, objects, descriptors, tasks, bytes on disk; at the end the slope of each with its sigma.
+With ``PYTHONMALLOC=malloc`` what is held is exact (:mod:`benchmarks.soak.allocator`).
 ``python -m benchmarks.soak --hours 168 --flights 2 --rate 1``.
 """
 
@@ -26,6 +27,7 @@ from typing import Any
 from unittest.mock import patch
 
 from benchmarks.daemon import cpu_and_memory, in_a_process, record_landed
+from benchmarks.soak.allocator import held_mb
 from benchmarks.soak.rows import HEAD, Row, judge
 from benchmarks.soak.world import HOUR, World
 from onboard.daemon.process.service import Service
@@ -45,6 +47,7 @@ def measured(service: Service, folder: Path, began: float) -> Row:
     return Row(
         hour=(asyncio.get_running_loop().time() - began) / HOUR,
         memory=cpu_and_memory(os.getpid())[1],
+        held=held_mb(),
         objects=len(gc.get_objects()),
         descriptors=len(os.listdir("/proc/self/fd")),
         tasks=len(asyncio.all_tasks()),

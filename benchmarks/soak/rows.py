@@ -14,10 +14,14 @@ FEWEST = 12
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What the service holds on to now; memory in MB, the disk in kB."""
+    """What the service holds on to now; memory in MB, the disk in kB.
+
+    ``memory`` is resident; of it ``held`` was asked of the allocator and not given back.
+    """
 
     hour: float
     memory: float
+    held: float
     objects: int
     descriptors: int
     tasks: int
@@ -26,14 +30,14 @@ class Row:
 
     def __str__(self) -> str:
         return (
-            f"| {self.hour:.0f} | {self.memory:.1f} | {self.objects:,} | {self.descriptors} "
-            f"| {self.tasks} | {self.disk:.0f} | {self.notices} |"
+            f"| {self.hour:.0f} | {self.memory:.1f} | {self.held:.2f} | {self.objects:,} "
+            f"| {self.descriptors} | {self.tasks} | {self.disk:.0f} | {self.notices} |"
         )
 
 
 HEAD = (
-    "| hour | memory, MB | objects | descriptors | tasks | state, kB | notices |\n"
-    "|---|---|---|---|---|---|---|"
+    "| hour | memory, MB | held, MB | objects | descriptors | tasks | state, kB | notices |\n"
+    "|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -55,10 +59,11 @@ class Slope:
 
 
 def slopes(rows: list[Row]) -> list[Slope]:
-    """Of each column but the notices, which are kept up to a number."""
+    """Of each column that is known but the notices, which are kept up to a number."""
     hours = np.array([row.hour for row in rows])
-    names = ("memory", "objects", "descriptors", "tasks", "disk")
-    return [slope(name, hours, np.array([getattr(row, name) for row in rows])) for name in names]
+    names = ("memory", "held", "objects", "descriptors", "tasks", "disk")
+    columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
+    return [slope(name, hours, x) for name, x in columns.items() if np.isfinite(x).all()]
 
 
 def slope(of: str, hours: NDArray[np.float64], values: NDArray[np.float64]) -> Slope:

@@ -57,6 +57,7 @@ class Explanation:
             files=self.files,
             autopilot=self.source.autopilot,
             duration_s=self.duration_s,
+            damage=self.source.damage,
             samples={
                 "imu": self.source.vehicle.counts.get(f"imu {self.imu}", 0),
                 "gps": self.source.vehicle.counts.get("gps", 0),

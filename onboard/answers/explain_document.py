@@ -134,13 +134,14 @@ class UnseenDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
-    """What was read."""
+    """What was read; ``damage``: what was skipped of damaged files, in sentences."""
 
     files: list[str]
     autopilot: str
     duration_s: float | None
     imu: int
     samples: dict[str, int]
+    damage: list[str] = []
 
 
 class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -180,6 +181,7 @@ def explain_document(
     duration_s: float,
     samples: dict[str, int],
     advice: Advice | None = None,
+    damage: Sequence[str] = (),
 ) -> ExplainDocument:
     """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
     sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
@@ -190,6 +192,7 @@ def explain_document(
             duration_s=finite(duration_s),
             imu=diagnosis.imu,
             samples=samples,
+            damage=list(damage),
         ),
         calibration=calibration_document(diagnosis.calibration, autopilot),
         timing=timing_document(diagnosis.timing),

@@ -86,6 +86,12 @@ class Match:
     frame: Mapping[str, float | list[float]] = field(default_factory=dict)
 
     @property
+    def damage(self) -> list[str]:
+        """What was skipped of damaged files, in sentences."""
+        both = (self.simulation, self.real)
+        return [note for flown in both if flown is not None for note in flown.source.damage]
+
+    @property
     def silent(self) -> bool:
         """Whether the recording says nothing; the vehicle's note says why."""
         return self.vehicle.series is None and self.verdict is Verdict.INSUFFICIENT
@@ -166,12 +172,15 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
     sigma = recording.sensors.force_sigma
-    if kind in COPTERS:
-        return match_copter(flight, recording.signals, airframe, sigma)
-    found = match_plane(flight, plane, sigma)
-    if found is not None:
-        return found
-    why = "it never flew as fast as a plane flies, below the stall"
+    try:
+        if kind in COPTERS:
+            return match_copter(flight, recording.signals, airframe, sigma)
+        found = match_plane(flight, plane, sigma)
+        if found is not None:
+            return found
+        why = "it never flew as fast as a plane flies, below the stall"
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        why = f"its numbers fit no model ({error})"
     return VehicleMatch(kind, not_testable=tuple(NotTestable(n, why) for n in names), note=why)
 
 

@@ -67,10 +67,11 @@ class WindDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class MatchedRecordings(msgspec.Struct, frozen=True, kw_only=True):
-    """Names of the files."""
+    """Names of the files; ``damage``: what was skipped of damaged ones, in sentences."""
 
     simulation: str | None
     real: str
+    damage: list[str] = []
 
 
 class TwiceDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -129,6 +130,7 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
         recordings=MatchedRecordings(
             simulation=None if match.simulation is None else match.simulation.name,
             real=match.real.name,
+            damage=match.damage,
         ),
         verdict=match.verdict.value,
         note=vehicle.note,

@@ -24,7 +24,7 @@ from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.opening import open_recording
-from onboard.recordings.recording import Recording
+from onboard.recordings.recording import Recording, damage_by_file
 
 Progress = Callable[[float], None]
 """Told the share of the work that is done, 0 ... 1, now and then."""
@@ -85,6 +85,11 @@ class Reading:
         """Length of all recordings together, s."""
         return sum(recording.duration_s for recording in self.recordings)
 
+    @property
+    def damage(self) -> list[str]:
+        """What was skipped of damaged files, in sentences."""
+        return damage_by_file(self.recordings)
+
 
 @dataclass(frozen=True, slots=True)
 class Replay:
@@ -132,7 +137,7 @@ class Replay:
                 autopilot=self.autopilot,
                 duration_s=self.duration_s,
                 samples=self.counts,
-                damage=[f"{r.path.name}: {note}" for r in self.recordings for note in r.damage],
+                damage=damage_by_file(self.recordings),
                 notes=[f"{r.path.name}: {note}" for r in self.recordings for note in r.notes]
                 + list(self.notes),
             ),

@@ -81,12 +81,13 @@ class ExplanationResult(Result):
     def __str__(self) -> str:
         d, a = self._explanation.diagnosis, self._explanation.advice
         head = f"{', '.join(self.files)}: accelerometer {d.imu}, {self.duration_s:.0f} s"
+        damage = [f"damage: {note}" for note in self._explanation.source.damage]
         said = [*verdict.missing(d), verdict.proof(d), *verdict.cures(d, a), *verdict.remarks(d)]
         for unclear in d.ambiguous:
             names = " / ".join(title_of(name) for name in unclear.names)
             said.append(f"Not told apart: {names}. To tell: {unclear.tell_apart}.")
         shown = [f"{self.verdict}: {self.headline}", *(f"  {sentence}" for sentence in said)]
-        return "\n".join([head, *shown])
+        return "\n".join([head, *damage, *shown])
 
     def _html(self, base: str) -> str:
         return explanation_html(self._explanation, base)

@@ -12,7 +12,7 @@ from onboard.answers import match_words
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import MatchDocument, match_document
-from onboard.answers.match_files import frame_text, read_frame, settings_text
+from onboard.answers.match_files import checked_frame, frame_text, read_frame, settings_text
 from onboard.answers.replay import Progress
 from onboard.api.accelerometer import Row
 from onboard.api.figures import draw_forces
@@ -20,6 +20,7 @@ from onboard.api.result import Result
 from onboard.api.sources import Source, opened
 from onboard.core.physics.finding import Quantity
 from onboard.errors import RecordingError, UsageError
+from onboard.recordings.recording import because_of
 from onboard.report.files import save
 from onboard.report.match import match_html
 
@@ -100,6 +101,7 @@ class MatchResult(Result):
         against = " against ".join(self.files)
         lines = [
             f"{against}: {self.vehicle}, {self.flight_s:.0f} s in the air",
+            *(f"damage: {note}" for note in self._match.damage),
             f"{self.headline}.",
         ]
         for effect in self._match.effects:
@@ -141,14 +143,15 @@ def match(
         raise UsageError("match takes one recording, or a simulation's and a real one")
     given = opened(recordings)
     simulation = given[0] if len(given) > 1 else None
-    keys = read_frame(frame) if isinstance(frame, str | os.PathLike) else frame
-    try:
-        made = match_recordings(given[-1], simulation, frame=keys, progress=progress)
-    except ValueError as error:
-        raise UsageError(f"frame: no frame of a simulator ({error})") from None
+    if isinstance(frame, str | os.PathLike):
+        keys = read_frame(frame)
+    else:
+        keys = checked_frame(frame or {}, "frame")
+    made = match_recordings(given[-1], simulation, frame=keys, progress=progress)
     vehicle = made.vehicle
     if made.silent:
-        raise RecordingError(f"{made.real.source.recordings[0].path}: {vehicle.note}")
+        path, why = made.real.source.recordings[0].path, because_of(made.damage)
+        raise RecordingError(f"{path}: {vehicle.note}{why}")
     return MatchResult(
         verdict=made.verdict.value,
         headline=match_words.headline(made),

@@ -61,6 +61,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("began_unix_s", NUMBER, "s", "first fix, since 1970, UTC"),
     Column("duration_s", NUMBER, "s", "of the recording"),
     Column("alone", TEXT, "", "why it is not put together with others of its vehicle"),
+    Column("damage", TEXTS, "", "what was skipped of a damaged file"),
     Column("imu", INTEGER, "", "accelerometer, from 1"),
     Column("device_id", INTEGER, "", "INS_ACC*_ID"),
     Column("status", TEXT, "", "calibrated, insufficient, invalid, collecting"),
@@ -168,6 +169,7 @@ def _of_recording(
         "began_unix_s": p.began_unix_s,
         "duration_s": r.duration_s,
         "alone": None if flight is None else flight.why or None,
+        "damage": [note.removeprefix(f"{record.name}: ") for note in r.damage],
     }
 
 

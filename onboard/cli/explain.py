@@ -16,8 +16,9 @@ from onboard.answers.explain import Explanation
 from onboard.answers.explain import explain as explain_recordings
 from onboard.answers.knowledge import seen
 from onboard.answers.words import fixed, percent
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading
-from onboard.cli.replay import STANDARD_OUTPUT, write_bytes, write_json, write_text
+from onboard.cli.replay import write_bytes, write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
@@ -71,6 +72,7 @@ def explain(
     Says what is missing, how sure that is, what to change, and what this flight could not have
     shown.  Nothing is written to any autopilot.
     """
+    refuse_overwriting(logs, json_file, report_file, param_file, mcap_file)
     with reading(logs, then="comparing models") as progress:
         result = explain_recordings(logs, imu=imu, progress=progress)
     if json_file is not None:
@@ -94,6 +96,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     """What a pilot reads in ten seconds, and then the numbers."""
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
+    yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
     if d.verdict is Verdict.INSUFFICIENT:

@@ -20,8 +20,9 @@ from onboard.batches.crew import cores
 from onboard.batches.running import Orders, fly
 from onboard.batches.store import Store
 from onboard.cli.fleet_table import HEAD, lines, vehicle_lines
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import many
-from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.cli.replay import write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.errors import UsageError
 
@@ -125,6 +126,7 @@ def fleet(
     drifts, what has stepped between two flights, and which flights contradict the others.
     """
     files = found(places)
+    refuse_overwriting((path for path, _ in files), json_file, parquet_file)
     _possible(parquet_file, report_folder, store_folder, scheduler)
     orders = Orders(
         processes=jobs or cores(),

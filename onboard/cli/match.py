@@ -17,11 +17,12 @@ from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import match_document
 from onboard.answers.match_files import frame_text, read_frame, settings_text
 from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading, waiting
-from onboard.cli.replay import STANDARD_OUTPUT, write_json, write_text
+from onboard.cli.replay import write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.errors import RecordingError, UsageError
-from onboard.recordings.recording import Recording
+from onboard.recordings.recording import Recording, because_of
 from onboard.recordings.table import open_table
 
 EXAMPLES = """\
@@ -89,16 +90,15 @@ def match(
         raise UsageError("match takes one recording, or a simulation's and a real one")
     if ardupilot is not None and not verifies:
         raise UsageError("--ardupilot is for --verify")
+    read = (*logs, given_frame, columns_file)
+    refuse_overwriting(read, json_file, report_file, param_file, frame_file)
     frame = None if given_frame is None else read_frame(given_frame)
     opened = [_opened(log, columns_file) for log in logs]
     simulation = opened[0] if len(logs) == TWO else None
-    try:
-        with reading(logs, then="comparing vehicles") as progress:
-            result = match_recordings(opened[-1], simulation, frame=frame, progress=progress)
-    except ValueError as error:
-        raise UsageError(f"{given_frame}: no frame of a simulator ({error})") from None
+    with reading(logs, then="comparing vehicles") as progress:
+        result = match_recordings(opened[-1], simulation, frame=frame, progress=progress)
     if result.silent:
-        raise RecordingError(f"{logs[-1]}: {result.vehicle.note}")
+        raise RecordingError(f"{logs[-1]}: {result.vehicle.note}{because_of(result.damage)}")
     verified = None
     if verifies:
         # The simulator only when it is wanted.
@@ -145,6 +145,7 @@ def summary(result: Match) -> Iterator[RenderableType]:
     if result.simulation is not None:
         names.insert(0, result.simulation.name)
     yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
+    yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
     if result.effects:
         yield from ("", _effects(result))

@@ -7,13 +7,11 @@ from pathlib import Path
 import click
 
 from onboard.answers.calibrated import calibrated
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading
 from onboard.cli.table import replay_report
 from onboard.cli.terminal import Terminal
 from onboard.report.files import save
-
-STANDARD_OUTPUT = "-"
-
 
 EXAMPLES = """\
 \b
@@ -64,6 +62,7 @@ def replay(
     contradict each other are named, not averaged.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
+    refuse_overwriting(logs, json_file, report_file, param_file, mcap_file)
     with reading(logs, then="comparing models") as progress:
         watched = report_file is not None or mcap_file is not None
         made = calibrated(logs, imu=imu, watched=watched, progress=progress)

@@ -59,8 +59,9 @@ def run(
     this machine and write only when the vehicle is disarmed.
     """
     from onboard.daemon.setup import configuration, secret_files, settings
+    from onboard.toml_file import read_toml
 
-    document = {} if config is None else configuration.read(Path(config))
+    document = {} if config is None else read_toml(Path(config))
     for section, key, value in (
         ("link", "endpoints", list(endpoints)),
         ("state", "directory", state),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from urllib.parse import urlsplit
 import click
 
 from onboard.errors import LinkError, RefusedError, UsageError
+from onboard.printable import printable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -22,18 +24,25 @@ if TYPE_CHECKING:
 
 TIMEOUT_S = 10.0
 WATCH_INTERVAL_S = 1.0
+LONGEST = 16_000_000
+"""bytes of an answer; a snapshot has some hundred thousand."""
 
 
 class Client:
     """The daemon's control API, one short connection per request."""
 
     def __init__(self, url: str, token: str | None) -> None:
-        parts = urlsplit(url)
-        if parts.scheme != "http" or not parts.hostname:
+        try:
+            parts = urlsplit(url)
+            host, port = parts.hostname, parts.port or 80
+        except ValueError:  # brackets that do not close, a port that is none
+            host, port = None, 0
+        # Spaces and control characters would be sent as they are.
+        if host is None or parts.scheme != "http" or not re.fullmatch(r"[\w.:%-]+", host):
             raise UsageError(f"{url}: expected http://HOST:PORT")
         self._url = url
-        self._host = parts.hostname
-        self._port = parts.port or 80
+        self._host = host
+        self._port = port
         self._token = token
 
     def snapshot(self) -> Snapshot:
@@ -46,9 +55,10 @@ class Client:
 
         from onboard.daemon.view.snapshot import Snapshot
 
+        answer = self._request("GET", "/api/snapshot", b"")
         try:
-            return Snapshot.from_json(self._request("GET", "/api/snapshot", b""))
-        except msgspec.DecodeError as error:
+            return Snapshot.from_json(answer)
+        except (msgspec.DecodeError, ValueError, RecursionError) as error:
             raise LinkError(
                 f"{self._url}: not the onboard service of this version: {error}"
             ) from None
@@ -58,14 +68,22 @@ class Client:
 
         Raises:
             RefusedError: the daemon will not, and says why.
-            LinkError: nobody answers there.
+            LinkError: nobody answers there, or it is not the daemon.
         """
         import msgspec
 
         answer = self._request(
             "POST", f"/api/{action}", msgspec.json.encode({"imus": imus, **more})
         )
-        return str(msgspec.json.decode(answer)["done"])
+        try:
+            done = msgspec.json.decode(answer, type=dict[str, Any]).get("done")
+            if not isinstance(done, str):
+                raise ValueError("its answer does not say what was done")  # noqa: TRY004, TRY301
+        except (msgspec.DecodeError, ValueError, RecursionError) as error:
+            raise LinkError(
+                f"{self._url}: not the onboard service of this version: {error}"
+            ) from None
+        return printable(done)
 
     def _request(self, method: str, path: str, body: bytes) -> bytes:
         headers = {"Content-Type": "application/json"}
@@ -75,7 +93,7 @@ class Client:
         try:
             connection.request(method, path, body, headers)
             response = connection.getresponse()
-            answer = response.read()
+            answer = response.read(LONGEST)
         except (OSError, http.client.HTTPException) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise LinkError(f"{self._url}: no onboard service answers: {reason}") from None
@@ -91,7 +109,7 @@ def _reason(status: int, answer: bytes) -> str:
 
     try:
         return str(msgspec.json.decode(answer)["error"]["message"])
-    except (msgspec.DecodeError, KeyError, TypeError):
+    except (msgspec.DecodeError, KeyError, TypeError, ValueError, RecursionError):
         return f"the service answered with status {status}"
 
 

@@ -203,7 +203,6 @@ class ParameterClient:
             ValueError: the value is not finite or does not fit a float32.
         """
         wanted = to_float32(value)
-        self._exchanges.pop(name, None)
         phase = _Phase.SETTING if before is None else _Phase.CHECKING
         exchange = _Exchange(name, phase, self._settings.attempts, wanted, before)
         self._exchanges[name] = exchange

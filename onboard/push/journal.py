@@ -131,6 +131,7 @@ class Journal:
         """
         line = self._line(entry, at)
         try:
+            self._refuse_another()
             if self._torn:  # the disk was full in the middle of a line: start a clean one
                 os.ftruncate(self._fd, self._size)
             self._torn = True
@@ -219,6 +220,24 @@ class Journal:
                 if isinstance(e, ReadBack) and e.saved and e.value == wanted.get(e.name)
             ),
         )
+
+    def _refuse_another(self) -> None:
+        """The next start reads what is at the path, which is to be the file that is open.
+
+        It is not any more where somebody has put the directory elsewhere, or an older state back.
+
+        Raises:
+            StateError: something else is there, or nothing.
+            OSError: it cannot be seen.
+        """
+        try:
+            same = os.path.samestat(os.fstat(self._fd), self._path.stat())
+        except FileNotFoundError:
+            same = False
+        if not same:
+            raise StateError(
+                f"{self._path}: is not the journal that was opened; restart the service"
+            )
 
     def _open(self) -> int:
         fd = os.open(self._path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)

@@ -23,7 +23,7 @@ from onboard.recordings.dataflash_records import (
     record_times,
 )
 from onboard.recordings.dataflash_walk import MAGIC
-from onboard.recordings.recording import Recording, damage_notes, elapsed_s
+from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 
 BLOCK = 4096
 """Records converted at a time: bounds the memory, whatever the length of the log [cost]."""
@@ -47,9 +47,11 @@ def open_dataflash(path: Path) -> Recording:
     index = index_dataflash(data, WANTED)
     usable = _usable_slots(index)
     imu_slots = [k for k in usable if index.formats[k].name in IMU_NAMES]
+    damage = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
     if not np.isin(index.slots, imu_slots).any():
         raise RecordingError(
             f"{path}: a DataFlash log without inertial records (IMU) that have a time"
+            f"{because_of(damage)}"
         )
     t = _times(index, imu_slots)
     with np.errstate(all="ignore"):  # damaged bytes make any number
@@ -65,7 +67,7 @@ def open_dataflash(path: Path) -> Recording:
         duration_s=elapsed_s(t),
         counts=index.counts(),
         read=read,
-        damage=damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes),
+        damage=damage,
     )
 
 

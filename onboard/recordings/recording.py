@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -47,6 +47,16 @@ def elapsed_s(t: NDArray[np.float64]) -> float:
     """Time that a clock ``t`` (n,) counted, s: restarts and impossible steps add nothing."""
     steps = np.diff(t)
     return float(steps[(steps > 0.0) & (steps < LONGEST_GAP_S)].sum())
+
+
+def damage_by_file(recordings: Sequence[Recording]) -> list[str]:
+    """What was skipped of each recording, with the name of its file before it."""
+    return [f"{r.path.name}: {note}" for r in recordings for note in r.damage]
+
+
+def because_of(damage: Iterable[str]) -> str:
+    """What to add to the reason why a file cannot be used; empty of one that is whole."""
+    return "".join(f"; {note}" for note in damage)
 
 
 def damage_notes(places: int, skipped: int, cut_off: int) -> tuple[str, ...]:

@@ -44,11 +44,15 @@ from onboard.recordings.table_map import TableMap, load_map
 DELIMITERS = ",;\t"
 FEWEST_ROWS = 20
 EARTH_RADIUS_M = 6_371_000.0
+LONGEST_HEAD = 1_000_000
+"""Characters of the names of all columns."""
 SLOPE_S = 0.1
 """Span over which a position becomes a velocity, s: longer than the noise of motion capture,
 shorter than a manoeuvre."""
 TURN_S = 0.02
 """Span over which an attitude becomes rates, s, where there is no gyroscope."""
+LONGEST_S = 3.2e7
+"""What lasts longer is no flight, but a cell that is no time."""
 SMALLEST = 1e-6
 """Length of a quaternion that is none."""
 NO_NUMBERS = ("", "nan", "null", "none", "na")
@@ -72,8 +76,9 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     path, chosen = Path(path), load_map(columns)
     wanted = list(dict.fromkeys(c for q in chosen.quantities.values() for c in q.columns))
     cells = _read(path, wanted)
-    tracks = _tracks(path, cells, chosen)
-    samples = _samples(tracks, chosen)
+    with np.errstate(all="ignore"):  # a cell may hold any number
+        tracks = _tracks(path, cells, chosen)
+        samples = _samples(tracks, chosen)
     counts = {name: len(track.t) for name, track in tracks.items()}
     return Recording(
         path,
@@ -90,9 +95,11 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
 
 def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
     """The wanted columns, NaN where a cell holds no number."""
+    if path.exists() and not path.is_file():
+        raise RecordingError(f"{path}: is not a regular file")
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            head = file.readline().lstrip("# ")
+            head = file.readline(LONGEST_HEAD).lstrip("# ")
             delimiter = max(DELIMITERS, key=head.count)
             names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter), [])]
             missing = [name for name in wanted if name not in names]
@@ -146,9 +153,11 @@ def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, 
     # The clock starts at zero: nanoseconds since 1970 would leave no digits for a difference.
     zero = min(float(track.t[0]) for track in out.values() if len(track.t))
     out = {name: Track(track.t - zero, track.x) for name, track in out.items()}
+    where = ", ".join(clock.columns)
     if float(np.median(np.diff(out["force"].t))) > 1.0:
-        where = ", ".join(clock.columns)
         raise RecordingError(f"{path}: rows over a second apart; is the unit of {where} right?")
+    if max(float(track.t[-1]) for track in out.values() if len(track.t)) > LONGEST_S:
+        raise RecordingError(f"{path}: a flight of more than a year by {where}")
     return out
 
 
@@ -268,7 +277,7 @@ def _slope(t: Array, p: Array) -> tuple[Array, Array]:
 
 def _thinned(t: Array, rate: float) -> NDArray[np.intp]:
     """Indices of samples at no more than a rate (Hz)."""
-    slot = np.floor((t - t[0]) * rate + 1e-6).astype(np.int64)
+    slot = np.floor((t - t[0]) * rate + 1e-6)
     return np.flatnonzero(np.concatenate([[True], np.diff(slot) > 0]))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,10 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.errors import ConfigurationError
+from onboard.toml_file import read_toml
 
+LARGEST = 1e9
+"""Of any unit that a map has; infinity is none."""
 DEGREE = float(np.pi) / 180.0
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
@@ -106,13 +108,7 @@ def load_map(path: str | Path) -> TableMap:
     Raises:
         ConfigurationError: it cannot be read or makes no sense; names file and key.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-        found = tomllib.loads(text)
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{path}: no TOML ({error})") from None
+    found = read_toml(Path(path))
     try:
         return table_map(found)
     except ValueError as error:
@@ -222,7 +218,7 @@ def _flag(found: Mapping[str, Any], key: str, where: str) -> bool:
 
 def _number(found: Mapping[str, Any], key: str, default: float, where: str) -> float:
     value = found.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise ValueError(f"{where}{key} must be a number")
     return float(value)
 

@@ -31,7 +31,7 @@ from onboard.recordings.packet_columns import (
     payloads,
 )
 from onboard.recordings.packets import Unpacker
-from onboard.recordings.recording import Recording, damage_notes, elapsed_s
+from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 from onboard.recordings.tlog_index import Bytes, TlogIndex, index_tlog
 
 Source = tuple[int, int]
@@ -99,7 +99,8 @@ def open_tlog(path: Path) -> Recording:
         data = mmap(file.fileno(), 0, access=ACCESS_READ)
     index = index_tlog(data, WANTED)
     vehicles = _vehicles(index)
-    source, notes = _choose(vehicles, path)
+    damage = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
+    source, notes = _choose(vehicles, path, damage)
     vehicle = vehicles[source]
 
     def read() -> Iterator[Sample]:
@@ -112,7 +113,7 @@ def open_tlog(path: Path) -> Recording:
         duration_s=vehicle.duration_s,
         counts={mavlink.mavlink_map[kind].msgname: n for kind, n in sorted(vehicle.counts.items())},
         read=read,
-        damage=damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes),
+        damage=damage,
         notes=notes,
     )
 
@@ -163,12 +164,15 @@ def _vehicle(data: Octets, offsets: Integers, head: Headers) -> _Vehicle:
     )
 
 
-def _choose(vehicles: dict[Source, _Vehicle], path: Path) -> tuple[Source, tuple[str, ...]]:
+def _choose(
+    vehicles: dict[Source, _Vehicle], path: Path, damage: tuple[str, ...]
+) -> tuple[Source, tuple[str, ...]]:
     """The autopilot with most inertial data, and what to say about the others."""
     flying = {s: v for s, v in vehicles.items() if v.imu_messages}
     if not flying:
         raise RecordingError(
             f"{path}: no inertial messages (RAW_IMU, HIGHRES_IMU, SCALED_IMU2) in it"
+            f"{because_of(damage)}"
         )
     ranked = sorted(
         flying,

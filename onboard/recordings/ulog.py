@@ -25,7 +25,7 @@ from onboard.core.inputs.samples import (
 )
 from onboard.errors import RecordingError
 from onboard.recordings.bulk import no_collection, samples_of
-from onboard.recordings.recording import Recording, damage_notes, elapsed_s
+from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 from onboard.recordings.ulog_index import Records, Topic, UlogIndex, columns_of, index_ulog
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ def open_ulog(path: Path) -> Recording:
     ]
     inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
-        why = "".join(f"; {damage}" for damage in damage_of(index))
+        why = because_of(damage_of(index))
         raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
 
     def read() -> Iterator[Sample]:

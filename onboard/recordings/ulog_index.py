@@ -12,6 +12,7 @@ import struct
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from mmap import mmap
 from typing import Any
 
@@ -20,17 +21,19 @@ from numpy.typing import NDArray
 
 from onboard.errors import RecordingError
 from onboard.recordings.pace import Pace, chain
+from onboard.recordings.ulog_messages import LONGEST_KEY, PASSED_BY, is_name
 from onboard.recordings.ulog_types import Layout, Types
 
 Bytes = bytes | mmap
 Records = NDArray[np.void]
 
 MAGIC = b"ULog\x01\x12\x35"
-SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 HEADER_LENGTH = 16
 KINDS = frozenset(b"BFIMPQARDLCSO")
 LONGEST_UNKNOWN = 10000
 """bytes; a message of a kind that nobody knows and that is longer is damage."""
+MOST_IN_A_ROW = 4
+"""Messages of kinds that nobody knows, one after the other."""
 MOST_PARAMETERS = 20_000
 """PX4 has some 2000."""
 UNFOLDED = 32
@@ -89,7 +92,7 @@ class _Walk:
         self._defining = True
         self._time = 0
         self._jumps: list[int] = []
-        self._sync = 0
+        self._wasted = 0
         self._handlers: dict[int, Callable[[int, int], bool]] = {
             ord("D"): self._record,
             ord("F"): self._type,
@@ -98,6 +101,8 @@ class _Walk:
             ord("O"): self._dropout,
             ord("B"): self._flags,
         }
+        passed = {kind: partial(check, data) for kind, check in PASSED_BY.items()}
+        self._handlers |= passed
 
     def run(self) -> None:
         data, end = self.data, len(self.data)
@@ -105,7 +110,7 @@ class _Walk:
         whole = True
         index, pace = self.index, Pace()
         while at + _HEAD.size <= end:
-            if pace.strides(at):
+            if whole and pace.strides(at):
                 last = self._jumps[0] if self._jumps else end
                 stop = min(at + pace.length, last)
                 following = self._stride(at, stop, last)
@@ -118,15 +123,14 @@ class _Walk:
             if self._jumps and stop > self._jumps[0]:
                 at = max(at, self._jumps.pop(0))
                 continue
-            if kind in KINDS and stop <= end:
-                handler = self._handlers.get(kind)
-                good = handler is None or handler(body, stop)
-                following = stop
+            if kind in KINDS and stop <= end and (whole or self._sure(body, kind, stop)):
+                following, good = stop, self._handlers[kind](body, stop)
             else:
-                following, good = self._resume(at, size, kind, end)
-                if good and following == end < stop:
-                    index.cut_off_bytes += end - at
+                following, good = stop, whole and kind not in KINDS and self._is_new(at)
+            if not good and whole and stop > end and self._begins(at):
+                break
             if not good:
+                following = self._resume(at, kind, stop)
                 index.damaged_places += whole
                 index.skipped_bytes += following - at
             at, whole = following, good
@@ -153,17 +157,44 @@ class _Walk:
                 self._time = max(self._time, int(self._stamps[its + topic.layout.timestamp].max()))
         return int(following[taken[-1]])
 
-    def _resume(self, at: int, size: int, kind: int, end: int) -> tuple[int, bool]:
-        """Where to go on after a message that is none, and whether it may be of a new kind."""
-        stop = at + _HEAD.size + size
-        if 0 <= self._sync <= at:
-            self._sync = self.data.find(SYNC, at + 1)
-        plausible = bool(kind) and 0 < size <= LONGEST_UNKNOWN and stop <= end
-        if self._sync >= 0 and (not plausible or self._sync < stop):
-            return self._sync + len(SYNC), False
-        if plausible:
-            return stop, True
-        return (end, True) if kind in KINDS and size else (at + 1, False)
+    def _resume(self, at: int, kind: int, stop: int) -> int:
+        """Where to look after what is no message: at the next byte, whatever its length says.
+
+        Only types are read to their end before they are refused; so that this costs no more than
+        the file is long, bytes that have been read in vain are left out from then on.
+        """
+        if kind == ord("F") and self._wasted > len(self.data) >= stop:
+            return stop
+        return at + 1
+
+    def _begins(self, at: int) -> bool:
+        """Whether a message begins there that may be one, as far as its head says."""
+        if at + _HEAD.size + 2 > len(self.data):
+            return True
+        size, kind = _HEAD.unpack_from(self.data, at)
+        if kind != ord("D"):
+            return kind in KINDS and size > 0
+        number = int(self._words[at + _HEAD.size])
+        return bool(self._least[number] <= size <= self._most[number])
+
+    def _sure(self, body: int, kind: int, stop: int) -> bool:
+        """Whether a message behind damage is followed by one; those that are taken prove it."""
+        if kind == ord("D") and stop - body > 1 and int(self._words[body]) in self._topic_of:
+            return True
+        return self._begins(stop)
+
+    def _is_new(self, at: int) -> bool:
+        """Whether it is a message of a kind that is newer than this: one that is known follows."""
+        for _ in range(MOST_IN_A_ROW + 1):
+            if at + _HEAD.size > len(self.data):
+                return at == len(self.data)
+            size, kind = _HEAD.unpack_from(self.data, at)
+            if kind in KINDS:
+                return self._begins(at)
+            if not kind or not 0 < size <= LONGEST_UNKNOWN:
+                return False
+            at += _HEAD.size + size
+        return False
 
     def _record(self, body: int, stop: int) -> bool:
         if stop - body < 2:
@@ -181,14 +212,18 @@ class _Walk:
         return True
 
     def _type(self, body: int, stop: int) -> bool:
-        return self._types.learn(bytes(self.data[body:stop]))
+        good = self._types.learn(bytes(self.data[body:stop]))
+        self._wasted += 0 if good else stop - body
+        return good
 
     def _subscription(self, body: int, stop: int) -> bool:
-        self._defining = False
         if stop - body < 4:
             return False
         instance, number = struct.unpack_from("<BH", self.data, body)
-        name = bytes(self.data[body + 3 : min(stop, body + 80)]).decode("ascii", "replace")
+        text = bytes(self.data[body + 3 : min(stop, body + 3 + LONGEST_KEY + 1)])
+        if not is_name(text):
+            return False
+        self._defining, name = False, text.decode("ascii")
         self._topic_of.pop(number, None)
         self._others.add(number)
         self._least[number], self._most[number] = 2, 65535

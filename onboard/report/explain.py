@@ -35,6 +35,7 @@ def explain_html(
     autopilot: str,
     duration_s: float,
     advice: Advice | None,
+    damage: Sequence[str] = (),
     base: str = PAGE,
 ) -> str:
     """The page of one diagnosis.
@@ -45,6 +46,7 @@ def explain_html(
         autopilot: where the recordings are from.
         duration_s: length of the recordings, s.
         advice: which of ArduPilot's parameters to set; None for another autopilot.
+        damage: what was skipped of damaged recordings, in sentences.
         base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
@@ -56,6 +58,7 @@ def explain_html(
         TEMPLATE,
         base,
         files=list(files),
+        damage=list(damage),
         autopilot=autopilot,
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
@@ -98,6 +101,7 @@ def explanation_html(result: Explanation, base: str = PAGE) -> str:
         autopilot=result.source.autopilot,
         duration_s=result.duration_s,
         advice=result.advice,
+        damage=result.source.damage,
         base=base,
     )
 

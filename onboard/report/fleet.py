@@ -151,6 +151,10 @@ def _flight(f: Flight, pages: Mapping[str, str]) -> dict[str, Any]:
         "minutes": f"{(f.record.document.recording.duration_s or 0.0) / 60.0:.1f}",
         "imus": imus,
         "why": f.why,
+        # Behind the name of the file, which is there already.
+        "damage": [
+            x.removeprefix(f"{f.record.name}: ") for x in f.record.document.recording.damage
+        ],
     }
 
 

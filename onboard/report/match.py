@@ -62,6 +62,7 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         TEMPLATE,
         base,
         files=[r.name for r in (match.simulation, match.real) if r is not None],
+        damage=match.damage,
         against=_against(match),
         vehicle=v.vehicle,
         seconds=words.fixed(v.seconds, 0),

@@ -22,6 +22,7 @@ from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.core.physics.catalogue import title_of
 from onboard.errors import UsageError
+from onboard.printable import in_ascii
 
 REAL32 = 9
 ULOG = "ulog"
@@ -172,7 +173,7 @@ def _tabbed(change: Change) -> str:
 
 
 def _text(lines: Iterable[str]) -> str:
-    return "".join(_plain(line) + "\n" for line in lines)
+    return "".join(in_ascii(line) + "\n" for line in lines)
 
 
 def _six(advice: Advice) -> Iterator[Change]:
@@ -198,8 +199,3 @@ def _cures(diagnosis: Diagnosis, advice: Advice) -> Iterator[Change]:
         for name, value in effect.parameters.items():
             reason = f"{effect.name}: {title_of(effect.name)}"
             yield Change(advice.names.get(name, name), value, reason, withheld)
-
-
-def _plain(line: str) -> str:
-    """One line of printable ASCII: ground stations differ in what encoding they expect."""
-    return "".join(c if " " <= c <= "~" or c == "\t" else "?" for c in line)

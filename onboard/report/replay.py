@@ -20,6 +20,7 @@ from onboard.answers.verdict import LACKING, about_six
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
 from onboard.core.maths.accelerometer import parameter_names
+from onboard.recordings.recording import damage_by_file
 from onboard.report.chart import pair_bar, share_bar
 from onboard.report.flight_rows import flight_rows
 from onboard.report.page import PAGE, render
@@ -81,7 +82,7 @@ def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
         duration=words.fixed(result.duration_s, 0),
         status=worst.value,
         headline=headline,
-        damage=[f"{r.path.name}: {n}" for r in result.recordings for n in r.damage],
+        damage=damage_by_file(result.recordings),
         notes=[f"{r.path.name}: {n}" for r in result.recordings for n in r.notes]
         + [n for n in result.notes if n not in common],
         trust_chart=trust_chart(chronicle),

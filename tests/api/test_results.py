@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import re
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import onboard
+from onboard import api
 from onboard.cli.main import run
 from onboard.errors import OnboardError, RecordingError, UsageError
 from tests.api.conftest import TRUTH
@@ -209,3 +211,28 @@ def test_a_frame_and_a_recording_that_cannot_be_used_are_named(tmp_path):
         onboard.match(path, frame={"mass": "x"})
     with pytest.raises(RecordingError, match=r"short\.BIN"):
         onboard.match(path)
+
+
+def test_numbers_that_no_model_fits_are_an_error_with_a_name(asked, monkeypatch):
+    def singular(*_args):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("onboard.answers.match.match_copter", singular)
+    with pytest.raises(RecordingError, match=r"flight\.tlog: its numbers fit no model"):
+        api.match(asked.path)
+
+
+def test_every_answer_says_what_was_skipped_of_its_recording(asked, tmp_path):
+    data = asked.path.read_bytes()
+    path, middle = tmp_path / "hurt.tlog", len(data) // 2
+    path.write_bytes(data[:middle] + random.Random(7).randbytes(3000) + data[middle:-7])
+    for ask in (api.explain, api.match):
+        result = ask(path)
+        document = result.to_dict()
+        place = "recording" if ask is api.explain else "recordings"
+        told, cut = document[place]["damage"]
+        assert told.startswith("hurt.tlog: 1 damaged place, 30")
+        assert "cut off" in cut
+        for sentence in (told, cut):
+            assert f"damage: {sentence}" in str(result)
+            assert sentence in Page.of(result._repr_html_()).words

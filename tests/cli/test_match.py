@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from onboard.answers.match_files import settings_text
 from onboard.cli.main import run
 from onboard.core.vehicle.airframe import CopterAirframe
 from tests.recordings.dataflash_writer import modern_log
+from tests.report.matches_by_hand import by_hand
 
 
 @pytest.fixture
@@ -35,7 +37,23 @@ def test_three_recordings_are_one_too_many(log, capsys):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), [("{", "no JSON"), ("[1]", "no JSON object"), ('{"mass": "x"}', "mass")]
+    ("content", "said"),
+    [
+        ("{", "no JSON"),
+        ("[1]", "no JSON object"),
+        ("[" * 100_000, "no JSON"),
+        ("9" * 5000, "no JSON"),
+        ('{"mass": "x"}', "mass"),
+        ('{"mass": NaN}', "mass is too large"),
+        ('{"mdrag_coef": -1e999}', "mdrag_coef is too large"),
+        ('{"battCapacityAh": ' + "9" * 400 + "}", "battCapacityAh is too large"),
+        ('{"mass": 0}', "mass must be positive"),
+        ('{"refAngle": 120}', "nothing flies with these numbers"),
+        ('{"refSpd": 1e-300}', "refSpd is too small"),
+        ('{"mass": 1e30}', "mass is too large"),
+        ('{"refAngle": 90.5, "mdrag_coef": 1}', "nothing flies with these numbers"),
+        ('{"x": "' + "y" * 1_000_000 + '"}', "longer than"),
+    ],
 )
 def test_a_frame_that_cannot_be_used_is_named(log, tmp_path, capsys, content, said):
     frame = tmp_path / "frame.json"
@@ -44,6 +62,18 @@ def test_a_frame_that_cannot_be_used_is_named(log, tmp_path, capsys, content, sa
     message = failed(capsys)
     assert said in message
     assert "frame.json" in message
+
+
+def test_a_frame_that_has_no_end_is_not_read_to_it(log, capsys):
+    assert run(["match", str(log), "--frame", "/dev/zero"]) == 2
+    assert "longer than" in failed(capsys)
+
+
+def test_a_name_with_an_end_of_a_line_sets_nothing():
+    text = settings_text(by_hand("flight\nINS_ACCSCAL_X,9.9\r\u2028ARMING_CHECK,0 \u00e4.BIN"))
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    assert lines == ["SIM_WIND_SPD,5"]
+    assert text.isascii()
 
 
 @pytest.mark.recordings
@@ -62,7 +92,7 @@ def test_a_flight_in_wind_with_another_frame_as_the_nominal_one(recordings, tmp_
     assert max(map(len, out.splitlines())) <= 80
     document = json.loads(answer.read_text())
     assert document["schema"] == "onboard.match/1"
-    assert document["recordings"] == {"simulation": None, "real": "e02.BIN"}
+    assert document["recordings"] == {"simulation": None, "real": "e02.BIN", "damage": []}
     # What differs from *this* frame: the drag, too.
     assert {e["name"] for e in document["effects"]} == {"wind", "rotor_drag", "body_drag"}
     assert document["wind"]["north"] == pytest.approx(-3.0, abs=0.15)
@@ -86,7 +116,11 @@ def test_two_recordings_differ_only_in_what_differs(recordings, tmp_path):
     answer = tmp_path / "a.json"
     assert run(["match", str(simulation), str(real), "--json", str(answer)]) == 0
     document = json.loads(answer.read_text())
-    assert document["recordings"] == {"simulation": "e03.BIN", "real": "e11.BIN"}
+    assert document["recordings"] == {
+        "simulation": "e03.BIN",
+        "real": "e11.BIN",
+        "damage": [],
+    }
     found = {e["name"]: e for e in document["effects"]}
     assert set(found) == {"gps_latency", "rotor_drag", "body_drag"}
     value = found["rotor_drag"]["values"]["mcoef"]

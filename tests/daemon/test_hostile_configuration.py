@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from onboard.cli.main import run as onboard
 from onboard.daemon.setup import configuration, settings
-from onboard.daemon.setup.configuration import LONGEST_FILE
 from onboard.daemon.setup.secret_files import read_secret
 from onboard.errors import ConfigurationError, OnboardError
+from onboard.toml_file import LONGEST_FILE, read_toml
 
 HOSTILE = {
     "nested lists": "a = " + "[" * 3000 + "]" * 3000,
@@ -112,7 +112,7 @@ def test_an_endless_secret_is_not_read_to_its_end():
     with pytest.raises(ConfigurationError, match="token_file"):
         read_secret(str(endless), key="[http] token_file")
     with pytest.raises(ConfigurationError, match="/dev/zero"):
-        configuration.read(endless)
+        read_toml(endless)
 
 
 names = st.sampled_from(

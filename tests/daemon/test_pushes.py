@@ -1,6 +1,8 @@
 """What the daemon writes over real UDP to a vehicle that stands still, and what it does not."""
 
 import asyncio
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -196,3 +198,29 @@ async def test_a_clock_that_is_set_in_the_middle_of_a_push_changes_nothing(
         await until(lambda: service.parts.parameters.complete)
         assert service.snapshot().push.can_roll_back == (1,)
         assert service.parts.journal.damaged == 0
+
+
+def put_elsewhere(directory, place):
+    shutil.copytree(directory, place)
+    shutil.rmtree(directory)
+    directory.symlink_to(place)
+
+
+async def test_a_state_directory_that_is_put_elsewhere_meanwhile_stops_pushes_until_a_restart(
+    document, daemon, port, tmp_path
+):
+    """What the next start would not know of is not begun, and nothing of the vehicle is changed."""
+    directory = Path(document["state"]["directory"])
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.handover.identified)
+        before = in_force(vehicle)
+        put_elsewhere(directory, tmp_path / "elsewhere")
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().counters.get("journal_failed", 0) > 0)
+        await asyncio.sleep(1.0)
+        assert vehicle.sets == []
+        assert in_force(vehicle) == before
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert pushed(vehicle)

@@ -55,6 +55,27 @@ async def test_only_the_newest_are_kept(tmp_path, monkeypatch):
     assert other.exists()
 
 
+async def test_a_clock_that_is_set_back_by_a_day_costs_none_of_the_newest(tmp_path, monkeypatch):
+    """Of a computer without a clock of its own: what was recorded before is of tomorrow."""
+    for number in range(5):
+        tomorrow = tmp_path / f"19700102-000000-{number:03d}.tlog"
+        tomorrow.write_bytes(b"x")
+        os.utime(tomorrow, (86_400.0 + number, 86_400.0 + number))
+    others = tmp_path / "somebody's own.tlog"
+    others.write_bytes(b"x")
+    os.utime(others, (0, 0))
+    line = 8 + len(FRAME)
+    files = await record(
+        tmp_path, frames=40, file_bytes=10 * line, keep=4, per_flush=5, monkeypatch=monkeypatch
+    )
+    assert others in files
+    ours = [file for file in files if file != others]
+    assert len(ours) == 4
+    # All that was recorded but for what four files do not hold, in the order of their names.
+    assert sum(file.stat().st_size for file in ours) >= 3 * 10 * line
+    assert all(file.read_bytes() != b"x" for file in ours)
+
+
 async def test_a_directory_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StateError):

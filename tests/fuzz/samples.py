@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import msgspec
@@ -14,6 +16,8 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.daemon.learning.flight import Judged, JudgedFlight, encode
 from onboard.daemon.learning.store import Store
 from onboard.daemon.view.history import Kept, Ring, Row
@@ -37,6 +41,7 @@ from tests.daemon.daemons import calibration
 from tests.mavlink.mavlink_peer import attitude, heartbeat, raw_imu
 from tests.push.pushing import make_plan
 from tests.recordings.dataflash_writer import modern_log, old_log
+from tests.recordings.table_writer import MAP, MOTORS
 from tests.recordings.telemetry_writer import px4_log, telemetry
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,6 +88,31 @@ TOML_TOKENS = (
     b"[link]", b"[http]", b"inf", b"-inf", b"nan", b"1e999", b"0x", b"[", b"]", b"{", b"}", b'"""',
     b"\\u0000", b"'", b"=", b".", b"\n", b"9" * 400, b"1979-05-27", b"udpin:", b"[::1]:",
 )  # fmt: skip
+FRAMES = (
+    json.dumps(asdict(CopterAirframe())).encode(),
+    json.dumps(asdict(PlaneAirframe())).encode(),
+    b'{"mass": 2.5, "moment_of_inertia": [1, 2, 3], "mdrag_coef": 0}',
+)
+MAP_ENDS = b"\n=====\n"
+"""Between a column map and its table."""
+
+
+def _table() -> bytes:
+    rows = [
+        {"t_ms": 40.0 * k, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.01 * k, "ax": 0.0, "ay": 0.1}
+        | {"az": 1.0, "gx": 0.0, "gy": 0.0, "gz": 1.0, "ve": 0.1 * k, "vn": 0.0, "vu": 0.0}
+        | {"e": 0.002 * k * k, "n": 0.0, "u": 1.0, "m1": 1500, "m2": 1500, "m3": 1500, "m4": 1500}
+        | {"mv": 12000}
+        for k in range(60)
+    ]
+    head = ",".join(rows[0])
+    return "\n".join([head, *(",".join(map(str, row.values())) for row in rows)]).encode()
+
+
+TABLES = (
+    MAP.encode() + MAP_ENDS + _table(),
+    (MAP + MOTORS).encode() + MAP_ENDS + _table(),
+)
 SECRETS = (b"open sesame\n", b"\n", "wörter\r\nzwei".encode())
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -17,7 +18,10 @@ from zlib import crc32
 import msgspec
 
 from onboard.answers.chronicle import Chronicle
+from onboard.answers.match_files import read_frame
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.daemon.learning.flight import decode, encode
 from onboard.daemon.learning.store import Store
 from onboard.daemon.mqtt.commands import Commands
@@ -29,6 +33,7 @@ from onboard.daemon.setup import configuration, secret_files, settings
 from onboard.daemon.view.history import History
 from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.notices import Notices
+from onboard.errors import UsageError
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import mavlink, message_ids
@@ -36,6 +41,7 @@ from onboard.push.journal import Journal
 from onboard.recordings import dataflash, ulog
 from onboard.recordings.arrays import read_arrays
 from onboard.recordings.opening import open_recording
+from onboard.recordings.table import open_table
 from onboard.web.page import status_page
 from tests.daemon.blank_snapshot import blank_snapshot
 from tests.daemon.test_control import Recorded
@@ -126,6 +132,35 @@ def chronicle(data: bytes) -> float:
         with contextlib.suppress(KeyError):
             watched.calibrator.calibration(imu)
     return watched.duration_s + len(watched.spans) + len(watched.speed.t)
+
+
+def frame(data: bytes) -> object:
+    """A frame file of the simulator, as far as a match makes numbers of it."""
+    with _file(data, "frame.json") as path:
+        given = read_frame(path)
+    made = []
+    for kind in (CopterAirframe, PlaneAirframe):
+        try:
+            made.append(kind.of(given))
+        except ValueError as error:  # which the command tells with the name of the file
+            raise UsageError(str(error)) from None
+    copter, plane = made
+    numbers = [copter.reference_density, copter.rotor_drag, copter.body_drag, copter.inflow]
+    numbers += [copter.full_thrust, plane.induced]
+    numbers += [float(x) for x in asdict(copter.with_drag(0.2, 0.02)).values()]
+    if not all(map(math.isfinite, numbers)):
+        raise AssertionError(f"{numbers}")
+    return numbers
+
+
+def table(data: bytes) -> int:
+    """A column map and a table."""
+    columns, _, rows = data.partition(samples.MAP_ENDS)
+    with _directory() as directory:
+        (directory / "map.toml").write_bytes(columns)
+        (directory / "x.csv").write_bytes(rows)
+        opened = open_table(directory / "x.csv", directory / "map.toml")
+        return sum(1 for _ in opened.samples())
 
 
 def configured(data: bytes) -> object:
@@ -241,6 +276,8 @@ TARGETS: dict[str, Target] = {
     "dataflash": Target(recording, samples.DATAFLASHES, samples.DATAFLASH_TOKENS),
     "ulog": Target(recording, samples.ULOGS, samples.ULOG_TOKENS),
     "chronicle": Target(chronicle, samples.RECORDINGS, samples.FRAME_TOKENS),
+    "frame": Target(frame, samples.FRAMES, samples.JSON_TOKENS),
+    "table": Target(table, samples.TABLES, samples.TOML_TOKENS),
     "configuration": Target(configured, samples.CONFIGURATIONS, samples.TOML_TOKENS),
     "secret": Target(secret, samples.SECRETS),
     "state": Target(state, samples.STATES),

@@ -101,6 +101,19 @@ def test_a_message_that_the_autopilot_lacks_costs_two_questions_twice():
     }
 
 
+def test_the_first_rate_that_is_measured_counts_what_came():
+    """Nobody granted it: it was asked for by somebody else, and comes all the same."""
+    streams = Streams([StreamRequest("RAW_IMU", 50.0)])
+    streams.start(1, 1, 100.0)
+    for k in range(1, 1000):
+        streams.feed(blank("RAW_IMU"), 100.0 + 0.02 * k)
+        streams.poll(100.0 + 0.02 * k)
+        (status,) = streams.report()
+        if status.measured is not None:
+            break
+    assert status.measured == pytest.approx(k / (0.02 * k))
+
+
 def test_a_reboot_starts_the_negotiation_again():
     w = world([("RAW_IMU", 50.0), ("HIGHRES_IMU", 50.0)])
     w.run(10.0)

@@ -17,8 +17,11 @@ class Stalled:
     """In the place of aiomqtt's client: takes so many publications, then confirms nothing."""
 
     takes = 0
+    overlong = False
+    made = 0
 
     def __init__(self, *_args, timeout, **_keywords):
+        Stalled.made += 1
         self.timeout = timeout
         self.messages = self._silence()
 
@@ -45,8 +48,9 @@ class Stalled:
 @pytest.mark.parametrize("before_s", [0.5, 12.0, 40.0])
 @virtual_time
 async def test_the_farewell_is_short(monkeypatch, takes, before_s):
-    monkeypatch.setattr(publisher_module.aiomqtt, "Client", Stalled)
+    monkeypatch.setattr(publisher_module, "Client", Stalled)
     monkeypatch.setattr(Stalled, "takes", takes)
+    monkeypatch.setattr(Stalled, "made", 0)
     loop = asyncio.get_running_loop()
     publisher = Publisher(settings(), Obedient(), Notices(loop.time), clock=loop.time)
     task = asyncio.create_task(publisher.run())
@@ -55,4 +59,5 @@ async def test_the_farewell_is_short(monkeypatch, takes, before_s):
     began = loop.time()
     await publisher.close(snapshot())
     await task
+    assert Stalled.made > 0
     assert loop.time() - began < STOP_S

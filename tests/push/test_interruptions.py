@@ -1,5 +1,7 @@
 """A push that something happens to after its first write: it goes back, or stays open."""
 
+import math
+
 import pytest
 
 from onboard.mavlink.parameter_messages import SendAction, SendParamSet
@@ -271,3 +273,20 @@ def test_an_armed_vehicle_that_does_not_answer_is_asked_nothing_any_more(world, 
     (outcome,) = world.outcomes
     assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
     assert max(sent) <= ends[0]
+
+
+def test_undoing_that_nobody_answers_ends_at_its_own_deadline(world):
+    """Whoever wakes at deadlines alone: no heartbeat, no answer and no report comes any more."""
+    armed = []
+
+    def arm_and_go():
+        armed.append(world.now)
+        world.feed(VehicleReport(armed=True, landed=True))
+        world.autopilot.receive = lambda *_: None
+        world.autopilot.silent_until = math.inf
+
+    when_written(world, 3, arm_and_go)
+    assert world.run_through()
+    (outcome,) = world.outcomes
+    assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
+    assert world.now - armed[0] == pytest.approx(limits.ARMED_UNDO_S, abs=1e-6)

@@ -1,5 +1,6 @@
 import errno
 import os
+import shutil
 
 import pytest
 from hypothesis import given, settings
@@ -209,12 +210,57 @@ def test_full_disk_is_reported_and_the_file_stays_whole(path, monkeypatch):
     assert (found, recovery.transaction, damaged) == ([entries[0], entries[2]], "a", 0)
 
 
+def moved_and_linked(directory):
+    """As somebody does who wants the state on another disk: moved, and a link in its place."""
+    elsewhere = directory.with_name("elsewhere")
+    shutil.copytree(directory, elsewhere)
+    shutil.rmtree(directory)
+    directory.symlink_to(elsewhere)
+
+
+def older_put_back(directory):
+    (directory / "journal.jsonl").replace(directory / "of today")
+    (directory / "journal.jsonl").write_bytes(b"")
+
+
+def deleted(directory):
+    shutil.rmtree(directory)
+
+
+@pytest.mark.parametrize("change", [moved_and_linked, older_put_back, deleted])
+def test_what_the_next_start_would_not_read_is_not_called_written(path, change):
+    first, second = story("a"), story("b")
+    with Journal(path) as journal:
+        for entry in first:
+            journal.append(entry, 1.0)
+        change(path.parent)
+        with pytest.raises(StateError, match="not the journal that was opened"):
+            journal.append(second[0], 2.0)
+        assert [e for _, e in journal.entries] == first
+    with Journal(path) as journal:
+        assert journal.recover() == ()
+        journal.append(second[0], 3.0)
+        assert [found.transaction for found in journal.recover()] == ["b"]
+
+
+def test_a_directory_that_is_reached_by_another_way_is_the_same(path):
+    entries = story("a")
+    with Journal(path) as journal:
+        journal.append(entries[0], 1.0)
+        path.parent.rename(path.parent.with_name("moved"))
+        path.parent.symlink_to("moved")
+        journal.append(entries[1], 2.0)
+    assert read(path)[0] == entries[:2]
+
+
 class TestSize:
     def test_stays_bounded_and_keeps_what_is_needed(self, path):
         with Journal(path, limit_bytes=20_000, keep=3) as journal:
             for entry in story("first-of-imu-2", imu=2):
                 journal.append(entry, 1.0)
             for entry in story("open", imu=3)[:-1]:
+                journal.append(entry, 1.0)
+            for entry in story("in vain", result=Result.ROLLED_BACK):
                 journal.append(entry, 1.0)
             for i in range(200):
                 for entry in story(f"t{i}"):
@@ -225,6 +271,9 @@ class TestSize:
             assert [r.transaction for r in journal.recover()] == ["open"]
             assert journal.last_completed(2).transaction == "first-of-imu-2"
             assert journal.last_completed(1).transaction == "t199"
+            # What calibrating was good for is told by the first that succeeded.
+            assert {"t0", "t199"} <= {e.transaction for _, e in journal.entries}
+            assert "in vain" not in {e.transaction for _, e in journal.entries}
         assert [p.name for p in path.parent.iterdir()] == [path.name]
 
     def test_shrinking_keeps_no_descriptor(self, path):
@@ -246,6 +295,7 @@ class TestSize:
             raise OSError(errno.EIO, "Input/output error")
 
         expected = read(path)
+        there = len(os.listdir("/proc/self/fd"))
         with monkeypatch.context() as patch:
             if call == "rename":
                 patch.setattr("pathlib.Path.rename", fail)
@@ -259,6 +309,7 @@ class TestSize:
 
                 patch.setattr(os, "fsync", fsync)
             journal = Journal(path, limit_bytes=10, keep=1)
+        assert len(os.listdir("/proc/self/fd")) == there + 1
         journal.append(story("d")[0], 9.0)
         journal.close()
         found, _, _ = read(path)

@@ -107,6 +107,23 @@ def test_stale_value_in_the_middle_is_not_taken_for_a_change(world):
     assert finish(world).result is Result.COMPLETED
 
 
+def test_another_device_that_is_only_said_in_the_middle_changes_nothing(world):
+    """A packet of before, or of somebody else: the vehicle itself is asked, and says the same."""
+    when_written(world, 2, lambda: world.feed(ValueReceived("INS_ACC_ID", 5e6)))
+    assert finish(world).result is Result.COMPLETED
+
+
+def test_another_device_in_the_middle_ends_the_push(world):
+    def swapped():
+        world.autopilot.ram["INS_ACC_ID"] = 5e6
+        world.feed(ValueReceived("INS_ACC_ID", 5e6))
+
+    when_written(world, 2, swapped)
+    outcome = finish(world)
+    assert outcome.result is not Result.COMPLETED
+    assert len({name for name, _ in world.autopilot.history}) < 6
+
+
 def test_a_second_copy_of_what_was_written_is_no_change(world):
     first = world.plan.write_order(world.plan.before)[0]
     again = ValueReceived(first, world.plan.wanted[first])

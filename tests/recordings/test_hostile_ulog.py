@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import random
 import struct
 import tracemalloc
 from contextlib import redirect_stdout
@@ -17,10 +18,10 @@ from onboard.recordings.ulog import CONVERTERS
 from onboard.recordings.ulog_index import (
     HEADER_LENGTH,
     MOST_PARAMETERS,
-    SYNC,
     columns_of,
     index_ulog,
 )
+from onboard.recordings.ulog_messages import SYNC
 from tests.recordings.telemetry_writer import px4_log
 
 HEADER = px4_log(1)[:HEADER_LENGTH]
@@ -145,3 +146,26 @@ def test_a_log_goes_on_after_the_next_sync_mark():
     damaged = index_ulog(whole[:half] + rubbish + whole[half:], WANTED)
     assert damaged.damaged_places == 1
     assert len(damaged.topics["sensor_combined", 0].offsets) == 100
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_takes_nothing_of_what_stands_behind_it(seed):
+    """Any of its bytes may be a letter of a kind, and say a length that reaches far behind it."""
+    whole, noise = px4_log(200), random.Random(seed).randbytes(3000)
+    index = index_ulog(whole, WANTED)
+    at = index.topics["sensor_combined", 0].offsets[2000] - 5
+    damaged = index_ulog(whole[:at] + noise + whole[at:], WANTED)
+    assert damaged.damaged_places == 1
+    assert damaged.skipped_bytes == len(noise)
+    for key, topic in index.topics.items():
+        assert len(damaged.topics[key].offsets) == len(topic.offsets)
+
+
+@pytest.mark.parametrize("row", [1, 4])
+def test_messages_of_a_kind_that_is_not_known_yet_are_no_damage(row):
+    whole = px4_log(2)
+    at = index_ulog(whole, WANTED).topics["sensor_combined", 0].offsets[50] - 5
+    new = message("Z", b"something to come") * row
+    index = index_ulog(whole[:at] + new + whole[at:], WANTED)
+    assert (index.damaged_places, index.skipped_bytes) == (0, 0)
+    assert len(index.topics["sensor_combined", 0].offsets) == 100

@@ -83,7 +83,7 @@ def by_hand(name: str = "flight.BIN", **changes: Any) -> Match:
         "seconds": 100.0,
     }  # fmt: skip
     vehicle = VehicleMatch(**(fields | changes))
-    real: Any = SimpleNamespace(name=name, autopilot="ardupilot")
+    real: Any = SimpleNamespace(name=name, autopilot="ardupilot", source=SimpleNamespace(damage=[]))
     settings = (Setting("SIM_WIND_SPD", 5.0, 0.02, "wind"),) if vehicle.effects else ()
     verdict = Verdict.EXPLAINED if vehicle.effects else Verdict.CLEAN
     return Match(

@@ -16,6 +16,7 @@ from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 
 POSITIVE = ("mass", "refSpd", "maxVoltage", "hoverThrOut", "disc_area", "refVoltage")
 """Keys of a file that are divided by, or a root is taken of."""
+DERIVED = ("reference_density", "rotor_drag", "body_drag", "full_thrust", "inflow")
 LEAST_BODY_DRAG = 1e-4
 """m^2/kg; a file cannot have rotors' drag and none at all of the body: its reference test gives
 what is left over to the body."""
@@ -55,7 +56,7 @@ class CopterAirframe:
         Raises:
             ValueError: a key that should be a number is none, or cannot be.
         """
-        return with_numbers(cls(), given, POSITIVE)
+        return with_numbers(cls(), given, POSITIVE, DERIVED)
 
     @property
     def reference_density(self) -> float:

@@ -51,7 +51,7 @@ class PlaneAirframe:
         Raises:
             ValueError: a key that should be a number is none, or cannot be.
         """
-        return with_numbers(cls(), given, POSITIVE)
+        return with_numbers(cls(), given, POSITIVE, ("induced",))
 
     @property
     def induced(self) -> float:

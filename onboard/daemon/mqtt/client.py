@@ -1,7 +1,8 @@
-"""The broker's line: aiomqtt's client, which hangs up on what is longer than anything said to us.
+"""The broker's line: aiomqtt's client, which hangs up on what is more than anything said to us.
 
 The library would collect a packet of up to 256 MB before anybody sees how long it is, and a
-retained one comes again with every connection.
+retained one comes again with every connection.  Messages of quality 2, which we ask nobody for, it
+would keep until the broker releases them: 65,535 of them.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ class Client(aiomqtt.Client):
             if bufsize > limits.PACKET_MAX:
                 self.overlong = True
                 raise ConnectionError(f"a packet of {bufsize} bytes")
+            if len(self._client._in_messages) > limits.COMMANDS_WAITING:  # noqa: SLF001 - as above
+                raise ConnectionError("messages that are never released")
             return receive(bufsize)
 
         # What is left of a packet is asked for at once, so this is its length.  There is no public

@@ -94,7 +94,7 @@ class Service:
     # Life
 
     async def run(self, *, handle_signals: bool = False) -> None:
-        """Serve until :meth:`stop` or, with ``handle_signals``, SIGTERM or SIGINT.
+        """Serve until :meth:`stop` or, with ``handle_signals``, SIGTERM, SIGINT or SIGHUP.
 
         Raises:
             LinkError: no heartbeat in the time limit.

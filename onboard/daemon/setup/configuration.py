@@ -9,7 +9,6 @@ from __future__ import annotations
 import difflib
 import ipaddress
 import os
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
@@ -18,13 +17,10 @@ from msgspec import Meta
 
 from onboard.errors import ConfigurationError
 from onboard.push.limits import LEAST_DISARMED_S
+from onboard.toml_file import read_toml
 
 LARGEST = 1e9
 """No setting is larger; infinity is none."""
-LONGEST_FILE = 65536
-"""bytes; the sample, which shows every key, has 3500."""
-LONGEST_LINE = 4096
-"""Characters; dotted keys as long as a file take the parser minutes."""
 Positive = Annotated[float, Meta(gt=0.0, le=LARGEST)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=LARGEST)]
 Rate = Annotated[float, Meta(ge=0.0, le=1000.0)]
@@ -245,39 +241,7 @@ def load(path: Path) -> Configuration:
     Raises:
         ConfigurationError: it cannot be read, is not TOML, or has a wrong key or value.
     """
-    return from_mapping(read(path), source=str(path))
-
-
-def read(path: Path) -> dict[str, Any]:
-    """Read a file as it stands, nothing checked but that it is TOML.
-
-    Raises:
-        ConfigurationError: it cannot be read or is not TOML.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(LONGEST_FILE + 1)
-    except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror or error}") from None
-    except ValueError:  # a NUL in the path itself
-        raise ConfigurationError(f"{str(path)!r}: not a file name") from None
-    if len(data) > LONGEST_FILE:
-        raise ConfigurationError(f"{path}: longer than {LONGEST_FILE} bytes")
-    for number, line in enumerate(data.split(b"\n"), start=1):
-        if len(line) > LONGEST_LINE:
-            raise ConfigurationError(
-                f"{path}: line {number} is longer than {LONGEST_LINE} characters"
-            )
-    try:
-        return tomllib.loads(data.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{path}: not UTF-8 text at byte {error.start}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"{path}: not TOML: {error}") from None
-    except RecursionError:
-        raise ConfigurationError(f"{path}: not TOML that is meant: nested too deep") from None
-    except ValueError:  # Python's limit on the digits of an integer
-        raise ConfigurationError(f"{path}: a number with too many digits") from None
+    return from_mapping(read_toml(path), source=str(path))
 
 
 def from_mapping(document: dict[str, Any], *, source: str) -> Configuration:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +10,15 @@ from pathlib import Path
 from onboard.errors import StateError
 from onboard.mavlink.recorder import Recorder
 
+_NAME = re.compile(r"(\d{8}-\d{6})-(\d{3,})\.tlog")
+
 
 class RollingRecorder(Recorder):
     """A recorder that goes on in a new file past ``file_bytes`` and keeps ``keep`` files.
 
     Files are named by the time of their start, UTC; a counter tells files of one second apart.
+    Where the clock was set back, names go on counting from the newest file: by its name, not by its
+    time, the oldest is the one that is deleted.
 
     Raises:
         StateError: the directory cannot be made.
@@ -51,15 +56,17 @@ class RollingRecorder(Recorder):
 
     def _next_path(self) -> Path:
         stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(self._wall_clock()))
-        number = 0
-        while True:
-            path = self._directory / f"{stamp}-{number:03d}.tlog"
-            if not path.exists():
-                return path
-            number += 1
+        last, number = max(self._ours(), default=("", 0))[:2]
+        if last < stamp:
+            last, number = stamp, -1
+        return self._directory / f"{last}-{number + 1:03d}.tlog"
+
+    def _ours(self) -> list[tuple[str, int, Path]]:
+        """Recordings of this or an earlier run by the order in which they were begun."""
+        named = [(_NAME.fullmatch(path.name), path) for path in self._directory.glob("*.tlog")]
+        return [(name[1], int(name[2]), path) for name, path in named if name]
 
     def _prune(self) -> None:
-        files = sorted(self._directory.glob("*.tlog"), key=lambda path: path.stat().st_mtime)
-        for path in files[: -self._keep]:
+        for *_, path in sorted(self._ours())[: -self._keep]:
             if path != self.path:
                 path.unlink(missing_ok=True)
