@@ -26,11 +26,18 @@ class Solved:
         x: (m,) difference of the unknowns from those of the full fit.
         sigma: (m,) of the free ones, inflated; zero for those that are fixed.
         chi2: whitened squares and prior, over the inflation.
+        covariance: (m, m) of the free ones, inflated and with what no data tell; zero elsewhere.
     """
 
     x: Array
     sigma: Array
     chi2: float
+    covariance: Array
+
+    def apart(self, places: Sequence[int], off: Array) -> float:
+        """Squared distance of some unknowns that are ``off`` (p,), in sigmas."""
+        inside = self.covariance[np.ix_(list(places), list(places))]
+        return float(off @ np.linalg.solve(inside, off))
 
 
 class Choices:
@@ -56,12 +63,14 @@ class Choices:
         f = self.fit
         apart = f.theta + x - f.model.nominal
         squares = self._s - 2.0 * self._b @ x + x @ self._N @ x + f.prior @ (apart * apart)
-        covariance = np.linalg.inv((self._N + np.diag(f.prior))[np.ix_(free, free)])
-        sigma = np.zeros(len(x))
-        plain = np.hypot(np.sqrt(np.diag(covariance) * f.inflation[free]), f.doubt[free])
-        for i, s in zip(free, plain.tolist(), strict=True):
+        information = (self._N + np.diag(f.prior))[np.ix_(free, free)]
+        root = np.sqrt(f.inflation[free])
+        sigma, covariance = np.zeros(len(x)), np.zeros((len(x),) * 2)
+        inside = np.linalg.inv(information) * np.outer(root, root) + f.untold(information, free)
+        covariance[np.ix_(free, free)] = inside
+        for i, s in zip(free, np.sqrt(np.diag(inside)).tolist(), strict=True):
             sigma[i] = f.model.unknowns[i].doubted(float(f.theta[i] + x[i]), s)
-        return Solved(x, sigma, float(squares) / f.scale)
+        return Solved(x, sigma, float(squares) / f.scale, covariance)
 
     def held_out(self, effects: Sequence[str]) -> float:
         """Whitened squares of every fold, each by unknowns of the others; over the inflation."""
@@ -182,8 +191,16 @@ def _passes(choices: Choices, chosen: Sequence[str], name: str, gain: float, lev
 def _no_chance(
     choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float
 ) -> bool:
-    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are."""
-    if survival(gain, len(choices.fit.model.indices(name))) > level:
+    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are.
+
+    What gusts may have turned explains nothing: so far from nominal its numbers must be then.
+    """
+    fit, places = choices.fit, choices.fit.model.indices(name)
+    if fit.turned is not None:
+        at = choices.solved([*chosen, name])
+        off = (fit.theta + at.x - fit.model.nominal)[places]
+        gain = min(gain, at.apart(places, off))
+    if survival(gain, len(places)) > level:
         return False
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
