@@ -9,8 +9,8 @@ force, right where the angle has the error: W. A. Fuller, *Measurement Error Mod
 1.1).  Both are first-order: the force ahead less its own slopes times the two gusts.
 
 That takes the lift for known.  Its slope cannot be told from angles that gusts scatter, so it is
-nominal, and the lift at no angle what the mean force upwards makes it; what the slope may be instead
-is a doubt of what is found.
+nominal, and the lift at no angle what the mean force upwards makes it.  What the slope may be
+instead, and how well wind and airspeed are known, are doubts of what is found.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
+from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.fit import BlockSums, Fit, inflation_of
 from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import SETTLED
@@ -42,6 +44,21 @@ LONGEST_STEP = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+class Felt:
+    """A fit with drag and thrust by a force that has no gusts in it.
+
+    Attributes:
+        fit: of everything.
+        places: of what that force has told.
+        lean: (m, l) of :class:`onboard.core.vehicle.turned.Turned`.
+    """
+
+    fit: Fit
+    places: tuple[int, ...]
+    lean: Array
+
+
+@dataclass(frozen=True, slots=True)
 class _Rows:
     """Whitened force ahead: (r,) what is left, (r, m) regressors, and the noise."""
 
@@ -50,12 +67,12 @@ class _Rows:
     noise: AxisNoise
 
 
-def with_gusts_felt(fit: Fit) -> Fit:
-    """The fit with drag and thrust found anew; itself where there is nothing to find them by."""
+def felt_by(fit: Fit) -> Felt | None:
+    """The fit with drag and thrust found anew; None where there is nothing to find them by."""
     model = fit.model
     if model.axes != (AHEAD, 1, UP, 3):
-        return fit
-    mine = told_ahead(model)
+        return None
+    mine = _told_ahead(model)
     theta = _balanced(model, fit.theta)
     # From what gusts have made of drag and thrust another valley is nearer than the airframe's.
     theta[mine] = model.nominal[mine]
@@ -70,10 +87,11 @@ def with_gusts_felt(fit: Fit) -> Fit:
         theta[mine] += step / max(1.0, far / LONGEST_STEP)
         if float(np.max(np.abs(step) / np.sqrt(np.diag(np.linalg.inv(N))))) < SETTLED:
             break
-    return _summed(fit, theta, mine)
+    rows = _rows(model, theta)
+    return Felt(_summed(fit, theta, rows, mine), tuple(mine), _lean(fit, theta, rows, mine))
 
 
-def told_ahead(model: ForceModel) -> list[int]:
+def _told_ahead(model: ForceModel) -> list[int]:
     """Unknowns that the force ahead is to tell."""
     out: list[int] = []
     at = 0
@@ -145,7 +163,23 @@ def _steadied(model: ForceModel, theta: Array, missing: Array) -> ForceModel:
     return replace(model, flight=replace(flight, v_b=v_b))
 
 
-def _summed(fit: Fit, theta: Array, mine: Sequence[int]) -> Fit:
+def _lean(fit: Fit, theta: Array, ahead: _Rows, mine: Sequence[int]) -> Array:
+    """(m, l) scores by a standard deviation of the lift's slope, of the wind, of the airspeed."""
+    model = fit.model
+    constant, slope = model.indices(Lift.name)
+    others = [*model.indices(Wind.name), *model.indices(AirspeedScale.name)]
+    known = np.linalg.cholesky(fit.covariance[np.ix_(others, others)])
+    made = [ahead.regressors[:, others] @ known]
+    # Another slope comes with another constant: the mean lift is what it is.
+    angle = float(np.mean(model.air(theta).alpha))
+    tilted = ahead.regressors[:, slope] - angle * ahead.regressors[:, constant]
+    made.append(model.plausible[slope] * tilted[:, None])
+    out = np.zeros((len(theta), len(others) + 1))
+    out[list(mine)] = ahead.regressors[:, list(mine)].T @ np.hstack(made)
+    return out
+
+
+def _summed(fit: Fit, theta: Array, ahead: _Rows, mine: Sequence[int]) -> Fit:
     """Sums of both: the force ahead tells what is ``mine``, the other axes all else."""
     model, m = fit.model, len(theta)
     residual = model.measured() - model.predicted(theta)
@@ -154,7 +188,6 @@ def _summed(fit: Fit, theta: Array, mine: Sequence[int]) -> Fit:
     windows = windows_of(model.flight)
     even = np.ones(len(windows.first))
     upwards = fitted_noise(windows.mean(residual[:, UP]), even, windows.piece, windows.length_s)
-    ahead = _rows(model, theta)
     noise = (ahead.noise, fit.noise[1], upwards, *fit.noise[3:])
     every = whitened_rows(model, residual, jacobian, noise, sensitivity)
     told = np.zeros(m, dtype=bool)

@@ -12,11 +12,10 @@ what is left of the force: an error of the angle that shortens the law of the fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.felt import AHEAD, Felt
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.model import GUST
 from onboard.core.vehicle.turned import Turned
@@ -26,15 +25,17 @@ LEAST_SLOPE = 1e-6
 """1/s: a force that no gust changes tells nothing of gusts [physics]."""
 
 
-def turned_by_gusts(fit: Fit, rms: float, clear: Sequence[int] = ()) -> Turned:
+def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
     """What gusts of this RMS along the flow, m/s, and at most as large across it, may have done.
 
     Args:
         fit: of everything.
         rms: along the flow, m/s.
-        clear: unknowns whose rows have no gusts in them.
+        felt: what the force ahead has told, which has no gusts in it.
     """
     m = len(fit.theta)
+    clear = () if felt is None else felt.places
+    lean = np.zeros((m, 0)) if felt is None else felt.lean
     windows = windows_of(fit.model.flight)
     here = fit.model.predicted(fit.theta)
     sizes = [its.size(windows.mean(fit.sensitivity[:, k])) for k, its in enumerate(fit.noise)]
@@ -45,7 +46,7 @@ def turned_by_gusts(fit: Fit, rms: float, clear: Sequence[int] = ()) -> Turned:
         turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
         level = _level(fit, sizes, slope, axis, rms)
         for k, size in enumerate(sizes):
-            if clear and k == 0:
+            if felt is not None and k == AHEAD:
                 continue
             # Gusts have the colour of the noise: what whitens it leaves them as they are.
             rows = level * turned[:, k] / size[:, None]
@@ -54,7 +55,7 @@ def turned_by_gusts(fit: Fit, rms: float, clear: Sequence[int] = ()) -> Turned:
     # The mean wind is what gusts are about.
     for place in (*fit.model.indices("wind"), *fit.model.indices("wind_profile"), *clear):
         E[place] = E[:, place] = b[place] = 0.0
-    return Turned(E, b, fit.prior)
+    return Turned(E, b, fit.prior, lean)
 
 
 def _level(fit: Fit, sizes: list[Array], slope: Array, axis: int, rms: float) -> float:
@@ -62,8 +63,8 @@ def _level(fit: Fit, sizes: list[Array], slope: Array, axis: int, rms: float) ->
     if axis not in fit.model.axes:
         return rms
     k = fit.model.axes.index(axis)
-    felt = float(np.sqrt(np.mean(slope[:, k] ** 2)))
-    if axis == 0 or felt < LEAST_SLOPE:
+    slope_of = float(np.sqrt(np.mean(slope[:, k] ** 2)))
+    if axis == AHEAD or slope_of < LEAST_SLOPE:
         # Ahead the sensor tells; drag hardly shows a gust.
         return rms
-    return min(rms, float(np.sqrt(np.mean(sizes[k] ** 2))) / felt)
+    return min(rms, float(np.sqrt(np.mean(sizes[k] ** 2))) / slope_of)

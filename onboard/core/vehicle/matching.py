@@ -9,7 +9,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.choices import Choices, Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
-from onboard.core.vehicle.felt import told_ahead, with_gusts_felt
+from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import turned_by_gusts
@@ -59,11 +59,10 @@ def matched(model: ForceModel) -> Matched:
         fit = fitted(model, fit.theta)
     turbulence = turbulence_of(fit)
     if AirspeedScale.name in {e.name for e in model.effects}:
-        felt = with_gusts_felt(fit) if turbulence.found else fit
-        clear = () if felt is fit else told_ahead(model)
-        fit = felt
+        felt = felt_by(fit) if turbulence.found else None
+        fit = fit if felt is None else felt.fit
         if turbulence.seen:
-            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, clear))
+            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
     fit = replace(fit, doubt=propeller_doubt(fit))
     choices = Choices(fit)
     chosen = choose(choices)

@@ -31,11 +31,13 @@ class Turned:
         E: (m, m).
         b: (m,).
         prior: (m,) weights of the prior, 1 / sigma^2.
+        lean: (m, l) what each standard deviation of what was taken for known adds to the scores.
     """
 
     E: Array
     b: Array
     prior: Array
+    lean: Array
 
     def covariance(self, information: Array, free: Sequence[int]) -> Array:
         """(f, f) of the free unknowns, by gusts.
@@ -55,5 +57,6 @@ class Turned:
         # One rho moves all that the flight tells; what it does not tell is free to move alone.
         moved = back[:, ~untold] @ short[~untold]
         loose = back[:, untold] * before[untold]
-        out: Array = np.outer(moved, moved) + loose @ loose.T
+        leant = inverse.T @ inverse @ self.lean[places]
+        out: Array = np.outer(moved, moved) + loose @ loose.T + leant @ leant.T
         return out
