@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.choices import Choices, Chosen, choose
+from onboard.core.vehicle.choices import Choices
+from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
