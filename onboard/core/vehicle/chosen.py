@@ -52,7 +52,7 @@ def choose(choices: Choices) -> Chosen:
             break
         chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, level)
-    rivals = {n: _rivals(choices, chosen, n, candidates) for n in chosen}
+    rivals = {n: _rivals(choices, chosen, n) for n in chosen}
     asked = [n for n in untestable if _needs(n, chosen)]
     left = choices.solved(chosen).chi2
     would = {n: left - choices.solved([*chosen, n]).chi2 for n in asked}
@@ -122,15 +122,17 @@ def _pruned(
         ]
 
 
-def _rivals(
-    choices: Choices, chosen: Sequence[str], name: str, candidates: Sequence[str]
-) -> tuple[str, ...]:
-    """Effects that are not taken in, and in its place would leave hardly more."""
+def _rivals(choices: Choices, chosen: Sequence[str], name: str) -> tuple[str, ...]:
+    """Effects that are not taken in, and in its place would leave hardly more.
+
+    Also of those that this flight could not have shown: that nobody knows their numbers is no
+    reason why it should not be they.
+    """
     whole = choices.solved(chosen).chi2
     rest = [c for c in chosen if c != name]
     return tuple(
         n
-        for n in candidates
+        for n in choices.names
         if n not in chosen
         and _needs(n, rest)
         and choices.solved([*rest, n]).chi2 - whole < AMBIGUOUS
