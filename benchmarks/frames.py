@@ -6,13 +6,14 @@ the project, and prints the table of docs/benchmarks.md.
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,12 +78,14 @@ def lateral(mismatch: Mapping[str, Any], when: str) -> float:
     return math.sqrt(sum(mismatch[axis][when] ** 2 for axis in "xy") / 2.0)
 
 
-def lines() -> Iterator[str]:
-    """One row per recording."""
+def lines(names: Sequence[str] = ()) -> Iterator[str]:
+    """One row per recording; of these alone, if any are named."""
     truths = json.loads((recordings() / "answers.json").read_text())["recordings"]
     yield f"| {' | '.join(HEADS)} |"
     yield "|" + "---|" * len(HEADS)
     for name, truth in truths.items():
+        if names and name not in names:
+            continue
         document, seconds, memory = asked(recordings() / f"{name}.BIN")
         effects = {e["name"]: e for e in document["effects"]}
         wrong = sorted(set(effects) ^ set(truth["effects"]))
@@ -100,11 +103,13 @@ def lines() -> Iterator[str]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Print the table, or why there is none."""
-    del arguments
+    options = argparse.ArgumentParser(description="What is said of flights of ArduPilot's SITL.")
+    options.add_argument("names", nargs="*", help="recordings; all without")
+    chosen = options.parse_args(arguments)
     if not (recordings() / "answers.json").exists():
         print(WHERE)
         return
-    for line in lines():
+    for line in lines(chosen.names):
         print(line, flush=True)
 
 

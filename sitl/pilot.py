@@ -1,8 +1,7 @@
 """A pilot of any ArduPilot, real or built in: an independent MAVLink client (MAVSDK) that flies.
 
-It arms, takes off, flies random manoeuvres that excite every axis, and lands.  All waiting is
-by the autopilot's own clock, so that the speed of the simulation does not matter; a limit on
-the wall clock only catches a simulator that has died.
+It arms, takes off, flies random manoeuvres that excite every axis, and lands; what it sees of the
+vehicle is in :mod:`sitl.eyes`.
 """
 
 from __future__ import annotations
@@ -10,8 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Callable
-from typing import Any
+from collections.abc import AsyncIterator
 
 from mavsdk.asyncio import Configuration, Mavsdk, MavsdkConnectionError
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
@@ -21,12 +19,10 @@ from mavsdk.plugins.param import ParamError
 
 from sitl.course import Course
 from sitl.errors import SitlError
+from sitl.eyes import SILENCE, Eyes
 from sitl.manoeuvres import GROUND_STATION, Manoeuvres, Plugin, mavlink_message
 
-ARMED = 128
 ACCEPTED = 0
-SILENCE = 60.0
-"""Wall-clock seconds without the wanted event after which a simulator counts as dead."""
 MODES = {
     "copter": {"guided": 4, "land": 9},
     "plane": {"take off": 13, "fly by wire": 6, "land": 26},
@@ -46,10 +42,8 @@ class Pilot:
         self.vehicle = vehicle
         self._direct = MavlinkDirectAsync(system)
         self._param = ParamAsync(system)
-        self._manoeuvres = Manoeuvres(self, self._direct, seed=seed)
-        self._state: dict[str, dict[str, Any]] = {}
-        self._news = asyncio.Condition()
-        self._tasks: list[asyncio.Task[None]] = []
+        self._eyes = Eyes(self._direct)
+        self._manoeuvres = Manoeuvres(self._eyes, self._direct, seed=seed)
 
     @classmethod
     @contextlib.asynccontextmanager
@@ -78,74 +72,34 @@ class Pilot:
             finally:
                 await pilot._rest()
 
-    # -- what it sees ----------------------------------------------------------------------
-
     async def _watch(self) -> None:
-        for name in ("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "STATUSTEXT"):
-            self._tasks.append(asyncio.create_task(self._follow(name), name=f"pilot: {name}"))
+        self._eyes.open()
         for message, interval_us in INTERVALS:
             await self.command(SET_INTERVAL, message, interval_us)
 
-    async def _follow(self, name: str) -> None:
-        async for message in self._direct.subscribe_message(name):
-            async with self._news:
-                self._state[name] = json.loads(message.fields_json)
-                self._news.notify_all()
-
     async def _rest(self) -> None:
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._eyes.close()
         self._direct.destroy()
         self._param.destroy()
-
-    async def _until(self, condition: Callable[[], bool], what: str) -> None:
-        """Waits for something to be seen.
-
-        Raises:
-            SitlError: the simulator has fallen silent, or it took far too long.
-        """
-        async with self._news:
-            try:
-                async with asyncio.timeout(SILENCE * 5):
-                    while not condition():
-                        await asyncio.wait_for(self._news.wait(), SILENCE)
-            except TimeoutError:
-                said = self._state.get("STATUSTEXT", {}).get("text", "nothing")
-                raise SitlError(f"waited in vain for {what}; it last said: {said}") from None
 
     @property
     def time(self) -> float:
         """Boot time of the autopilot, s."""
-        return float(self._state.get("ATTITUDE", {}).get("time_boot_ms", 0)) * 1e-3
-
-    @property
-    def armed(self) -> bool:
-        """As the last heartbeat said."""
-        return bool(int(self._state.get("HEARTBEAT", {}).get("base_mode", 0)) & ARMED)
+        return self._eyes.time
 
     @property
     def height(self) -> float:
         """Above home, m."""
-        return float(self._state.get("GLOBAL_POSITION_INT", {}).get("relative_alt", 0)) * 1e-3
+        return self._eyes.height
 
     @property
-    def standing(self) -> bool:
-        """On the ground and not moving."""
-        speed = float(self._state.get("GPS_RAW_INT", {}).get("vel", 0)) * 1e-2
-        return abs(self.height) < 2.0 and speed < 0.5
-
-    @property
-    def yaw(self) -> float:
-        """Heading, rad."""
-        return float(self._state.get("ATTITUDE", {}).get("yaw", 0.0))
+    def armed(self) -> bool:
+        """As the last heartbeat said."""
+        return self._eyes.armed
 
     async def wait(self, seconds: float) -> None:
         """Waits by the autopilot's clock."""
-        end = self.time + seconds
-        await self._until(lambda: self.time >= end, f"{seconds:.0f} s to pass")
-
-    # -- what it does ----------------------------------------------------------------------
+        await self._eyes.wait(seconds)
 
     async def parameter(self, name: str) -> float:
         """Reads a parameter.
@@ -194,20 +148,19 @@ class Pilot:
         Raises:
             SitlError: it refuses.
         """
-        await self._until(
-            lambda: int(self._state.get("GPS_RAW_INT", {}).get("fix_type", 0)) >= 3, "a GPS fix"
-        )
+        eyes = self._eyes
+        await eyes.until(lambda: eyes.fixed, "a GPS fix")
         await self.set_mode("guided" if self.vehicle == "copter" else "take off")
         for _ in range(120):
             if await self.command(ARM_DISARM, 1):
                 break
             await self.wait(1.0)
         else:
-            raise SitlError(f"does not arm: {self._state.get('STATUSTEXT', {}).get('text')}")
+            raise SitlError(f"does not arm: {eyes.said}")
         if self.vehicle == "copter":
             await self.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, height)
         safe = 0.8 * height if self.vehicle == "copter" else 45.0
-        await self._until(lambda: self.height > safe, f"a height of {safe:.0f} m")
+        await eyes.until(lambda: eyes.height > safe, f"a height of {safe:.0f} m")
 
     async def manoeuvre(self, seconds: float) -> None:
         """Flies at random for so long."""
@@ -227,18 +180,19 @@ class Pilot:
     async def land(self) -> None:
         """Comes down and waits until it has disarmed."""
         if self.vehicle == "copter":
-            await self._manoeuvres.set_velocity((0.0, 0.0, 0.0), self.yaw)
+            await self._manoeuvres.set_velocity((0.0, 0.0, 0.0), self._eyes.yaw)
             await self.wait(3.0)
         await self.set_mode("land")
-        await self._until(lambda: not self.armed or self.standing, "the landing")
+        eyes = self._eyes
+        await eyes.until(lambda: eyes.standing or not eyes.armed, "the landing")
         # Some versions of Plane leave the disarming to the pilot; and a copter with another frame
         # than the one that its landing detector is tuned for may stand there, and not believe it.
         for k in range(60):
             await self.wait(1.0)
             force = FORCED if k >= UNBELIEVING_S else 0
-            if not self.armed or (self.standing and await self.command(ARM_DISARM, 0, force)):
+            if not eyes.armed or (eyes.standing and await self.command(ARM_DISARM, 0, force)):
                 break
-        await self._until(lambda: not self.armed, "disarming after the landing")
+        await eyes.until(lambda: not eyes.armed, "disarming after the landing")
 
     async def reboot(self) -> None:
         """Reboots the autopilot and waits until its clock has begun anew.

@@ -298,3 +298,15 @@ class Challenge:
 
     def _vehicle(self, i: int) -> Vehicle:
         return self.vehicles[i % len(self.vehicles)]
+
+
+def gusty_planes(first: int, alone: int = 10, each: int = 3) -> list[Secret]:
+    """Planes in turbulence with nothing else, and with each of a plane's effects beside it."""
+    others = [name for name in PLANE if name not in ("wind", "turbulence")]
+    names = [("turbulence",)] * alone
+    names += [(name, "turbulence") for name in others for _ in range(each)]
+    kinds: list[Kind] = ["single" if len(n) == 1 else "pair" for n in names]
+    return [
+        Secret(first + i, "plane", kind, n)
+        for i, (kind, n) in enumerate(zip(kinds, names, strict=True))
+    ]

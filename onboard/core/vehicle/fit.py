@@ -23,6 +23,7 @@ from onboard.core.vehicle.limits import (
 )
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise
+from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
 
 
@@ -51,7 +52,8 @@ class Fit:
         jacobian: (n, k, m) of the prediction.
         sensitivity: (n, k) to gusts, 1/s.
         block: (n,) number of the block of each step.
-        doubt: (m,) by how much gusts may have turned the unknowns.
+        doubt: (m,) by how much laws may be wrong in the unknowns.
+        turned: what gusts may have done to the unknowns; None where none are seen.
     """
 
     model: ForceModel
@@ -65,6 +67,7 @@ class Fit:
     sensitivity: Array
     block: Array
     doubt: Array
+    turned: Turned | None = None
 
     @property
     def information(self) -> Array:
@@ -82,9 +85,23 @@ class Fit:
     @property
     def sigma(self) -> Array:
         """(m,) standard deviations, with what the laws are good for."""
-        plain = np.hypot(np.sqrt(np.diag(self.covariance)), self.doubt)
+        every = list(range(len(self.theta)))
+        untold = self.untold(self.information, every)
+        plain = np.sqrt(np.diag(self.covariance + untold))
         pairs = zip(self.model.unknowns, self.theta.tolist(), plain.tolist(), strict=True)
         return np.array([u.doubted(v, s) for u, v, s in pairs])
+
+    def untold(self, information: Array, free: Sequence[int]) -> Array:
+        """(f, f) covariance that no data tell: of laws, and by what gusts may have turned.
+
+        Args:
+            information: (f, f) of the free ones, the prior in it.
+            free: their places.
+        """
+        laws: Array = np.diag(self.doubt[list(free)] ** 2)
+        if self.turned is None:
+            return laws
+        return laws + self.turned.covariance(information, free)
 
     @property
     def scale(self) -> float:
@@ -148,7 +165,7 @@ def summed(
         theta,
         prior,
         tuple(sums),
-        _inflation(sums, prior),
+        inflation_of(sums, prior),
         tuple(noise),
         residual,
         jacobian,
@@ -202,7 +219,7 @@ def _level(model: ForceModel, theta: Array) -> Array | None:
     return model.levelled.steps(theta) if model.instrumented else None
 
 
-def _inflation(blocks: Sequence[BlockSums], prior: Array) -> Array:
+def inflation_of(blocks: Sequence[BlockSums], prior: Array) -> Array:
     """(m,) variance of the estimate by the scatter of the blocks' scores, over that of the sums.
 
     The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).

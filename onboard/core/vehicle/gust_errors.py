@@ -2,10 +2,12 @@
 
 The velocity through the air is known but for the gusts.  A vehicle that answers them (a plane that
 keeps its lift turns its nose against a gust) makes least squares take the scatter of the angle for
-a law that hardly depends on it.  How much of that happened is not seen; the most that can have
-happened is: with regressors H of which the gusts make ``E = sum dH^T dH``, an estimate is short by
-``(N - E)^-1 b``, ``b`` the mean of ``dH^T`` times what the gusts do to the force.  W. A. Fuller,
-*Measurement Error Models* (1987), section 1.2.
+a law that hardly depends on it.  That is no scatter of the estimate, which the blocks' sums would
+tell, but a step towards zero in every block: :mod:`onboard.core.vehicle.turned` has what it can be.
+
+How large the gusts are an airspeed sensor tells along the flow.  Across it no gust is larger than
+what is left of the force: an error of the angle that shortens the law of the force by L leaves
+``1 / L`` of the error's square in the residual, over the law as it was found.
 """
 
 from __future__ import annotations
@@ -13,33 +15,56 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.felt import AHEAD, Felt
 from onboard.core.vehicle.fit import Fit
-from onboard.core.vehicle.limits import MOST_BY_GUSTS
 from onboard.core.vehicle.model import GUST
+from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
 
+LEAST_SLOPE = 1e-6
+"""1/s: a force that no gust changes tells nothing of gusts [physics]."""
 
-def gust_doubt(fit: Fit, rms: float) -> Array:
-    """(m,) the most that gusts of this RMS along each axis, m/s, may have turned the unknowns."""
+
+def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
+    """What gusts of this RMS along the flow, m/s, and at most as large across it, may have done.
+
+    Args:
+        fit: of everything.
+        rms: along the flow, m/s.
+        felt: what the force ahead has told, which has no gusts in it.
+    """
     m = len(fit.theta)
-    if not rms > 0.0:
-        return np.zeros(m)
+    clear = () if felt is None else felt.places
+    lean = np.zeros((m, 0)) if felt is None else felt.lean
     windows = windows_of(fit.model.flight)
-    slope = windows.mean(fit.model.gust_slope(fit.theta))
+    here = fit.model.predicted(fit.theta)
+    sizes = [its.size(windows.mean(fit.sensitivity[:, k])) for k, its in enumerate(fit.noise)]
     E, b = np.zeros((m, m)), np.zeros(m)
-    sizes = [its.size(windows.mean(fit.sensitivity[:, k])) / rms for k, its in enumerate(fit.noise)]
-    for direction, gust in enumerate(GUST * np.eye(3)):
+    for axis in range(3):
+        gust = GUST * fit.model.flight.R_bn[:, axis]
+        slope = windows.mean(fit.model.predicted(fit.theta, gust) - here) / GUST
         turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
+        level = _level(fit, sizes, slope, axis, rms)
         for k, size in enumerate(sizes):
+            if felt is not None and k == AHEAD:
+                continue
             # Gusts have the colour of the noise: what whitens it leaves them as they are.
-            rows = turned[:, k] / size[:, None]
+            rows = level * turned[:, k] / size[:, None]
             E += rows.T @ rows
-            b += rows.T @ (slope[:, k, direction] / size)
-    root = np.linalg.cholesky(fit.information)
-    inverse = np.linalg.inv(root)
-    share, axes = np.linalg.eigh(inverse @ E @ inverse.T)
-    short = axes @ ((axes.T @ (inverse @ b)) / (1.0 - np.minimum(share, MOST_BY_GUSTS)))
-    out: Array = np.abs(inverse.T @ short)
+            b += rows.T @ (level * slope[:, k] / size)
     # The mean wind is what gusts are about.
-    out[[*fit.model.indices("wind"), *fit.model.indices("wind_profile")]] = 0.0
-    return out
+    for place in (*fit.model.indices("wind"), *fit.model.indices("wind_profile"), *clear):
+        E[place] = E[:, place] = b[place] = 0.0
+    return Turned(E, b, fit.prior, lean)
+
+
+def _level(fit: Fit, sizes: list[Array], slope: Array, axis: int, rms: float) -> float:
+    """RMS of the gusts along a body axis, m/s."""
+    if axis not in fit.model.axes:
+        return rms
+    k = fit.model.axes.index(axis)
+    slope_of = float(np.sqrt(np.mean(slope[:, k] ** 2)))
+    if axis == AHEAD or slope_of < LEAST_SLOPE:
+        # Ahead the sensor tells; drag hardly shows a gust.
+        return rms
+    return min(rms, float(np.sqrt(np.mean(sizes[k] ** 2))) / slope_of)

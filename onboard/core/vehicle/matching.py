@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.choices import Choices, Chosen, choose
+from onboard.core.vehicle.choices import Choices
+from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.gust_errors import gust_doubt
+from onboard.core.vehicle.gust_errors import turned_by_gusts
 from onboard.core.vehicle.limits import MOST_OUTLYING, OUTLYING
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
@@ -57,9 +59,12 @@ def matched(model: ForceModel) -> Matched:
         model = replace(model, flight=_cut(model.flight, kept))
         fit = fitted(model, fit.theta)
     turbulence = turbulence_of(fit)
-    fit = replace(fit, doubt=np.hypot(fit.doubt, propeller_doubt(fit)))
-    if AirspeedScale.name in {e.name for e in model.effects} and turbulence.seen:
-        fit = replace(fit, doubt=np.hypot(fit.doubt, gust_doubt(fit, turbulence.rms)))
+    if AirspeedScale.name in {e.name for e in model.effects}:
+        felt = felt_by(fit) if turbulence.found else None
+        fit = fit if felt is None else felt.fit
+        if turbulence.seen:
+            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
+    fit = replace(fit, doubt=propeller_doubt(fit))
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)

@@ -95,7 +95,12 @@ class ForceModel:
         return self.indices("")
 
     def air(self, theta: Array, gust: Array | None = None) -> Air:
-        """The prediction at unknowns (m,), in air that also moves by ``gust`` (3,), m/s."""
+        """The prediction at unknowns (m,), in air that also moves by ``gust``, m/s.
+
+        Args:
+            theta: (m,) unknowns.
+            gust: (3,) or (n, 3) towards north, east, down.
+        """
         air = self.start(self.flight)
         if gust is not None:
             air.gust_n = gust
@@ -106,9 +111,9 @@ class ForceModel:
             at += n
         return air
 
-    def predicted(self, theta: Array) -> Array:
-        """(n, k) force along the axes, m/s^2."""
-        out: Array = self.air(theta).force_b[:, list(self.axes)]
+    def predicted(self, theta: Array, gust: Array | None = None) -> Array:
+        """(n, k) force along the axes, m/s^2, in air that also moves by ``gust``."""
+        out: Array = self.air(theta, gust).force_b[:, list(self.axes)]
         return out
 
     def _stages(self, theta: Array, gust: Array | None = None) -> list[Air]:
@@ -142,10 +147,7 @@ class ForceModel:
     def gust_slope(self, theta: Array) -> Array:
         """(n, k, 3) change of the force by a gust towards north, east, down, 1/s."""
         here = self.predicted(theta)
-        columns = [
-            (self.air(theta, gust).force_b[:, list(self.axes)] - here) / GUST
-            for gust in GUST * np.eye(3)
-        ]
+        columns = [(self.predicted(theta, gust) - here) / GUST for gust in GUST * np.eye(3)]
         return np.stack(columns, axis=-1)
 
     def sensitivity(self, theta: Array) -> Array:
@@ -179,7 +181,7 @@ class ForceModel:
         return np.stack(columns, axis=-1)
 
     def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
-        """(n, k, m) derivatives by central differences, in air that also moves by ``gust`` (3,)."""
+        """(n, k, m) derivatives by central differences, in air that also moves by ``gust``."""
         stages, columns = self._stages(theta, gust), []
         for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
             h = DIFFERENCE * size

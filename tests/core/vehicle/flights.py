@@ -115,13 +115,15 @@ def plane_flight(
     throttle_swing=0.15,
     heading_off=0.0,
     noise=0.05,
+    gusts=0.0,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
     ``ratio`` of the thrust, ``lost`` of it by m/s that the propeller meets, a windmilling one's
     share of what that brakes, and the ``bend`` of that line at its end; drag by the square of
     sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
-    recorded heading, rad, and of the force's noise, m/s^2.
+    recorded heading, rad, of the force's noise, m/s^2, and of gusts along each axis that carry the
+    plane along, so that it flies through them as through still air, m/s.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -133,6 +135,8 @@ def plane_flight(
     x = speed / np.sqrt(1 + np.tan(alpha) ** 2 + np.tan(beta) ** 2)
     u = np.stack([x, x * np.tan(beta), x * np.tan(alpha)], axis=1)
     v_n = np.einsum("nij,nj->ni", R, u) + np.array([*wind, 0.0])
+    if gusts:
+        v_n = v_n + np.stack([smooth(rng, n, gusts, 1.0) for _ in range(3)], axis=1)
     height = 700.0 + smooth(rng, n, 10.0, 8.0)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     q = 0.5 * rho * rho / 1.225 * speed**2 * 0.45 / 2.0

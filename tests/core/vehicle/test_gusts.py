@@ -1,0 +1,99 @@
+"""A plane in gusts: what they do to its laws, and how much of that is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.plane_match import match_plane
+from onboard.core.vehicle.turned import Turned
+from tests.core.vehicle.flights import plane_flight
+
+SIGMA = np.array([0.003, 0.003, 0.01])
+
+
+def matched(**change):
+    match = match_plane(plane_flight(reading=1.0, **change), PlaneAirframe(), SIGMA)
+    assert match is not None
+    return match
+
+
+def told(match):
+    return {d.name for d in match.effects} - {"turbulence"}
+
+
+def turned(E, b, prior, lean=0.0):
+    size = np.atleast_1d(np.asarray(b, dtype=float))
+    m = len(size)
+    return Turned(
+        np.atleast_2d(E),
+        size,
+        np.full(m, prior),
+        np.full((m, 1), lean) if lean else np.zeros((m, 0)),
+    )
+
+
+@pytest.mark.parametrize("answered", [0.0, 0.3, 1.0])
+def test_a_slope_by_angles_that_are_off_is_short_by_no_more_than_is_said(answered):
+    """Force and angle that gusts have moved by ``1 - answered`` and ``answered`` of themselves."""
+    rng = np.random.default_rng(3)
+    errors = []
+    for _ in range(200):
+        angle, gust = rng.normal(size=400), 0.4 * rng.normal(size=400)
+        force = 2.0 * (angle - (1.0 - answered) * gust) + 0.01 * rng.normal(size=400)
+        seen = angle + answered * gust
+        N, E = float(seen @ seen), float(gust @ gust)
+        found = float(seen @ force) / N
+        doubt = turned(E, found * E, 1e-6).covariance(np.array([[N]]), [0])
+        plain = np.var(force - found * seen) / N
+        errors.append((found - 2.0) / np.sqrt(doubt[0, 0] + plain))
+    assert np.mean(np.abs(errors) < 2.0) > 0.9
+    if answered == 1.0:
+        # It is all short, by more than half of what twice the doubt allows.
+        assert np.median(errors) < -1.0
+
+
+def test_gusts_that_may_be_all_there_is_leave_what_was_known_before():
+    doubt = turned(99.0, 50.0, 1.0 / 0.3**2).covariance(np.array([[100.0]]), [0])
+    assert np.sqrt(doubt[0, 0]) == pytest.approx(0.3)
+
+
+def test_what_was_taken_for_known_is_a_doubt_of_its_share():
+    doubt = turned(0.0, 0.0, 1.0, lean=20.0).covariance(np.array([[100.0]]), [0])
+    assert np.sqrt(doubt[0, 0]) == pytest.approx(0.2)
+
+
+def test_an_unknown_that_gusts_do_not_touch_is_in_no_doubt():
+    covariance = turned(np.diag([30.0, 0.0]), [10.0, 0.0], 1.0).covariance(
+        100.0 * np.eye(2), [0, 1]
+    )
+    assert covariance[1, 1] == pytest.approx(0.0)
+    assert covariance[0, 0] > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [41, 42, 43])
+def test_gusts_alone_accuse_no_coefficient(seed):
+    match = matched(seed=seed, gusts=0.5)
+    assert told(match) == set()
+    assert match.wind is not None
+    assert match.wind.turbulence_rms > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("c_drag_p", [0.055, 0.17])
+def test_drag_is_found_in_gusts(c_drag_p):
+    match = matched(seed=44, gusts=0.5, c_drag_p=c_drag_p)
+    assert told(match) == {"drag"}
+    number = match.numbers["drag.c_drag_p"]
+    assert abs(number.real - c_drag_p) < 3.0 * number.sigma
+    assert number.sigma < 0.02
+
+
+@pytest.mark.slow
+def test_thrust_is_found_in_gusts():
+    match = matched(seed=45, gusts=0.5, ratio=0.75)
+    assert told(match) == {"thrust_scale"}
+    number = match.numbers["thrust_scale.ratio"]
+    assert abs(number.real - 0.75) < 3.0 * number.sigma
