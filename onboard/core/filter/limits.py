@@ -100,8 +100,9 @@ ATTITUDE_TIME_S: Final = 30.0
 took it for, in some tens of seconds [physics]."""
 HEADING_TIME_S: Final = 5.0
 """Of the smooth error of the recorded heading: an EKF follows its compass, or the course, within
-some seconds [likelihood: of 5, 7, 10, 20 and 30 s the best on the quivers, and within 1 % of the
-best on the other flights that were built on]."""
+some seconds [likelihood: of 5, 10 and 20 s the best on three of eight flights that were built on,
+by 10 to 60; on five 10 s is, by 50 to 170.  Of 5, 7, 10 and 20 s the offsets of simulated copters
+err least with 5]."""
 
 STAMP_JITTER_S: Final = 8e-4
 """s; by how much a recorded attitude's stamp may be off beside a constant delay: whole milliseconds
