@@ -16,9 +16,11 @@ Bytes = bytes | mmap
 SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 LEVELS = frozenset(range(8)) | frozenset(b"01234567")
 """Of a text for people: syslog's, as a digit; older writers had the number."""
-LATEST_US = 1 << 48
-"""Clocks begin with the board or in 1970: nobody has nine years of one, or a date past 8900."""
+LATEST_US = 1 << 53
+"""Clocks begin with the board, or in 1970 and then end in 2255.  Of eight bytes of noise one in
+2,000 is a time [bound]."""
 LONGEST_KEY = 255
+"""Of a name: its length is one byte [the format]."""
 
 
 def _information(data: Bytes, body: int, stop: int) -> bool:

@@ -169,3 +169,15 @@ def test_messages_of_a_kind_that_is_not_known_yet_are_no_damage(row):
     index = index_ulog(whole[:at] + new + whole[at:], WANTED)
     assert (index.damaged_places, index.skipped_bytes) == (0, 0)
     assert len(index.topics["sensor_combined", 0].offsets) == 100
+
+
+@pytest.mark.parametrize(
+    "us", [12_000_000, 1_790_000_000_000_000], ids=["since boot", "since 1970"]
+)
+def test_a_text_is_no_damage_whatever_its_clock_begins_with(us):
+    whole = px4_log(2)
+    at = index_ulog(whole, WANTED).topics["sensor_combined", 0].offsets[50] - 5
+    said = message("L", b"6" + struct.pack("<Q", us) + b"Armed by RC")
+    index = index_ulog(whole[:at] + said + whole[at:], WANTED)
+    assert (index.damaged_places, index.skipped_bytes) == (0, 0)
+    assert len(index.topics["sensor_combined", 0].offsets) == 100
