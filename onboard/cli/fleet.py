@@ -161,8 +161,7 @@ def fleet(
     if report_folder is not None:
         _write_index(done, histories, compared, pages, report_folder)
     _write_numbers(done, histories, compared, parquet_file, json_file)
-    failed = sum(bool(one.error) for one in done)
-    if failed:
+    if failed := sum(bool(one.error) for one in done):
         raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
 
 

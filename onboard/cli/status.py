@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 TIMEOUT_S = 10.0
 WATCH_INTERVAL_S = 1.0
 LONGEST = 16_000_000
-"""bytes of an answer; a snapshot has some hundred thousand."""
+"""bytes of an answer; a snapshot has some hundred thousand, and more is not kept [cost]."""
 
 
 class Client:

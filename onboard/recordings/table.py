@@ -45,14 +45,14 @@ DELIMITERS = ",;\t"
 FEWEST_ROWS = 20
 EARTH_RADIUS_M = 6_371_000.0
 LONGEST_HEAD = 1_000_000
-"""Characters of the names of all columns."""
+"""Characters of the names of all columns: 10,000 of a hundred each [bound]."""
 SLOPE_S = 0.1
 """Span over which a position becomes a velocity, s: longer than the noise of motion capture,
 shorter than a manoeuvre."""
 TURN_S = 0.02
 """Span over which an attitude becomes rates, s, where there is no gyroscope."""
 LONGEST_S = 3.2e7
-"""What lasts longer is no flight, but a cell that is no time."""
+"""A year: what lasts longer is no flight, but a cell that is no time [bound]."""
 SMALLEST = 1e-6
 """Length of a quaternion that is none."""
 NO_NUMBERS = ("", "nan", "null", "none", "na")

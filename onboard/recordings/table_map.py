@@ -15,7 +15,7 @@ from onboard.errors import ConfigurationError
 from onboard.toml_file import read_toml
 
 LARGEST = 1e9
-"""Of any unit that a map has; infinity is none."""
+"""Of any unit that a map has: a second in nanoseconds; infinity is none [bound]."""
 DEGREE = float(np.pi) / 180.0
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},

@@ -33,7 +33,8 @@ KINDS = frozenset(b"BFIMPQARDLCSO")
 LONGEST_UNKNOWN = 10000
 """bytes; a message of a kind that nobody knows and that is longer is damage."""
 MOST_IN_A_ROW = 4
-"""Messages of kinds that nobody knows, one after the other."""
+"""Messages of kinds that nobody knows, one after the other: in a row of more, noise is likelier to
+look like one that is known at its end [bound]."""
 MOST_PARAMETERS = 20_000
 """PX4 has some 2000."""
 UNFOLDED = 32

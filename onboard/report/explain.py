@@ -82,15 +82,20 @@ def explain_html(
         six=_six(diagnosis),
         status=diagnosis.calibration.status.value,
         known=diagnosis.calibration.parameters_known,
-        timing=[
-            (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
-            for name, e in diagnosis.timing.items()
-        ],
+        timing=_timing(diagnosis),
         parameters=() if advice is None else _parameters(diagnosis, advice),
         ambiguous=[([title_of(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous],
         not_testable=[(title_of(n.name), n.why) for n in diagnosis.not_testable],
         unseen=() if refused else _unseen(diagnosis),
     )
+
+
+def _timing(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Delays and averaging: what, and how much with its sigma."""
+    return [
+        (words.TIMING.get(name, name.replace("_", " ")), words.seconds(e.value, e.sigma))
+        for name, e in diagnosis.timing.items()
+    ]
 
 
 def explanation_html(result: Explanation, base: str = PAGE) -> str:

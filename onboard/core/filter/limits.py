@@ -132,9 +132,10 @@ The slow error of the recorded attitude is no such formality.  Its lower end is 
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
 [physics].  The likelihood would have less, for it sees how smooth this error is, not how large:
 with 10 mrad, flights that hover err by 2.3 sigma in x and y offset, each towards what the EKF was
-levelled with.  So with the heading: three degrees are what a compass beside motors is good for
-[data sheet], and the likelihood would have one; with one, offsets of simulated copters err by 2 to
-2.5 sigma."""
+levelled with.  So with the heading, whose error goes with the manoeuvre, too: the likelihood would
+have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
+1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
+sealed ones, which it was not made from]."""
 STENCIL_FACTOR: Final = 2.0
 """Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
 LINE_SHARES: Final = (0.25, 0.5, 1.0)

@@ -20,7 +20,7 @@ from onboard.push.limits import LEAST_DISARMED_S
 from onboard.toml_file import read_toml
 
 LARGEST = 1e9
-"""No setting is larger; infinity is none."""
+"""No setting is larger (30 years in seconds); infinity is none [bound]."""
 Positive = Annotated[float, Meta(gt=0.0, le=LARGEST)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=LARGEST)]
 Rate = Annotated[float, Meta(ge=0.0, le=1000.0)]
