@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.candidates import smallest
+from onboard.core.diagnosis.companions import Companions
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
@@ -51,8 +52,8 @@ from onboard.core.physics.finding import Finding
 class Evidence:
     """The models: everything, what was chosen of it, the one that is reported, what is in doubt.
 
-    ``believed`` is the number of fixes of the flight that were to be used, ``unused`` flight
-    without any.
+    ``companions`` are all accelerometers of the vehicle; ``believed`` is the number of fixes of the
+    flight that were to be used, ``unused`` flight without any.
     """
 
     full: Examination
@@ -60,6 +61,7 @@ class Evidence:
     final: Examination
     families: tuple[Effect, ...]
     doubts: Mapping[str, Sequence[str]]
+    companions: Companions
     believed: int = 0
     unused: tuple[Unused, ...] = ()
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.examination import VELOCITY, Examination
-from onboard.core.diagnosis.jumps import jump_near
+from onboard.core.diagnosis.jumps import jump_near, reach_of_blocks
 from onboard.core.diagnosis.limits import CLEARLY, JUMP_SHARE
 from onboard.core.filter.refused import Refused
 from onboard.core.physics.finding import Finding
@@ -35,7 +35,8 @@ def refused_beside_a_jump(full: Examination, fault: Finding, t0: float) -> Refus
     inside = [(stamp, VELOCITY[0]) for stamp in _stamps(full, fault, t0)]
     faulty = Refused([*inside, *full.refused_velocities().items()])
     as_fault = full.beside((), faulty).with_rows()
-    as_jump = full.beside((jump_near(full, (), start),)).with_rows()
+    jump = jump_near(full, (), start, reach_of_blocks(full))
+    as_jump = full.beside((jump,)).with_rows()
     still, were = (sum(made.refused[name] for name in VELOCITY) for made in (as_jump, as_fault))
     likelier = as_jump.log_likelihood - as_fault.log_likelihood > CLEARLY / 2.0
     return as_jump.refused_velocities() if likelier and still < JUMP_SHARE * were else None

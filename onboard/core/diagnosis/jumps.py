@@ -72,13 +72,19 @@ def shown_from(
     return out if with_others is None else np.minimum(out, with_others)
 
 
-def jump_near(full: Examination, chosen: Sequence[Effect], centre: float) -> BiasStep:
+def jump_near(full: Examination, chosen: Sequence[Effect], centre: float, reach: float) -> BiasStep:
     """The jump near ``centre`` (s) that explains most beside ``chosen``.
 
     One that is found at the edge of where it was looked for is looked for further there.
+
+    Args:
+        full: the flight with every column.
+        chosen: effects that are in the model.
+        centre: s.
+        reach: s to either side in which it is looked for first: how well the centre is known.  A
+            flight may have another one further off.
     """
     coarse, fine = SPACINGS_S
-    reach = _reach(full)
     for _ in range(FURTHEST):
         best = _best(full, chosen, centre, coarse, reach)
         at_edge = abs(best.moment - centre) > reach - 2.0 * coarse
@@ -143,8 +149,8 @@ def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
     return surprise(gain, len(shock.unknowns), full.trusted_s / SPACINGS_S[-1]) >= least()
 
 
-def _reach(full: Examination) -> float:
-    """At the start of a block, a jump shows that is anywhere in those beside it."""
+def reach_of_blocks(full: Examination) -> float:
+    """s: at the start of a block, a jump shows that is anywhere in those beside it."""
     return 1.5 * float(np.median([b.end - b.start for b in full.blocks]))
 
 

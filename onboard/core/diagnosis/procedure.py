@@ -28,7 +28,7 @@ from onboard.core.diagnosis.jumps import (
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import CLEARLY, FURTHEST, SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY, FURTHEST, SCAN_S, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
@@ -73,7 +73,9 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     return Judge(
         calibrator,
         imu,
-        Evidence(full, choice, final, tuple(families), rivals, believed(flight), unused),
+        Evidence(
+            full, choice, final, tuple(families), rivals, companions, believed(flight), unused
+        ),
         origin,
         clear.absent,
         tuple(e for e in (clear.rail, clear.fault) if e is not None),
@@ -201,7 +203,7 @@ def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
     best = max(looked, key=lambda at: at.gain)
     if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < -2.0 * log(SEARCHED):
         return None
-    return jump_near(full, (), best.moment)
+    return jump_near(full, (), best.moment, SCAN_S)
 
 
 def _wanders(choice: Choice) -> bool:
