@@ -128,11 +128,12 @@ def compared(
     for name, value in truth.items():
         old = before.numbers.get(name, (0.0, 0.0))[0]
         new, sigma = after.numbers.get(name, (0.0, 0.0))
-        hidden = name.split(".")[0] in after.blind or after.verdict == SILENT
+        effect = name.partition(".")[0]
+        hidden = effect in after.blind or after.verdict == SILENT
         hidden = hidden or abs(value - old) < after.smallest.get(name, 0.0)
-        changes.append(
-            Change(name, value - old, new - old, sigma, name in after.numbers, hidden=hidden)
-        )
+        # What a nuisance says of an effect that is not named has its prior in its sigma.
+        told = name in after.numbers and (effect == name or effect in after.names)
+        changes.append(Change(name, value - old, new - old, sigma, told, hidden=hidden))
     moved = max(
         abs(after.numbers[n][0] - before.numbers[n][0]) / after.numbers[n][1]
         for n in SIX_NAMES

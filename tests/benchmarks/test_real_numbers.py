@@ -178,6 +178,19 @@ def test_what_a_flight_does_not_claim_to_know_is_recovered_but_not_seen() -> Non
     assert not o.seen
 
 
+@pytest.mark.parametrize(("smallest", "seen"), [(0.7, False), (0.3, True)])
+def test_of_an_effect_that_is_not_named_the_smallest_size_counts_not_a_nuisance(
+    smallest: float, seen: bool
+) -> None:
+    """The antenna's nuisance is within centimetres by its prior, whatever the flight shows."""
+    kind = next(k for k in KINDS if k.name.startswith("antenna x"))
+    name = "gps_lever_arm.x"
+    before, after = said({name: (0.0, 0.04)}), said({name: (0.1, 0.04)})
+    o = compared("a", kind, before, replace(after, smallest={name: smallest}), {name: 0.5})
+    assert o.seen is seen
+    assert not o.recovered
+
+
 def test_the_mean_force_is_of_the_flight_before_its_end() -> None:
     """Standing it reads 1, flying 2, after the crash 9."""
     samples: list[Sample] = []
