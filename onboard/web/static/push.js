@@ -65,6 +65,7 @@ export class Push {
       { class: "proposal", "data-imu": proposal.imu },
       h("h3", { text: title }),
       changesTable(proposal.changes),
+      h("p", { class: "soft", text: "± is of accelerometer and gyroscope together, by which the vehicle navigates. On its card it is of the accelerometer alone, against which the gyroscope may be turned." }),
       ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
       ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map((text) => h("li", { text })))] : []),
       h(
