@@ -12,11 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.diagnosis.limits import (
-    NEIGHBOURS,
-    SAMPLE_S,
-    WORTH_A_PASS,
-)
+from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS

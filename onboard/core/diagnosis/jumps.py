@@ -14,15 +14,9 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
+from onboard.core.diagnosis.effort import AT_ONCE, FURTHEST
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import (
-    AT_ONCE,
-    CLEARLY,
-    CONTACT_S,
-    FURTHEST,
-    SCAN_S,
-    SPACINGS_S,
-)
+from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.shocks import Shock

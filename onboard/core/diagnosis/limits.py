@@ -1,7 +1,8 @@
 """Every number of this room that decides something, with where it comes from.
 
 [probability] a chance level, [physics] a bound of nature or of sensors, [cost] processor time or
-memory, [use] what matters to whoever flies, [tuned] set on simulated flights: to be derived.
+memory, [use] what matters to whoever flies, [tuned] set on simulated flights: to be derived.  What
+decides how long it takes, and not what is said, is in :mod:`onboard.core.diagnosis.effort`.
 """
 
 from __future__ import annotations
@@ -38,8 +39,6 @@ MOST_EFFECTS: Final = 5
 FORGOTTEN_S: Final = 35.0
 """s after which a filter that GPS corrects has forgotten nine tenths of what tells a jump of the
 accelerometer, and an EKF has settled [simulated planes and copters: 0.88 to 0.92]."""
-FURTHEST: Final = 3
-"""Times that a search goes on beyond its edge [cost]."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
 SEARCHED: Final = 0.1
@@ -48,24 +47,12 @@ that is found with it in the model [cost]."""
 SCAN_S: Final = 4.0
 """s between the moments at which a jump is looked for: 3 s from where it is it explains half
 [physics: the time in which GPS corrects a velocity]."""
-AT_ONCE: Final = 12
-"""Jumps in one pass of the search [cost: more columns against more flight around them]."""
 CONTACT_S: Final = 10.0
 """s before the end of a flight in which the ground may have been touched: bounces, and the seconds
 that an autopilot takes to see that it has landed [physics]."""
 LARGEST_TURN: Final = 0.2
 """rad/s over the last spacing that a gyroscope may miss in a shock, one sigma: 6 degrees, as much
 as a hard landing turns a vehicle by [physics]."""
-
-# Passes of a diagnosis (examination).
-
-SAMPLE_S: Final = 200.0
-"""s of flight on which noise levels are tried; more does not make them better known [cost]."""
-NEIGHBOURS: Final = 4
-"""Neighbouring batches of the sample: the filter needs ten seconds to settle in each [cost]."""
-WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
-"""Moves of delay (s), squared window (s^2), attitude delay (s) and heading (rad) that are worth
-another pass [cost]."""
 
 # Clipping (clipping, screening).
 
@@ -76,8 +63,6 @@ LEAST_RAIL: Final = 10.3
 MARGIN_S: Final = 0.4
 """s to either side of clipped flight that go with it: a low-pass of 5 Hz rings so long
 [physics]."""
-SHORTEST_S: Final = 4.0
-"""s of flight between two clipped parts that are worth keeping [cost]."""
 
 # False fixes (screening, faults, coasting, refusals).
 

@@ -14,6 +14,7 @@ from math import log
 
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
 from onboard.core.diagnosis.companions import Companion, Companions
+from onboard.core.diagnosis.effort import FURTHEST
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
@@ -28,7 +29,7 @@ from onboard.core.diagnosis.jumps import (
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import CLEARLY, FURTHEST, SCAN_S, SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY, SCAN_S, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight

@@ -14,14 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.coasting import Contradiction, contradictions
+from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.faults import fault_effect
-from onboard.core.diagnosis.limits import (
-    FAULT_M_S,
-    MARGIN_S,
-    OFF,
-    SHORTEST_S,
-)
+from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
 from onboard.core.diagnosis.refusals import OPINIONS, refused
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine, through

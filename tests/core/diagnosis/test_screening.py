@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.limits import MARGIN_S, SHORTEST_S
+from onboard.core.diagnosis.effort import SHORTEST_S
+from onboard.core.diagnosis.limits import MARGIN_S
 from onboard.core.diagnosis.screening import unclipped
 from tests.core.diagnosis.flights import batches, resting
 

@@ -1,0 +1,22 @@
+"""How much work a diagnosis takes on: numbers that cost time and do not decide what is said.
+
+With twice the work the same effects are named, and their sizes move by less than half a sigma.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+SAMPLE_S: Final = 200.0
+"""s of flight on which noise levels are tried; more does not make them better known."""
+NEIGHBOURS: Final = 4
+"""Neighbouring batches of the sample: the filter needs ten seconds to settle in each."""
+WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
+"""Moves of delay (s), squared window (s^2), attitude delay (s) and heading (rad) that are worth
+another pass."""
+FURTHEST: Final = 3
+"""Times that a search goes on beyond its edge."""
+AT_ONCE: Final = 12
+"""Jumps in one pass of the search: more columns against more flight around them."""
+SHORTEST_S: Final = 4.0
+"""s of flight between two clipped parts that are worth keeping."""

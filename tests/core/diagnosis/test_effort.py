@@ -1,0 +1,45 @@
+"""What only costs time decides nothing: with twice the work a diagnosis says the same."""
+
+import pytest
+
+from benchmarks.explaining import heard
+from onboard.core.diagnosis import effort, examination, jumps, procedure
+from onboard.core.diagnosis.procedure import diagnose
+from sitl.builtin import effects as concealed
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec
+
+HALF = 0.5
+"""Sigmas: noise levels that were found on a part of a flight are a little other ones."""
+
+
+@pytest.mark.slow
+def test_twice_the_work_says_the_same(monkeypatch):
+    # Long enough for noise levels to be tried on a part of it.
+    spec = FlightSpec(
+        vehicle="plane",
+        seed=23,
+        duration=330.0,
+        imus=random_imus(23),
+        effects=(concealed.BiasStep(time=150.0, x=0.2, y=-0.1, z=0.1),),
+    )
+    calibrator = heard(spec)
+    found = diagnose(calibrator, 1)
+    more = {
+        (examination, "SAMPLE_S"): 2.0 * effort.SAMPLE_S,
+        (examination, "NEIGHBOURS"): 2 * effort.NEIGHBOURS,
+        (examination, "WORTH_A_PASS"): tuple(0.5 * x for x in effort.WORTH_A_PASS),
+        (jumps, "FURTHEST"): 2 * effort.FURTHEST,
+        (jumps, "AT_ONCE"): effort.AT_ONCE // 2,
+        (procedure, "FURTHEST"): 2 * effort.FURTHEST,
+    }
+    for (module, name), value in more.items():
+        monkeypatch.setattr(module, name, value)
+    again = diagnose(calibrator, 1)
+    assert {e.name for e in again.effects} == {e.name for e in found.effects} >= {"bias_step"}
+    for one, two in zip(found.effects, again.effects, strict=True):
+        for key, q in one.unknowns.items():
+            assert two.unknowns[key].value == pytest.approx(q.value, abs=HALF * q.sigma), key
+    one, two = found.calibration, again.calibration
+    assert two.scale == pytest.approx(one.scale, abs=HALF * min(one.scale_sigma))
+    assert two.offset == pytest.approx(one.offset, abs=HALF * min(one.offset_sigma))
