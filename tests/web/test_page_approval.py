@@ -38,6 +38,13 @@ def test_approval_shows_before_and_after_and_cancelling_changes_nothing(browser,
     assert served.told.asked == []
 
 
+def test_it_is_said_once_what_the_sigma_of_a_written_value_is_of(browser, served):
+    """A card's has the gyroscope's axes in it: it may be many times as large."""
+    served.tell(story(160))
+    browser.open(served.url)
+    assert browser.text("#proposals").count("accelerometer and gyroscope together") == 1
+
+
 @pytest.mark.slow
 def test_roll_back_and_forgetting(browser, served):
     served.tell(story(30), push=wrote(story(0).push))

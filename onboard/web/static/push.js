@@ -15,6 +15,7 @@ const QUESTIONS = {
   rollback: (imus) => [`Roll back ${imus}?`, "The values from before the last push are written again:"],
   reset: () => ["Forget what was learned?", "Of all accelerometers: learning begins anew. The autopilot's parameters stay as they are."],
 };
+const SIGMAS = () => h("p", { class: "soft", text: "± here: accelerometer and gyroscope together, which is what navigates. On the cards: the accelerometer alone." });
 const LABELS = { approve: "Approve", override: "Approve all the same", reject: "Reject", rollback: "Roll back", reset: "Forget what was learned" };
 
 export class Push {
@@ -46,7 +47,7 @@ export class Push {
     const states = new Map(imus.map(({ imu, state }) => [imu, state]));
     renew(byId("proposals"), [push.proposals, [...states]], () =>
       push.proposals.length
-        ? push.proposals.map((proposal) => this.proposal(proposal, states.get(proposal.imu)))
+        ? [...push.proposals.map((proposal) => this.proposal(proposal, states.get(proposal.imu))), SIGMAS()]
         : [h("p", { class: "soft", text: "Nothing is proposed yet: no accelerometer has an answer that differs from the values in force." })],
     );
     renew(byId("push-all"), [push.can_roll_back, imus.length > 0], () => [
@@ -65,7 +66,6 @@ export class Push {
       { class: "proposal", "data-imu": proposal.imu },
       h("h3", { text: title }),
       changesTable(proposal.changes),
-      h("p", { class: "soft", text: "± is of accelerometer and gyroscope together, by which the vehicle navigates. On its card it is of the accelerometer alone, against which the gyroscope may be turned." }),
       ...(proposal.changes.some((c) => c.kept) ? [h("p", { class: "soft", text: "Kept: not shown by the flight, stays as it is." })] : []),
       ...(reasons.length ? [h("p", { class: "soft", text: "Not written now because:" }), h("ul", { class: "held" }, ...reasons.map((text) => h("li", { text })))] : []),
       h(
