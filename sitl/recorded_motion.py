@@ -20,6 +20,7 @@ from sitl.builtin.airframe.motion import Motion, leaning
 from sitl.builtin.smoothing import DT, Array, smooth
 from sitl.builtin.trajectory import Environment, Start, whole_samples
 from sitl.builtin.world import Vehicle
+from sitl.ends import grounded
 from sitl.errors import SitlError
 
 SMOOTHING_S = (0.2, 0.14, 0.1, 0.06)
@@ -47,6 +48,8 @@ class _Rows:
     velocity: list[tuple[float, float, float, float]] = field(default_factory=list)
     attitude: list[tuple[float, float, float, float]] = field(default_factory=list)
     fallback: list[tuple[float, float, float, float]] = field(default_factory=list)
+    height: list[tuple[float, float]] = field(default_factory=list)
+    above_home: list[tuple[float, float]] = field(default_factory=list)
     plane: bool = False
     home: tuple[float, float, float] | None = None
 
@@ -65,7 +68,7 @@ def recorded_motion(path: str | Path, wind: tuple[float, float] = (0.0, 0.0)) ->
     file = Path(path)
     rows = _of_tlog(file) if file.suffix.lower() == ".tlog" else _of_dataflash(file)
     if not rows.velocity:
-        rows.velocity = rows.fallback
+        rows.velocity, rows.height = rows.fallback, rows.above_home
     if len(rows.velocity) < 20 or len(rows.attitude) < 20:
         raise SitlError(f"{file.name} has no velocity or no attitude that could be flown again")
     home = Environment()
@@ -78,6 +81,9 @@ def recorded_motion(path: str | Path, wind: tuple[float, float] = (0.0, 0.0)) ->
 
 def _motion(rows: _Rows, name: str, wind: tuple[float, float]) -> Motion:
     velocity = np.array(_sorted(rows.velocity))
+    if not rows.plane:
+        heights = np.array(_sorted(rows.height)).reshape(-1, 2)
+        velocity = grounded(velocity, heights, FLYING["copter"])
     speed = np.linalg.norm(velocity[:, 1:], axis=1)
     fast = velocity[speed > FLYING["plane" if rows.plane else "copter"], 0]
     if not len(fast):
@@ -132,9 +138,11 @@ def _of_tlog(path: Path) -> _Rows:
             case "LOCAL_POSITION_NED":
                 t = message.time_boot_ms * 1e-3
                 rows.velocity.append((t, message.vx, message.vy, message.vz))
+                rows.height.append((t, -message.z))
             case "GLOBAL_POSITION_INT":
                 t = message.time_boot_ms * 1e-3
                 rows.fallback.append((t, *(x * 0.01 for x in (message.vx, message.vy, message.vz))))
+                rows.above_home.append((t, message.relative_alt * 1e-3))
                 if rows.home is None and message.lat:
                     ground = (message.alt - message.relative_alt) * 1e-3
                     rows.home = (message.lat * 1e-7, message.lon * 1e-7, ground)
@@ -163,6 +171,7 @@ def _of_dataflash(path: Path) -> _Rows:
             case "XKF1" if message.C == 0:
                 t = message.TimeUS * 1e-6
                 rows.velocity.append((t, message.VN, message.VE, message.VD))
+                rows.height.append((t, -message.PD))
             case "ATT":
                 angles = np.radians([message.Roll, message.Pitch, message.Yaw])
                 rows.attitude.append((message.TimeUS * 1e-6, *(float(x) for x in angles)))
