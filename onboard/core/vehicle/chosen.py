@@ -7,9 +7,13 @@ difference from the nominal airframe matters beyond its uncertainty.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.choices import Choices, Solved
 from onboard.core.vehicle.fit import Fit
@@ -25,8 +29,9 @@ class Chosen:
         gains: fall of chi-square by each, beside the others.
         rivals: for each, effects that would do as well in its place.
         untestable: effects that this flight could not have shown at any plausible size.
-        suspected: those of them that explain more than chance all the same: something is there, of
-            which nobody knows the numbers.
+        suspected: effects that explain more than chance and are not taken in all the same, because
+            nobody knows their numbers: something is there.
+        partly: effects of which gusts hide a part: an unknown of theirs is not testable.
     """
 
     effects: tuple[str, ...]
@@ -34,6 +39,7 @@ class Chosen:
     rivals: dict[str, tuple[str, ...]]
     untestable: tuple[str, ...]
     suspected: tuple[str, ...] = ()
+    partly: tuple[str, ...] = ()
 
 
 def choose(choices: Choices) -> Chosen:
@@ -53,12 +59,35 @@ def choose(choices: Choices) -> Chosen:
         chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, level)
     rivals = {n: _rivals(choices, chosen, n) for n in chosen}
-    asked = [n for n in untestable if _needs(n, chosen)]
-    left = choices.solved(chosen).chi2
-    would = {n: left - choices.solved([*chosen, n]).chi2 for n in asked}
-    suspected = tuple(n for n in asked if _no_chance(choices, chosen, n, would[n], level))
     effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
-    return Chosen(effects, gains, rivals, untestable, suspected)
+    suspected = _suspected(choices, chosen, level)
+    hidden = () if fit.turned is None else candidates
+    partly = tuple(n for n in hidden if any(_untestable(fit, fit.model.indices(n))))
+    return Chosen(effects, gains, rivals, untestable, suspected, partly)
+
+
+def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[str, ...]:
+    """Effects that are not taken in, and explain more than chance by numbers that may matter.
+
+    Where gusts leave one combination of an effect's numbers, it has to be large to be named.  That
+    nothing is there is then no longer sure from where the combination is off by :data:`SURE`.
+    """
+    left = choices.solved(chosen).chi2
+    out = []
+    for n in choices.names:
+        if n in chosen or not _needs(n, chosen):
+            continue
+        places = choices.fit.model.indices(n)
+        its = level
+        if together_testable(choices.fit, places) is not None:
+            its = math.erfc(SURE / math.sqrt(2.0))
+        elif _testable(choices.fit, n):
+            continue
+        with_it = choices.solved([*chosen, n])
+        slight = _slight(choices.fit, places, with_it)
+        if not slight and _no_chance(choices, chosen, n, left - with_it.chi2, its):
+            out.append(n)
+    return tuple(out)
 
 
 def _needs(name: str, chosen: Sequence[str]) -> bool:
@@ -88,18 +117,47 @@ def _no_chance(
         at = choices.solved([*chosen, name])
         off = (fit.theta + at.x - fit.model.nominal)[places]
         gain = min(gain, at.apart(places, off))
-    if survival(gain, len(places)) > level:
+    # What is known of unknowns together is one number.
+    count = len(places) if together_testable(fit, places) is None else 1
+    if survival(gain, count) > level:
         return False
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
 
 def _matters(fit: Fit, places: Sequence[int], at: Solved) -> bool:
-    """Whether one of the unknowns is off by more than matters, surely."""
+    """Whether an unknown, or what is known of them together, is surely off by more than matters."""
     unknowns = fit.model.unknowns
-    apart = [abs(fit.theta[i] + at.x[i] - unknowns[i].nominal) for i in places]
-    return any(
-        d > unknowns[i].floor + SURE * at.sigma[i] for d, i in zip(apart, places, strict=True)
-    )
+    off = _off(fit, places, at)
+    each = [(unknowns[i].floor, float(at.sigma[i])) for i in places]
+    if any(abs(d) > floor + SURE * s for d, (floor, s) in zip(off.tolist(), each, strict=True)):
+        return True
+    way = together_testable(fit, places)
+    if way is None:
+        return False
+    size, floor, sigma = _along(fit, places, at, way)
+    return size > floor + SURE * sigma
+
+
+def _slight(fit: Fit, places: Sequence[int], at: Solved) -> bool:
+    """Whether what is known of unknowns together is surely off by no more than matters."""
+    way = together_testable(fit, places)
+    if way is None:
+        return False
+    size, floor, sigma = _along(fit, places, at, way)
+    return size + SURE * sigma < floor
+
+
+def _off(fit: Fit, places: Sequence[int], at: Solved) -> Array:
+    out: Array = (fit.theta + at.x - fit.model.nominal)[list(places)]
+    return out
+
+
+def _along(fit: Fit, places: Sequence[int], at: Solved, way: Array) -> tuple[float, float, float]:
+    """By how much unknowns are off in a direction (p,), what of that matters, and its sigma."""
+    floors = np.array([fit.model.unknowns[i].floor for i in places])
+    inside = at.covariance[np.ix_(list(places), list(places))]
+    off = abs(float(way @ _off(fit, places, at)))
+    return off, float(np.linalg.norm(way * floors)), math.sqrt(float(way @ inside @ way))
 
 
 def _pruned(
@@ -140,6 +198,33 @@ def _rivals(choices: Choices, chosen: Sequence[str], name: str) -> tuple[str, ..
 
 
 def _testable(fit: Fit, name: str) -> bool:
-    """Whether the largest plausible size would have been seen in one of the unknowns."""
+    """Whether the largest plausible size would have been seen, of one unknown or of all."""
+    places = fit.model.indices(name)
+    return not all(_untestable(fit, places)) or together_testable(fit, places) is not None
+
+
+def _untestable(fit: Fit, places: Sequence[int]) -> list[bool]:
+    """Of each unknown, whether the flight would not have shown it at the largest plausible size."""
     sigma, unknowns = fit.sigma, fit.model.unknowns
-    return any(TESTABLE * sigma[i] < unknowns[i].plausible for i in fit.model.indices(name))
+    return [TESTABLE * float(sigma[i]) >= unknowns[i].plausible for i in places]
+
+
+def together_testable(fit: Fit, places: Sequence[int]) -> Array | None:
+    """(p,) direction in which unknowns are testable together, where one alone is not.
+
+    Gusts leave such (:mod:`onboard.core.vehicle.across`): the lift at one angle of attack, not what
+    of it is its slope's.  None where there are no gusts, or nothing is known in that direction.
+    """
+    effect = fit.model.effect_of(places[0])
+    if fit.turned is None or not effect.together or not any(_untestable(fit, places)):
+        return None
+    plausible = fit.model.plausible[list(places)]
+    every = list(range(len(fit.theta)))
+    known: Array = fit.covariance + fit.untold(fit.information, every)
+    inside: Array = known[np.ix_(list(places), list(places))] / np.outer(plausible, plausible)
+    variances, ways = np.linalg.eigh(inside)
+    if TESTABLE * np.sqrt(variances[0]) >= 1.0:
+        return None
+    # The first of the unknowns tells the unit.
+    way: Array = ways[:, 0] / plausible * (plausible[0] / ways[0, 0])
+    return way

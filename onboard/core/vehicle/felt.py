@@ -11,6 +11,8 @@ force, right where the angle has the error: W. A. Fuller, *Measurement Error Mod
 That takes the lift for known.  Its slope cannot be told from angles that gusts scatter, so it is
 nominal, and the lift at no angle what the mean force upwards makes it.  What the slope may be
 instead, and how well wind and airspeed are known, are doubts of what is found.
+
+The lift itself, and the side force, are told as :mod:`onboard.core.vehicle.across` says.
 """
 
 from __future__ import annotations
@@ -21,21 +23,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.across import UP, Rows, across, whitened_axis
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
+from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.fit import BlockSums, Fit, inflation_of
 from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel
-from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.windows import windows_of
 
-AHEAD, UP, SENSED = 0, 2, -1
+AHEAD, SENSED = 0, -1
 """Places of the axes: a plane with throttle and airspeed has x, y, z and the sensor."""
 STEPS = 25
 """Steps at the most: what is left is nearly linear [cost]."""
@@ -56,15 +59,6 @@ class Felt:
     fit: Fit
     places: tuple[int, ...]
     lean: Array
-
-
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Whitened force ahead: (r,) what is left, (r, m) regressors, and the noise."""
-
-    left: Array
-    regressors: Array
-    noise: AxisNoise
 
 
 def felt_by(fit: Fit) -> Felt | None:
@@ -88,7 +82,10 @@ def felt_by(fit: Fit) -> Felt | None:
         if float(np.max(np.abs(step) / np.sqrt(np.diag(np.linalg.inv(N))))) < SETTLED:
             break
     rows = _rows(model, theta)
-    return Felt(_summed(fit, theta, rows, mine), tuple(mine), _lean(fit, theta, rows, mine))
+    theta, side, up = across(fit, theta)
+    places = (*mine, *model.indices(Lift.name), *model.indices(SideForce.name))
+    found = _summed(fit, theta, (rows, side, up), mine)
+    return Felt(found, places, _lean(fit, theta, rows, mine))
 
 
 def _told_ahead(model: ForceModel) -> list[int]:
@@ -114,7 +111,7 @@ def _balanced(model: ForceModel, theta: Array) -> Array:
     return out
 
 
-def _rows(model: ForceModel, theta: Array) -> _Rows:
+def _rows(model: ForceModel, theta: Array) -> Rows:
     """The force ahead without gusts, at unknowns (m,)."""
     here = model.predicted(theta)
     residual = model.measured() - here
@@ -137,11 +134,7 @@ def _rows(model: ForceModel, theta: Array) -> _Rows:
 
     windows = windows_of(model.flight)
     left, columns = windows.mean(apart(residual)), windows.mean(apart(steady.jacobian(theta)))
-    even = np.ones(len(left))
-    noise = fitted_noise(left, even, windows.piece, windows.length_s)
-    every = np.column_stack([left, columns])
-    made = whitened(every, noise, even, windows.piece, windows.length_s)
-    return _Rows(made[:, 0], made[:, 1:], noise)
+    return whitened_axis(left, columns, windows)
 
 
 def _north(model: ForceModel, x_b: Array) -> Array:
@@ -163,7 +156,7 @@ def _steadied(model: ForceModel, theta: Array, missing: Array) -> ForceModel:
     return replace(model, flight=replace(flight, v_b=v_b))
 
 
-def _lean(fit: Fit, theta: Array, ahead: _Rows, mine: Sequence[int]) -> Array:
+def _lean(fit: Fit, theta: Array, ahead: Rows, mine: Sequence[int]) -> Array:
     """(m, l) scores by a standard deviation of the lift's slope, of the wind, of the airspeed."""
     model = fit.model
     constant, slope = model.indices(Lift.name)
@@ -179,27 +172,25 @@ def _lean(fit: Fit, theta: Array, ahead: _Rows, mine: Sequence[int]) -> Array:
     return out
 
 
-def _summed(fit: Fit, theta: Array, ahead: _Rows, mine: Sequence[int]) -> Fit:
-    """Sums of both: the force ahead tells what is ``mine``, the other axes all else."""
+def _summed(fit: Fit, theta: Array, rows: tuple[Rows, ...], mine: Sequence[int]) -> Fit:
+    """Sums of all axes: the first of the rows tells what is ``mine``, the others all else."""
     model, m = fit.model, len(theta)
     residual = model.measured() - model.predicted(theta)
     jacobian = model.jacobian(theta)
     sensitivity = model.sensitivity(theta)
     windows = windows_of(model.flight)
-    even = np.ones(len(windows.first))
-    upwards = fitted_noise(windows.mean(residual[:, UP]), even, windows.piece, windows.length_s)
-    noise = (ahead.noise, fit.noise[1], upwards, *fit.noise[3:])
+    noise = (*(its.noise for its in rows), *fit.noise[len(rows) :])
     every = whitened_rows(model, residual, jacobian, noise, sensitivity)
     told = np.zeros(m, dtype=bool)
     told[list(mine)] = True
-    every[AHEAD] = np.column_stack([ahead.left, np.where(told, ahead.regressors, 0.0)])
-    for k in range(1, len(every)):
-        every[k][:, 1:] = np.where(told, 0.0, every[k][:, 1:])
+    every[: len(rows)] = [np.column_stack([its.left, its.regressors]) for its in rows]
+    for k, axis in enumerate(every):
+        axis[:, 1:] = np.where(told == (k == AHEAD), axis[:, 1:], 0.0)
     of_row = fit.block[windows.first]
     sums = []
     for number in np.unique(of_row):
-        rows = np.concatenate([r[of_row == number] for r in every])
-        y, h = rows[:, 0], rows[:, 1:]
+        its = np.concatenate([r[of_row == number] for r in every])
+        y, h = its[:, 0], its[:, 1:]
         sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y)))
     return replace(
         fit,

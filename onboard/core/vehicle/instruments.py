@@ -62,7 +62,7 @@ def whitened_rows(
             m = jacobian.shape[-1]
             mine, other = made[:, 1 : 1 + m], made[:, 1 + m :]
             by = other if sideways else _past(mine, windows.piece)
-            made = np.hstack([made[:, :1], _told(mine, by)])
+            made = np.hstack([made[:, :1], told_by(mine, by)])
         out.append(made)
     return out
 
@@ -78,7 +78,7 @@ def _past(rows: Array, piece: NDArray[np.int64]) -> Array:
     return np.hstack(past)
 
 
-def _told(rows: Array, instruments: Array) -> Array:
+def told_by(rows: Array, instruments: Array) -> Array:
     """(r, m) rows as far as a linear combination of the instruments tells them."""
     size = np.linalg.norm(instruments, axis=0)
     instruments = instruments[:, size > 0.0] / size[size > 0.0]

@@ -29,6 +29,8 @@ from onboard.core.vehicle.records import (
 from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
 from onboard.core.vehicle.wind_record import wind_of
 
+PARTLY = "gusts hide a part of its numbers, and only the rest was tested"
+
 
 def vehicle_match(
     m: Matched,
@@ -121,6 +123,9 @@ def not_testable_of(
     why = dict(absent)
     for name in m.chosen.untestable:
         why.setdefault(name, "the flight would not have shown it")
+    for name in m.chosen.partly:
+        if name not in m.chosen.effects:
+            why.setdefault(name, PARTLY)
     return tuple(
         NotTestable(name, f"{reason}; {shown_by[name]}" if shown_by.get(name) else reason)
         for name, reason in why.items()
@@ -193,13 +198,10 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 def is_explained(m: Matched) -> bool:
     """Whether what is left is less than errors of the motion, or the gusts found, make."""
-    if m.remainders:
+    if m.remainders or m.chosen.suspected:
         return False
     if m.turbulence.found:
         return True
-    if m.chosen.suspected:
-        # No gust was shown that could have made it.
-        return False
     unclear = m.model.unclear(m.fit.theta)
     return all(
         rms(m.held[:, k]) < rms(unclear[:, k])
@@ -211,7 +213,7 @@ def is_explained(m: Matched) -> bool:
 def note_of(m: Matched) -> str:
     """What a person must know of flight that is not described or was not used; may be empty."""
     said = (
-        "" if m.turbulence.found else suspected_sentence(m.chosen.suspected),
+        suspected_sentence(m.chosen.suspected),
         remainder_sentence(m.remainders),
         left_out_sentence(m.left_out),
     )
@@ -225,7 +227,7 @@ def suspected_sentence(names: tuple[str, ...]) -> str:
     its = "its" if len(names) == 1 else "their"
     return (
         f"{listed(list(names))} would explain a part of what is left, but this flight does not "
-        f"determine {its} numbers (see what was not tested)"
+        f"determine {its} numbers"
     )
 
 

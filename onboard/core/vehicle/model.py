@@ -78,6 +78,10 @@ class ForceModel:
         """The effect of this name, which is in the model."""
         return next(e for e in self.effects if e.name == name)
 
+    def effect_of(self, place: int) -> Effect:
+        """The effect that an unknown belongs to."""
+        return self.effects[self._owners[place]]
+
     def index(self, unknown: str) -> int:
         """Place of an unknown by its own name, of the first effect that has it.
 

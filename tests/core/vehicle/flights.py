@@ -103,6 +103,7 @@ def plane_flight(
     seconds=240.0,
     wind=(0.0, 0.0),
     c_lift_0=0.56,
+    c_lift_a=6.9,
     c_drag_p=0.1,
     c_y_b=-0.98,
     ratio=1.0,
@@ -116,6 +117,7 @@ def plane_flight(
     heading_off=0.0,
     noise=0.05,
     gusts=0.0,
+    rudder_by_slip=0.0,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -123,7 +125,8 @@ def plane_flight(
     share of what that brakes, and the ``bend`` of that line at its end; drag by the square of
     sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
     recorded heading, rad, of the force's noise, m/s^2, and of gusts along each axis that carry the
-    plane along, so that it flies through them as through still air, m/s.
+    plane along, so that it flies through them as through still air, m/s.  The rudder moves at
+    random, and by the sideslip that it holds.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -140,11 +143,11 @@ def plane_flight(
     height = 700.0 + smooth(rng, n, 10.0, 8.0)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     q = 0.5 * rho * rho / 1.225 * speed**2 * 0.45 / 2.0
-    lift = c_lift_0 + 6.9 * alpha
+    lift = c_lift_0 + c_lift_a * alpha
     drag = c_drag_p + lift**2 / (np.pi * 0.9 * 1.88**2 / 0.45) + slip_drag * beta**2
     drag = drag + slip_straight * np.abs(beta)
     throttle = 0.5 + np.clip(smooth(rng, n, throttle_swing), -0.48, 0.48)
-    rudder = smooth(rng, n, 0.15)
+    rudder = smooth(rng, n, 0.15 if not rudder_by_slip else 0.02) + rudder_by_slip * beta
     decay = np.exp(-STEP / 0.14)
     late = np.empty((2, n))
     for row, command in zip(late, (throttle, rudder), strict=True):

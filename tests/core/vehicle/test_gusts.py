@@ -97,3 +97,53 @@ def test_thrust_is_found_in_gusts():
     assert told(match) == {"thrust_scale"}
     number = match.numbers["thrust_scale.ratio"]
     assert abs(number.real - 0.75) < 3.0 * number.sigma
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("c_lift_0", [0.36, 0.76])
+def test_lift_is_found_in_gusts_by_its_mean(c_lift_0):
+    match = matched(seed=46, gusts=0.5, c_lift_0=c_lift_0)
+    assert told(match) == {"lift"}
+    constant, slope = (match.numbers[f"lift.{key}"] for key in ("c_lift_0", "c_lift_a"))
+    assert abs(constant.real - c_lift_0) < 3.0 * constant.sigma
+    assert abs(slope.real - 6.9) < 3.0 * slope.sigma
+    # How much of it is the slope's the gusts hide, and the mean lift is known all the same.
+    assert slope.sigma > 1.0
+    mean = constant.real - 0.03 * slope.real
+    assert mean == pytest.approx(c_lift_0 - 0.03 * 6.9, abs=0.06)
+
+
+@pytest.mark.slow
+def test_side_force_is_found_in_gusts_by_the_rudder_that_holds_the_sideslip():
+    match = matched(seed=47, gusts=0.3, c_y_b=-0.4, rudder_by_slip=3.0)
+    assert told(match) == {"side_force"}
+    number = match.numbers["side_force.c_y_b"]
+    assert abs(number.real + 0.4) < 3.0 * number.sigma
+
+
+@pytest.mark.slow
+def test_a_rudder_that_follows_the_sideslip_is_not_taken_for_side_force():
+    """It knows the sideslip without the gusts: least squares would give it all of the force."""
+    match = matched(seed=47, gusts=0.5, rudder_by_slip=3.0)
+    assert told(match) == set()
+    for key, truth in (("c_y_b", -0.98), ("c_y_deltar", -0.2)):
+        number = match.numbers[f"side_force.{key}"]
+        assert abs(number.real - truth) < number.sigma
+
+
+@pytest.mark.slow
+def test_what_gusts_hide_is_not_called_tested():
+    """With a rudder that knows nothing of the sideslip, nothing tells its force."""
+    match = matched(seed=47, gusts=0.5, c_y_b=-0.45)
+    assert told(match) == set()
+    assert match.numbers["side_force.c_y_b"].sigma > 0.4
+    assert "gusts" in next(n.why for n in match.not_testable if n.name == "side_force")
+
+
+@pytest.mark.slow
+def test_a_lift_between_nothing_and_what_can_be_named_is_not_called_explained():
+    match = matched(seed=50, gusts=0.5, c_lift_0=0.68)
+    assert told(match) == set()
+    assert not match.explained
+    assert "lift would explain" in match.note
+    assert "gusts" in next(n.why for n in match.not_testable if n.name == "lift")

@@ -55,10 +55,12 @@ class Effect(ABC):
         name: in the controlled vocabulary; empty for what is only estimated beside the effects.
         unknowns: its numbers.
         manoeuvre: what would show it, as an imperative.
+        together: whether it is asked what its unknowns do together where gusts hide single ones.
     """
 
     name: str = ""
     manoeuvre: str = ""
+    together: bool = False
 
     def __init__(self, unknowns: Sequence[Unknown]) -> None:
         """Take the unknowns."""

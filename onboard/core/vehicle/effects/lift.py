@@ -19,6 +19,7 @@ class Lift(Effect):
 
     name = "lift"
     manoeuvre = "fly slow and fast level legs, and turns of 45 degrees"
+    together = True
 
     def __init__(self, frame: PlaneAirframe) -> None:
         """Nominally the file's."""

@@ -8,14 +8,21 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.recursion import lagged
 
 FLOOR_S = 0.03
 """Lags below this are within the steps of outputs logged at 10 Hz, s [data sheet]."""
 LONGEST_S = 1.0
+LEAST_S = 0.005
+"""Below it the lag acts in proportion: a tenth of a step of the outputs is no more than a slope."""
 
 
 class MotorLag(Effect):
-    """Thrust follows the command with a lag, whose first moment this is."""
+    """Thrust follows the command behind a low-pass of first order.
+
+    That is what inertia makes of a motor.  A mere delay turns the phase of a tenth of a second by
+    more than the low-pass does, and would be found an eighth too short.
+    """
 
     name = "motor_lag"
     manoeuvre = "give short bursts of throttle, and log the outputs at 50 Hz or faster"
@@ -25,12 +32,13 @@ class MotorLag(Effect):
         super().__init__([Unknown("time_constant", 0.0, 0.1, FLOOR_S, "s", doubt=0.003)])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
-        """Delay the commands."""
+        """Slow the commands down; a lag that is less than none leads by as much."""
         if air.commands is None:
             return
-        t, lag = air.flight.t, float(np.clip(values[0], -LONGEST_S, LONGEST_S))
-        c = air.commands
-        air.commands = np.stack([np.interp(t - lag, t, c[:, j]) for j in range(c.shape[1])], 1)
+        lag = float(np.clip(values[0], -LONGEST_S, LONGEST_S))
+        tau = max(abs(lag), LEAST_S)
+        late = lagged(air.commands, tau, air.flight.piece, air.flight.step_s)
+        air.commands = air.commands + lag / tau * (late - air.commands)
 
     def missing(self, air: Air) -> str:
         """It takes outputs."""

@@ -23,6 +23,7 @@ class SideForce(Effect):
 
     name = "side_force"
     manoeuvre = "kick the rudder to both sides, or fly uncoordinated turns"
+    together = True
 
     def __init__(self, frame: PlaneAirframe) -> None:
         """Nominally the file's."""
