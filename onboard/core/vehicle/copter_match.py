@@ -28,9 +28,9 @@ from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import APART
+from onboard.core.vehicle.limits import AMBIGUOUS, APART
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
-from onboard.core.vehicle.matching import Matched, matched
+from onboard.core.vehicle.matching import Matched, held_out, matched
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Signals
@@ -46,7 +46,7 @@ RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
     # ArduPilot's rotors that lean drag more on one axis.
     ("thrust_tilt", {"by_components": True}),
 )
-"""Where an effect was found, another form of the model: that which predicts better is taken."""
+"""Where an effect was found, another form of the model; see :func:`_better`."""
 
 
 def match_copter(
@@ -69,7 +69,7 @@ def match_copter(
         if name in found.chosen.effects:
             other_form = replace(variant, **change)
             other = matched(copter_model(flight, frame, force_sigma, other_form))
-            if rms(other.held) < rms(found.held):
+            if _better(other, found):
                 variant, found = other_form, other
     effects = tuple(
         _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
@@ -84,6 +84,23 @@ def match_copter(
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
     )
+
+
+def _better(other: Matched, found: Matched) -> bool:
+    """Whether another form of the model predicts better; of two alike, whether it needs less.
+
+    Alike are forms whose log-likelihoods on flight that was not used differ by less than
+    :data:`AMBIGUOUS`, with the same effects in both.  Rotors that lean as far ahead as aside drag
+    alike in all forms, if there is less of the drag: then it is the form that needs no other drag.
+    """
+    fit = found.fit
+    names = tuple(dict.fromkeys((*found.chosen.effects, *other.chosen.effects)))
+    before, after = (rms(held_out(m.choices, names)) for m in (found, other))
+    rows = sum(block.rows for block in fit.blocks) / fit.scale
+    ahead = 2.0 * rows * math.log(before / after)
+    if abs(ahead) > AMBIGUOUS:
+        return ahead > 0.0
+    return len(other.chosen.effects) < len(found.chosen.effects)
 
 
 def _with_battery(

@@ -10,15 +10,18 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import turned_by_gusts
 from onboard.core.vehicle.limits import MOST_OUTLYING, OUTLYING
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import likelihood
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
 from onboard.core.vehicle.remainder import Remainder, left_out, remainders
 from onboard.core.vehicle.turbulence import Turbulence, turbulence_of
+from onboard.core.vehicle.windows import windows_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +56,7 @@ class Matched:
 
 def matched(model: ForceModel) -> Matched:
     """Fit, leave out what is no part of the model, fit again, decide."""
-    whole, fit = model, fitted(model)
+    whole, fit = model, likelier(model)
     kept = _inlying(fit)
     if not kept.all():
         model = replace(model, flight=_cut(model.flight, kept))
@@ -78,6 +81,34 @@ def matched(model: ForceModel) -> Matched:
         remainders(whole, fit),
         left_out(whole.flight, kept),
     )
+
+
+def likelier(model: ForceModel) -> Fit:
+    """The likelier of two fits: from still air, and anew in the wind that it finds.
+
+    Beside a wind that is not known yet all else is pulled about, and may be left in another valley
+    of the likelihood: a propeller that brakes, and twice the thrust to make up for it.
+    """
+    first = fitted(model)
+    if model.instrumented:
+        # Regressors that are told from the past lead to no minimum of a likelihood.
+        return first
+    start, wind = model.nominal, model.indices(Wind.name)
+    start[wind] = first.theta[wind]
+    again = fitted(model, start)
+    return min(first, again, key=deviance)
+
+
+def deviance(fit: Fit) -> float:
+    """Twice the negative logarithm of the likelihood, by the fit's own noise, and of the prior."""
+    windows = windows_of(fit.model.flight)
+    residual, sensitivity = windows.mean(fit.residual), windows.mean(fit.sensitivity)
+    told = sum(
+        likelihood(residual[:, k], windows.piece, windows.length_s, its, sensitivity[:, k])
+        for k, its in enumerate(fit.noise)
+    )
+    apart = fit.theta - fit.model.nominal
+    return float(fit.prior @ (apart * apart)) - 2.0 * told
 
 
 def held_out(choices: Choices, effects: tuple[str, ...]) -> Array:

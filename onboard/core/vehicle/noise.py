@@ -133,10 +133,21 @@ def gust_evidence(
     return 2.0 * (score - none), trial.gust
 
 
-def likelihood(residual: Array, piece: NDArray[np.int64], step_s: float, noise: AxisNoise) -> float:
-    """Logarithm of the likelihood of a residual (n,) by a noise that does not grow with gusts."""
-    shape = 0.0, noise.correlation_s, noise.white
-    return _scored(residual, np.ones(len(residual)), piece, step_s, shape)[0]
+def likelihood(
+    residual: Array,
+    piece: NDArray[np.int64],
+    step_s: float,
+    noise: AxisNoise,
+    sensitivity: Array | None = None,
+) -> float:
+    """Logarithm of the likelihood of a residual (n,) by a noise of this shape.
+
+    It grows with the ``sensitivity`` (n,) to gusts, m/s^2 per m/s, where that is given.
+    """
+    even = np.ones(len(residual)) if sensitivity is None else sensitivity
+    level = 0.0 if sensitivity is None else noise.gust * (float(np.mean(even)) or 1.0) / noise.force
+    shape = level, noise.correlation_s, noise.white
+    return _scored(residual, even, piece, step_s, shape)[0]
 
 
 def _scored(

@@ -59,8 +59,12 @@ def copter_flight(
     sag=0.0,
     noise=0.01,
     still=False,
+    lag=0.0,
 ):
-    """A copter that manoeuvres: four motors that share the thrust, thrust by a known command."""
+    """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
+
+    The motors follow what is asked of them behind a low-pass of ``lag``, s.
+    """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = 50.0 + STEP * np.arange(n)
@@ -91,7 +95,8 @@ def copter_flight(
     f_b[:, 1] += tilt[1] * thrust
     f_b[:, 2] -= thrust
     f_b = f_b + noise * np.stack([smooth(rng, n, 1.0, 1.0) for _ in range(3)], axis=1)
-    commands = np.stack([command, command**2, np.ones(n)], axis=1)
+    asked = command + lag * np.gradient(command, STEP)
+    commands = np.stack([asked, asked**2, np.ones(n)], axis=1)
     return flight_with(
         t, R, v_n, height, f_b, commands=commands, volts=None if volts is None else voltage
     )

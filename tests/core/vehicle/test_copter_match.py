@@ -119,3 +119,19 @@ def test_a_gust_front_is_said_and_is_not_called_clean():
     assert names(match) == set()
     assert not match.explained
     assert "no effect describes the force at" in match.note
+
+
+def test_motors_that_follow_late_have_the_time_constant_of_their_low_pass():
+    match = matched(copter_flight(lag=0.12, seed=21))
+    assert names(match) == {"motor_lag"}
+    number = match.numbers["motor_lag.time_constant"]
+    assert abs(number.real - 0.12) < 3.0 * number.sigma
+    assert number.sigma < 0.01
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33, 34])
+def test_rotors_that_lean_ahead_and_aside_alike_are_not_said_to_drag_less(seed):
+    """The simulator's form of the drag and less of it would do as well: it is one effect more."""
+    match = matched(copter_flight(tilt=(0.036, -0.036), seed=seed, noise=0.03))
+    assert names(match) == {"thrust_tilt"}
+    within(match, "rotor_drag.mcoef", 0.24833)

@@ -3,6 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from onboard.core.vehicle.fit import fitted, summed
+from onboard.core.vehicle.matching import deviance, likelier
+from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
 from tests.core.vehicle.flights import plane_flight
@@ -168,3 +171,28 @@ def test_what_could_not_be_tested_is_a_rival_all_the_same(monkeypatch):
     assert "drag" in {n.name for n in match.not_testable}
     (thrust,) = match.effects
     assert "drag" in thrust.rivals
+
+
+def test_of_two_valleys_the_likelier_is_taken(monkeypatch):
+    """Whichever start leads there."""
+    model = plane_model(plane_flight(seed=4, wind=(2.4, 6.6), reading=1.0), PlaneAirframe(), SIGMA)
+    right = fitted(model)
+    wrong = right.theta.copy()
+    wrong[model.index("propeller_inflow")] += 0.05
+    wrong[model.index("log_ratio")] += 0.5
+    worse = summed(model, wrong, right.prior, right.noise, right.sensitivity)
+    assert deviance(worse) > deviance(right) + 10.0
+    starts = []
+    for order in ([right, worse], [worse, right]):
+        left = list(order)
+
+        def fitted_from(its, start=None, left=left):
+            starts.append(start)
+            return left.pop(0)
+
+        monkeypatch.setattr("onboard.core.vehicle.matching.fitted", fitted_from)
+        assert likelier(model) is right
+    # The second begins in the wind of the first, and with all else as it nominally is.
+    again = starts[1]
+    assert again[model.index("north")] == right.theta[model.index("north")]
+    assert again[model.index("log_ratio")] == 0.0
