@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import density
 from onboard.core.vehicle.battery import CELL_V, CHARGE_PERCENT, fitted_battery
+from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.gusts import positive_square, signed_square
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
@@ -168,3 +172,17 @@ def test_a_climb_on_the_spot_is_no_standing_where_no_vertical_speed_is_measured(
     assert len(spans) == 2
     assert spans[0] == pytest.approx((-3.0, 13.0), abs=1.5)
     assert spans[1] == pytest.approx((72.0, 92.8), abs=1.5)
+
+
+@pytest.mark.parametrize("tau", [0.05, 0.1, 0.2])
+def test_a_motor_is_a_low_pass_and_no_delay(tau):
+    """Gain and phase of ``1 / (1 + i w tau)`` at half a Hertz."""
+    flight = copter_flight(seconds=60.0)
+    omega = np.pi
+    t = flight.t - flight.t[0]
+    asked = np.column_stack([np.cos(omega * t), np.sin(omega * t)])
+    air = Air(replace(flight, commands=asked))
+    MotorLag().act(air, [tau])
+    came = (air.commands[200:] * np.exp(1j * omega * t[200:, None]))[:, 0]
+    answer = 2.0 * np.mean(came).conjugate()
+    assert abs(answer - 1.0 / (1.0 + 1j * omega * tau)) < 0.01
