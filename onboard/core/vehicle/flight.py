@@ -46,6 +46,7 @@ class Flight:
         velocity_sigma: of the velocity, m/s.
         attitude_sigma: of roll and pitch, rad.
         step_s: length of a step, s.
+        ground_seen: whether it began or ended on the ground, so that heights above it are known.
     """
 
     t: Array
@@ -66,6 +67,7 @@ class Flight:
     velocity_sigma: float
     attitude_sigma: float
     step_s: float = STEP_S
+    ground_seen: bool = True
 
     def __len__(self) -> int:
         return len(self.t)
@@ -108,7 +110,7 @@ def flight_of(
         pieces: motion at the accelerometer's samples.
         signals: of the vehicle.
         commands: of a copter's motors, as in :class:`Flight`; empty where there are none.
-        grounded: spans to leave out, s.
+        grounded: spans on the ground, which are left out, s.
         ground: height of the ground, m.
     """
     parts: list[dict[str, Array]] = []
@@ -125,6 +127,7 @@ def flight_of(
         return None
     flight = Flight(
         ground=ground,
+        ground_seen=bool(grounded),
         velocity_sigma=max(m.velocity_sigma for m in pieces),
         attitude_sigma=max(m.attitude_sigma for m in pieces),
         piece=joined["piece"].astype(np.int64),

@@ -100,7 +100,7 @@ def near_ground(flight: Flight) -> Mask:
     Where it was as low as that, or neither climbed nor sank before it first did and after it last
     did: such a stretch cannot be told from one that stands or rolls.
     """
-    touching = flight.height < flight.ground + GROUND_M
+    touching = (flight.height < flight.ground + GROUND_M) & flight.ground_seen
     moving = np.flatnonzero(np.abs(flight.v_n[:, 2]) > STILL_M_S)
     if len(moving):
         touching[: moving[0]] = True

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -135,3 +137,13 @@ def test_rotors_that_lean_ahead_and_aside_alike_are_not_said_to_drag_less(seed):
     match = matched(copter_flight(tilt=(0.036, -0.036), seed=seed, noise=0.03))
     assert names(match) == {"thrust_tilt"}
     within(match, "rotor_drag.mcoef", 0.24833)
+
+
+def test_without_a_ground_no_wind_is_said_to_grow_with_height():
+    """The lowest point that was flown is no ground: the law would have its end there."""
+    flight = copter_flight(wind=(4.0, -3.0), seed=3)
+    match = matched(replace(flight, ground=float(np.min(flight.height)), ground_seen=False))
+    why = {n.name: n.why for n in match.not_testable}
+    assert "ground" in why["wind_profile"]
+    assert "ground" in why["ground_effect"]
+    assert names(match) == {"wind"}

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 from onboard.core.vehicle.air import Air
 
+NO_GROUND = "it was never seen on the ground, and heights above it are not known"
+"""Why nothing can be said of what depends on them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Unknown:

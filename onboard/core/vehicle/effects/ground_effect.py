@@ -9,7 +9,7 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import NO_GROUND, Effect, Unknown
 
 REACH = 4.0
 """Radii of a rotor up to which it is felt [physics]."""
@@ -38,5 +38,7 @@ class GroundEffect(Effect):
         """It takes flight near the ground."""
         if air.commands is None:
             return "no motor outputs in the recording"
+        if not air.flight.ground_seen:
+            return NO_GROUND
         low = air.flight.height - air.flight.ground < REACH * self._radius
         return "" if float(np.mean(low)) > LEAST_SHARE else "not flown near the ground"

@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import NO_GROUND, Effect, Unknown
 
 TOP_M = 60.0
 """Height from which ArduPilot's simulator lets the wind be constant, m (SIM_WIND_T_ALT)."""
@@ -16,8 +16,6 @@ LOWEST_M = 0.5
 """The law has no meaning among the grass, m [physics]."""
 LEAST_RATIO = 1.5
 """Ratio of the heights flown (95th to 5th percentile) from which a law shows [physics]."""
-LEAST_WIND_M_S = 0.5
-"""Wind without which there is no profile, m/s [use]."""
 
 
 class WindProfile(Effect):
@@ -44,7 +42,9 @@ class WindProfile(Effect):
         return out
 
     def missing(self, air: Air) -> str:
-        """It takes heights that differ."""
+        """It takes heights that differ, above a ground that was seen."""
+        if not air.flight.ground_seen:
+            return NO_GROUND
         above = np.maximum(air.flight.height - air.flight.ground, LOWEST_M)
         low, high = np.percentile(above, [5, 95])
         if min(high, self.top) > LEAST_RATIO * min(low, self.top):
