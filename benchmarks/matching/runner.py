@@ -115,7 +115,9 @@ def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     options = parser("Sealed challenge of concealed airframes.", count=20, first=5000)
     options.add_argument("--vehicle", choices=("copter", "plane"), help="these alone")
-    options.add_argument("--name", help="single recordings of this effect alone")
+    options.add_argument(
+        "--name", help="single recordings of this effect alone; with --gusts those with it"
+    )
     options.add_argument("--gusts", action="store_true", help="planes in turbulence alone")
     options.add_argument("--all", action="store_true", help="say what was said of each")
     chosen = options.parse_args(arguments)
@@ -125,7 +127,8 @@ def main(arguments: list[str] | None = None) -> None:
     if chosen.vehicle:
         secrets = [s for s in secrets if s.vehicle == chosen.vehicle]
     if chosen.name:
-        secrets = [s for s in secrets if s.names == (chosen.name,)]
+        beside = {"turbulence"} if chosen.gusts else set()
+        secrets = [s for s in secrets if set(s.names) == beside | {chosen.name}]
     secrets = secrets[: chosen.count or len(secrets)]
 
     def tell(o: Outcome) -> str:
