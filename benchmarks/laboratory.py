@@ -80,7 +80,8 @@ class Flight:
             return f"{self.name:38} {self.why}"
         names = ", ".join(e["name"] for e in self.document["effects"]) or "nothing"
         before, after = self.lateral
-        return f"{self.name:38} {before:.3f} -> {after:.3f} m/s^2  {names}"
+        verdict = self.document["verdict"]
+        return f"{self.name:38} {before:.3f} -> {after:.3f} m/s^2  {verdict}: {names}"
 
 
 def asked(path: Path, columns: Path) -> Flight:
