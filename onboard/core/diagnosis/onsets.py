@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
+from operator import add
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.diagnosis.block_jumps import OFFSETS
 from onboard.core.diagnosis.examination import Examination
@@ -13,6 +16,8 @@ from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.solution import total
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
@@ -34,7 +39,8 @@ def fitted(
     """Fits without jumps, and with each of them alone; from one pass with all of them.
 
     Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
-    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.
+    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.  Gates
+    and attitude follow what ``full`` has found, and a jump of any size beside it.
 
     Returns:
         Sums with a column for each; the fit without; columns of each jump, and the fit with it.
@@ -45,17 +51,26 @@ def fitted(
     )
     moments = [s.moment for s in steps]
     first, last = min(moments) - FORGOTTEN_S, max(moments) + FORGOTTEN_S
-    far: list[Block] = []
+    early, late = [], []
     for batch, block in zip(full.batches, full.blocks, strict=True):
-        if batch.fixes.t[-1] < first or batch.fixes.t[0] > last:
-            after = bool(batch.fixes.t[0] > last)
-            far.append(_with_jumps(block, full, made.model, steps, after=after))
+        if batch.fixes.t[-1] < first:
+            early.append(block)
+        elif batch.fixes.t[0] > last:
+            late.append(block)
         else:
-            made.add(batch)
+            made.batches.append(batch)
+    made.once(_known(full, made.model))
+    far = [
+        _with_jumps(total(blocks), full, made.model, steps, after=blocks is late)
+        for blocks in (early, late)
+        if blocks
+    ]
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
-    fitter = Fitter([*far, *made.blocks], made.model, absent)
+    near = total(made.blocks)
+    whole = Block(full.blocks[0].start, full.blocks[-1].end, reduce(add, far, near))
+    fitter = Fitter([whole], made.model, absent)
     places = range(made.model.size)
     columns = [list(places[made.model.slices[s.name]]) for s in steps]
     stepped = {i for index in columns for i in index}
@@ -65,22 +80,42 @@ def fitted(
     return fitter, before, fits
 
 
+def _known(full: Examination, model: Model) -> tuple[Array, Array]:
+    """What the sums of ``full`` say of the unknowns of another model, (m,) and (m, m).
+
+    Of those that it has, without the rest of its own; of others nothing is known.
+    """
+    source = _places(full, model)
+    mine = np.flatnonzero(source >= 0)
+    theirs = source[mine].tolist()
+    fitter = Fitter([Block(0.0, 0.0, total(full.blocks))], full.model, full.absent)
+    theta, covariance = model.prior.copy(), np.diag(model.prior_sigma**2)
+    fit = fitter.fit(theirs, held_out=False)
+    theta[mine] = fit.theta[theirs]
+    covariance[np.ix_(mine, mine)] = np.linalg.inv(fitter.informed(fit, theirs))
+    return theta, covariance
+
+
+def _places(full: Examination, model: Model) -> NDArray[np.intp]:
+    """(m,) where the unknowns of another model are among those of ``full``; -1: nowhere."""
+    source = np.array([full.model.index.get(u.name, -1) for u in model.unknowns])
+    for family in full.model.families:
+        if family.instead_of in model.slices:
+            theirs = full.model.slices[family.name]
+            source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
+    return source
+
+
 def _with_jumps(
-    block: Block,
+    far: NormalSums,
     full: Examination,
     model: Model,
     steps: Sequence[BiasStep | Shock],
     *,
     after: bool,
-) -> Block:
-    """Sums of ``model`` over a block that lies before or after every jump."""
-    source, sign = np.full(model.size, -1), np.ones(model.size)
-    for i, unknown in enumerate(model.unknowns):
-        source[i] = full.model.index.get(unknown.name, -1)
-    for family in full.model.families:
-        if family.instead_of in model.slices:
-            theirs = full.model.slices[family.name]
-            source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
+) -> NormalSums:
+    """Sums of ``model`` from those of ``full`` over flight before every jump, or after it."""
+    source, sign = _places(full, model), np.ones(model.size)
     if after:
         for step in (s for s in steps if not isinstance(s, Shock)):
             # What the sensor reads too much; the offsets' columns are what is added to it.
@@ -89,7 +124,7 @@ def _with_jumps(
     to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
     signs = np.outer(sign[mine], sign[mine])
     sums = NormalSums.zeros(model.size)
-    sums.N[to], sums.G[to] = signs * block.sums.N[of], signs * block.sums.G[of]
-    sums.b[mine] = sign[mine] * block.sums.b[source[mine]]
-    sums.s, sums.rows, sums.log_det = block.sums.s, block.sums.rows, block.sums.log_det
-    return Block(block.start, block.end, sums)
+    sums.N[to], sums.G[to] = signs * far.N[of], signs * far.G[of]
+    sums.b[mine] = sign[mine] * far.b[source[mine]]
+    sums.s, sums.rows, sums.log_det = far.s, far.rows, far.log_det
+    return sums
