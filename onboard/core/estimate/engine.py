@@ -9,7 +9,7 @@ made anew from it.  Flight that has left the buffer stays in the sums as it was 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -28,6 +28,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
+from onboard.core.filter.limits import MADE_READY_AT_ONCE
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -50,17 +51,26 @@ class PassObserver(Protocol):
         """A batch has gone through it."""
 
 
-def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
+def through(
+    made: Pass, batch: Batch, coast_s: float, following: Sequence[Batch] = ()
+) -> PassResult:
     """One batch through a pass.
 
     Args:
         made: the pass; its filter begins anew where it has gone without fixes for too long.
         batch: flight.
         coast_s: longest dead reckoning, s.
+        following: flight that will go through it next.
     """
     if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
         made.restart()
-    return made.process(batch.segment, batch.fixes, batch.trusted)
+    return made.process(batch.segment, batch.fixes, batch.trusted, following)
+
+
+def _with_next(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Sequence[Batch]]]:
+    """Each batch with what is made ready beside it."""
+    for i, batch in enumerate(batches, 1):
+        yield batch, batches[i : i + MADE_READY_AT_ONCE]
 
 
 class Engine:
@@ -181,8 +191,8 @@ class Engine:
             self.refine()
         self._age()
 
-    def _run(self, batch: Batch) -> None:
-        result = through(self._pass, batch, self.settings.coast_s)
+    def _run(self, batch: Batch, following: Sequence[Batch] = ()) -> None:
+        result = through(self._pass, batch, self.settings.coast_s, following)
         if self._observer is not None:
             self._observer.take(result)
         self.blocks.append(result.block)
@@ -232,8 +242,8 @@ class Engine:
         self.refused.clear()
         self.states.clear()
         self.blocks = []
-        for batch in self.batches:
-            self._run(batch)
+        for batch, following in _with_next(self.batches):
+            self._run(batch, following)
 
     def tune(self, rounds: int, noise_rounds: int) -> None:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
@@ -270,7 +280,8 @@ class Engine:
         out = []
         for run in [self.batches] if self.sample is None else self.sample:
             made.restart()
-            out += [through(made, batch, self.settings.coast_s).block for batch in run]
+            for batch, following in _with_next(run):
+                out.append(through(made, batch, self.settings.coast_s, following).block)
         return out
 
     @property
