@@ -14,7 +14,7 @@ import numpy as np
 
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.calibration_model import moved
-from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.engine import Engine, through
 from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
@@ -145,6 +145,15 @@ class Examination(Engine):
     def log_likelihood(self) -> float:
         """Of the whole flight in the last pass, the unknowns integrated out with their prior."""
         return self._pass.log_likelihoods()[0]
+
+    def whitened(self) -> list[EpochTrace]:
+        """Every epoch with all that was whitened: much, and so found in one more pass."""
+        found = self.found()
+        made = self._new_pass()
+        made.hold(found.theta, found.covariance)
+        made.keep_traces = made.keep_rows = True
+        coast_s = self.settings.coast_s
+        return [x for batch in self.batches for x in through(made, batch, coast_s).traces]
 
     def refused_velocities(self) -> Refused:
         """Those that the gates have refused in the last pass, or in that of the one it is like."""

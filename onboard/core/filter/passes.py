@@ -62,6 +62,8 @@ class Pass:
         self.uses = uses or Uses()
         self.filter = WhiteningFilter(model.size, bank, self.uses)
         self.keep_traces = traces
+        self.keep_rows = False
+        """Whether traces have all that was whitened."""
         self._held = theta is not None
         self._information = np.diag(1.0 / model.prior_sigma**2)
         self._prior_b = self._information @ model.prior
@@ -240,7 +242,7 @@ class Pass:
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
         if self.keep_traces:
-            result.traces += gone.traces(ready.epochs)
+            result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
         self._estimate(sums, len(gone.epochs))
         if not self._held:
             gone.states[-1, 12:] = self.filter.velocity(self.theta)
@@ -253,14 +255,15 @@ class Pass:
         if made.velocities:
             self._last_velocity_t = made.t
         if self.keep_traces:
+            rows = slice(None) if self.keep_rows else slice(0)
             # Copies: views would keep the whole bank's innovations of every epoch alive.
             result.traces.append(
                 EpochTrace(
                     made.t,
                     made.raw_innovation.copy(),
-                    made.raw_columns.copy(),
-                    made.y[0].copy(),
-                    made.h[0].copy(),
+                    made.raw_columns.astype(np.float32),
+                    made.y[0, rows].copy(),
+                    made.h[0, rows].copy(),
                     made.velocities,
                     made.height,
                     made.refused,
