@@ -22,10 +22,12 @@ from onboard.core.estimate.limits import (
     MOST_STATES,
     NEW_SHARE,
     NOISE_ROUNDS,
+    ROUGH_ROUNDS,
     ROUNDS,
     STEADY,
 )
 from onboard.core.estimate.noise_search import NoiseSearch
+from onboard.core.estimate.sampling import few_of
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
 from onboard.core.filter.limits import MADE_READY_AT_ONCE
@@ -110,10 +112,14 @@ class Engine:
         self.aged: list[Block] = []
         self.blocks: list[Block] = []
         self.refused: Counter[str] = Counter()
+        self.refused_untuned: Counter[str] = Counter()
+        """What the gates refused with the levels from which those that hold were found."""
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
         self.left_brisk_s = 0.0
         """Of :attr:`brisk_s` what has left the buffer."""
+        self._waiting = 0
+        """Batches that were added and that no pass has gone through yet, at the end."""
         self._buffered_s = 0.0
         self._refined_s = 0.0
         self._frozen = False
@@ -183,13 +189,23 @@ class Engine:
     def add(self, batch: Batch) -> None:
         """Process a batch; refine when it is time."""
         self.batches.append(batch)
+        self._waiting += 1
+        self._solution = None
         self._buffered_s += batch.duration
         before, self.trusted_s = self.trusted_s, self.trusted_s + batch.trusted_s
-        self._run(batch)
+        if self.settings.at_once:
+            self._catch_up()
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
             self.refine()
         self._age()
+
+    def _catch_up(self) -> None:
+        """Go through what waits."""
+        waiting = self.batches[len(self.batches) - self._waiting :]
+        self._waiting = 0
+        for batch, following in _with_next(waiting):
+            self._run(batch, following)
 
     def _run(self, batch: Batch, following: Sequence[Batch] = ()) -> None:
         result = through(self._pass, batch, self.settings.coast_s, following)
@@ -202,6 +218,8 @@ class Engine:
 
     def _age(self) -> None:
         """Let flight leave the buffer; forget slowly what has left it."""
+        if self._buffered_s > self.settings.buffer_s:
+            self._catch_up()
         while self._buffered_s > self.settings.buffer_s and len(self.batches) > 1:
             if not self._frozen:
                 self.refine()
@@ -242,8 +260,8 @@ class Engine:
         self.refused.clear()
         self.states.clear()
         self.blocks = []
-        for batch, following in _with_next(self.batches):
-            self._run(batch, following)
+        self._waiting = len(self.batches)
+        self._catch_up()
 
     def tune(self, rounds: int, noise_rounds: int) -> None:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
@@ -254,16 +272,22 @@ class Engine:
         """
         search = NoiseSearch(noise_rounds)
         at, ready = self.point, Preparations()
+        sample = [self.batches] if self.sample is None else self.sample
+        few = few_of(sample) if self.noise == NoiseLevels() else None
         for turn in range(MOST_ROUNDS):
             if turn >= rounds and not search.unfinished:
                 break
+            rough = few is not None and turn < ROUGH_ROUNDS
             made = self._new_pass(search.members(turn, self.noise), ready)
-            self._seed = solve(self._over_sample(made), self.model)
+            results = self._over(few if few is not None and rough else sample, made)
+            self._seed = solve([result.block for result in results], self.model)
+            if turn == 0:
+                self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             before, at = at, moved(self.point, self.model, self._seed.theta)
-            levels = search.better(self.noise, made.log_likelihoods())
+            levels = search.better(self.noise, made.log_likelihoods(), rough=rough)
             settled = search.settled(self.noise, levels)
             self.noise = levels
-            if at.near(before, STEADY) and settled:
+            if at.near(before, STEADY) and settled and not rough:
                 break
             if not self.point.stands_for(at):
                 self._move(at, levels)
@@ -276,12 +300,13 @@ class Engine:
         self.point, self.noise = point, levels
         self.model = self._model()
 
-    def _over_sample(self, made: Pass) -> list[Block]:
+    def _over(self, runs: Sequence[Sequence[Batch]], made: Pass) -> list[PassResult]:
+        """Some runs of batches through a pass, each from a new beginning."""
         out = []
-        for run in [self.batches] if self.sample is None else self.sample:
+        for run in runs:
             made.restart()
             for batch, following in _with_next(run):
-                out.append(through(made, batch, self.settings.coast_s, following).block)
+                out.append(through(made, batch, self.settings.coast_s, following))
         return out
 
     @property
@@ -328,6 +353,7 @@ class Engine:
     @property
     def all_blocks(self) -> list[Block]:
         """Aged and buffered blocks, in order of time."""
+        self._catch_up()
         return [*self.aged, *self.blocks]
 
     def solution(self) -> Solution | None:
