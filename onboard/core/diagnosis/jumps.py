@@ -46,7 +46,7 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     out: list[Looked] = []
     for i in range(0, len(moments), AT_ONCE):
         some = moments[i : i + AT_ONCE]
-        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some])
+        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some], roughly=True)
         for t, (index, after) in zip(some, fits, strict=True):
             known = np.diag(fitter.informed(after, index))
             out.append(Looked(t, fitter.gain(before, after), known))

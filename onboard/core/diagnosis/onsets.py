@@ -34,13 +34,23 @@ def gains(
 
 
 def fitted(
-    full: Examination, chosen: Sequence[Effect], steps: Sequence[BiasStep | Shock]
+    full: Examination,
+    chosen: Sequence[Effect],
+    steps: Sequence[BiasStep | Shock],
+    *,
+    roughly: bool = False,
 ) -> tuple[Fitter, Fit, list[tuple[list[int], Fit]]]:
     """Fits without jumps, and with each of them alone; from one pass with all of them.
 
     Only the flight around the jumps is gone through.  Further away a jump is nothing before it, and
-    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.  Gates
-    and attitude follow what ``full`` has found, and a jump of any size beside it.
+    the offsets' own columns after it, of which ``full`` has the sums; a shock is forgotten.
+
+    Args:
+        full: the flight.
+        chosen: effects beside the jumps.
+        steps: the jumps.
+        roughly: gates and attitude follow what ``full`` has found without any jump, which takes a
+            quarter of the time; else the flight with them, as it is gone through.
 
     Returns:
         Sums with a column for each; the fit without; columns of each jump, and the fit with it.
@@ -59,7 +69,7 @@ def fitted(
             late.append(block)
         else:
             made.batches.append(batch)
-    made.once(_known(full, made.model))
+    made.once(_known(full, made.model) if roughly else None)
     far = [
         _with_jumps(total(blocks), full, made.model, steps, after=blocks is late)
         for blocks in (early, late)
