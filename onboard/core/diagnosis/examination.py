@@ -66,6 +66,7 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
+        self._refused: Refused | None = None
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
@@ -93,7 +94,7 @@ class Examination(Engine):
 
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
-        self.traces = []
+        self.traces, self._refused = [], None
 
     def take(self, result: PassResult) -> None:
         """Keep the epochs of a batch that has gone through."""
@@ -157,11 +158,18 @@ class Examination(Engine):
 
     def refused_velocities(self) -> Refused:
         """Those that the gates have refused in the last pass, or in that of the one it is like."""
+        if self._refused is not None:
+            return self._refused
         if not self.traces and isinstance(self._like, Examination):
             return self._like.refused_velocities()
         named = [(x.t, n) for x in self.traces for n in x.refused if n in VELOCITY]
         stamps = self.point.stamp(np.array([t for t, _ in named]))
         return Refused(zip(stamps.tolist(), (n for _, n in named), strict=True))
+
+    def let_epochs_go(self) -> None:
+        """Keep of them only which velocities were refused: of a day's flight they are much."""
+        self._refused = self.refused_velocities()
+        self.traces = []
 
     @property
     def absent(self) -> Array:

@@ -22,12 +22,10 @@ from onboard.core.estimate.limits import (
     MOST_STATES,
     NEW_SHARE,
     NOISE_ROUNDS,
-    ROUGH_ROUNDS,
     ROUNDS,
     STEADY,
 )
 from onboard.core.estimate.noise_search import NoiseSearch
-from onboard.core.estimate.sampling import few_of
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
 from onboard.core.filter.limits import MADE_READY_AT_ONCE
@@ -273,21 +271,19 @@ class Engine:
         search = NoiseSearch(noise_rounds)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
-        few = few_of(sample) if self.noise == NoiseLevels() else None
         for turn in range(MOST_ROUNDS):
             if turn >= rounds and not search.unfinished:
                 break
-            rough = few is not None and turn < ROUGH_ROUNDS
             made = self._new_pass(search.members(turn, self.noise), ready)
-            results = self._over(few if few is not None and rough else sample, made)
+            results = self._over(sample, made)
             self._seed = solve([result.block for result in results], self.model)
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             before, at = at, moved(self.point, self.model, self._seed.theta)
-            levels = search.better(self.noise, made.log_likelihoods(), rough=rough)
+            levels = search.better(self.noise, made.log_likelihoods())
             settled = search.settled(self.noise, levels)
             self.noise = levels
-            if at.near(before, STEADY) and settled and not rough:
+            if at.near(before, STEADY) and settled:
                 break
             if not self.point.stands_for(at):
                 self._move(at, levels)

@@ -32,13 +32,6 @@ flight to a tenth in six [cost]."""
 NOISE_ROUNDS: Final = ROUNDS - 1
 """Rounds that may begin a search for noise levels; each search takes two, and moves a level by a
 factor of four at the most [cost]."""
-ROUGH_ROUNDS: Final = 2
-"""The first search of a flight of which no level is known begins on a part of it: what is a factor
-of four away shows there, too [cost]."""
-ROUGH_S: Final = 80.0
-"""s of flight of that part: 1200 velocities tell a level to some per cent [cost]."""
-ROUGHLY_TOGETHER: Final = 4
-"""Neighbouring batches of it: the filter needs ten seconds to settle in each [cost]."""
 SETTLED_LOG_RATIO: Final = 0.15
 """Noise levels closer than this are the same: only their order of magnitude matters [cost]."""
 FAR_LOG_RATIO: Final = 0.6

@@ -44,16 +44,8 @@ class NoiseSearch:
             self._members = stencil(levels, self._moving)
         return self._members
 
-    def better(
-        self, levels: NoiseLevels, log_likelihoods: Sequence[float], *, rough: bool = False
-    ) -> NoiseLevels:
-        """Levels from here on, from what the bank of :meth:`members` has shown.
-
-        Args:
-            levels: that hold now.
-            log_likelihoods: of the members.
-            rough: on a part of the flight, which does not say that a level need not be tried again.
-        """
+    def better(self, levels: NoiseLevels, log_likelihoods: Sequence[float]) -> NoiseLevels:
+        """Levels from here on, from what the bank of :meth:`members` has shown."""
         target, self._target = self._target, None
         if self._members is None:
             return levels
@@ -63,12 +55,11 @@ class NoiseSearch:
             return best
         self._far = False
         found = stepped(levels, log_likelihoods, self._moving)
-        if not rough:
-            self._moving = [
-                name
-                for name in self._moving
-                if abs(np.log(getattr(found, name) / getattr(levels, name))) >= SETTLED_LOG_RATIO
-            ]
+        self._moving = [
+            name
+            for name in self._moving
+            if abs(np.log(getattr(found, name) / getattr(levels, name))) >= SETTLED_LOG_RATIO
+        ]
         if distance(levels, found) >= SETTLED_LOG_RATIO:
             self._target = found
         return levels
