@@ -20,6 +20,7 @@ from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.shocks import Shock
+from onboard.core.diagnosis.stepped import ReadyFlight
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect, Origin
@@ -44,9 +45,10 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
     jump = BiasStep(Origin(full.point.skew_from))
     out: list[Looked] = []
+    ready = ReadyFlight(full)
     for i in range(0, len(moments), AT_ONCE):
         some = moments[i : i + AT_ONCE]
-        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some], roughly=True)
+        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some], ready=ready)
         for t, (index, after) in zip(some, fits, strict=True):
             known = np.diag(fitter.informed(after, index))
             out.append(Looked(t, fitter.gain(before, after), known))

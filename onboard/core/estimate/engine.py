@@ -306,6 +306,11 @@ class Engine:
         return out
 
     @property
+    def bias_b(self) -> Array:
+        """(3,) bias of the gyroscope at the end of the last pass, body axes, rad/s."""
+        return self._pass.bias_b
+
+    @property
     def brisk_s(self) -> float:
         """Trusted flight faster than :attr:`CalibratorSettings.brisk_speed`, s."""
         fast = self.settings.brisk_speed

@@ -161,14 +161,14 @@ class Pass:
             segment = self.model.remembering(segment, before)
         else:
             segment, rest = found.segment, found.rest
-        made = self._all_ready(segment, rest)
+        made = self.all_ready(segment, rest)
         self._ahead = {each.of.key: each for each in made}
         if kept is not None:
             for each in made:
                 kept.keep(each)
         return made[0]
 
-    def _all_ready(self, segment: Segment, sources: tuple[Source, ...]) -> list[Kept]:
+    def all_ready(self, segment: Segment, sources: tuple[Source, ...]) -> list[Kept]:
         """A stretch made ready, cut into its parts."""
         first = sources[0]
         cuts = [0, *np.cumsum([len(s.fixes) - 1 - s.skipped for s in sources]).tolist()]
