@@ -109,7 +109,7 @@ class WithJumps(Preparations):
         made = self._flight.of(source, self.going.bias_b)
         if made is None:
             return None
-        ready = _jumping(made.ready, self._model, self._jumps, source.segment.R_bs)
+        ready = jumping(made.ready, self._model, self._jumps, source.segment.R_bs)
         return replace(made, of=source, ready=ready, rest=(source,))
 
 
@@ -143,8 +143,15 @@ def _key(batch: Batch) -> tuple[int, int]:
     return id(batch.segment), id(batch.fixes)
 
 
-def _jumping(ready: Prepared, model: Model, jumps: Sequence[BiasStep], R_bs: Array) -> Prepared:
-    """With the columns of jumps after those that are there."""
+def jumping(ready: Prepared, model: Model, jumps: Sequence[BiasStep], R_bs: Array) -> Prepared:
+    """What is ready, with the columns of jumps after those that are there.
+
+    Args:
+        ready: with the calibration's own columns first.
+        model: with the jumps after what those columns are of.
+        jumps: some moments, s on the boot clock.
+        R_bs: (3, 3) board orientation.
+    """
     steps, epochs, m1 = ready.steps, ready.epochs, model.size + 1
     known = steps.columns.shape[2]
     columns = np.zeros((len(steps), 9, m1))
