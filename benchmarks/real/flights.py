@@ -162,7 +162,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         epochs=len(engine.traces),
         believed=judge.evidence.believed,
         refused=dict(engine.refused),
-        white=whiteness(engine.traces, solution.theta),
+        white=whiteness(engine.whitened(), solution.theta),
         batches=tuple(engine.batches),
         chain=tuple(intervals([(b.segment, b.fixes) for b in engine.batches], engine.point)),
         states=tuple(engine.states),

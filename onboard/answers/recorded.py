@@ -30,7 +30,7 @@ from onboard.core.maths.compiling import prefer_compiled
 PAUSE_S = 10.0
 """Between two recordings."""
 NO_FLIGHT = "no stretch of flight with trusted GPS and inertial data"
-KEEPING_ALL = CalibratorSettings(refine=False, buffer_s=math.inf)
+KEEPING_ALL = CalibratorSettings(refine=False, at_once=False, buffer_s=math.inf)
 
 
 class Recorded:

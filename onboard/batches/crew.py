@@ -22,16 +22,12 @@ import msgspec
 import onboard
 from onboard.batches.frames import Result, next_said, send
 from onboard.batches.job import Job, Outcome
+from onboard.threads import ONE_THREAD
 
 Told = Callable[[int, float], None]
 """Told the number of a job and the share of it that is done."""
 TRIES = 2
 """Of a log whose process has died: once may be for want of memory, twice is the log [cost]."""
-ONE_THREAD = (
-    "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
-    "NUMBA_NUM_THREADS",
-)  # fmt: skip
-"""Of linear algebra: sums in another order differ in the last digit, and cores have jobs enough."""
 _END_S = 5.0
 """s to wait for a process whose pipes are closed, before it is killed [cost]."""
 

@@ -19,6 +19,7 @@ from onboard import __version__
 from onboard.cli.simulator import make_importable
 from onboard.errors import OnboardError
 from onboard.printable import printable
+from onboard.threads import in_one_thread
 
 DONE, USAGE, INTERRUPTED = 0, 2, 130
 COMPLETION = "_ONBOARD_COMPLETE"
@@ -178,4 +179,5 @@ def _forget_output() -> None:
 
 def main() -> None:
     """Entry point of the ``onboard`` command."""
+    in_one_thread(os.environ)
     sys.exit(run())

@@ -65,6 +65,7 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         full = Examination(
             engine, testable, t0=origin.t0, batches=batches, refused=refused
         ).with_noise()
+    full.let_epochs_go()
     return Cleared(full, testable, absent, rail, fault, clipped, sampled)
 
 

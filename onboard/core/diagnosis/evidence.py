@@ -116,7 +116,11 @@ class Judge:
             unseen=unseen,
             ladder=ladder,
             regimes=regime_residuals(
-                self.engine.traces, self.engine.batches, before.theta, after.theta
+                self.final.epochs,
+                self.engine.all_blocks,
+                self.engine.batches,
+                before.theta,
+                after.theta,
             ),
             series=self.final.series(before.theta, after.theta),
             note=note,

@@ -14,7 +14,7 @@ import numpy as np
 
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.calibration_model import moved
-from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.engine import Engine, through
 from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
@@ -66,6 +66,7 @@ class Examination(Engine):
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
         self.traces: list[EpochTrace] = []
+        self._refused: Refused | None = None
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
@@ -93,7 +94,7 @@ class Examination(Engine):
 
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
-        self.traces = []
+        self.traces, self._refused = [], None
 
     def take(self, result: PassResult) -> None:
         """Keep the epochs of a batch that has gone through."""
@@ -146,13 +147,29 @@ class Examination(Engine):
         """Of the whole flight in the last pass, the unknowns integrated out with their prior."""
         return self._pass.log_likelihoods()[0]
 
+    def whitened(self) -> list[EpochTrace]:
+        """Every epoch with all that was whitened: much, and so found in one more pass."""
+        found = self.found()
+        made = self._new_pass()
+        made.hold(found.theta, found.covariance)
+        made.keep_traces = made.keep_rows = True
+        coast_s = self.settings.coast_s
+        return [x for batch in self.batches for x in through(made, batch, coast_s).traces]
+
     def refused_velocities(self) -> Refused:
         """Those that the gates have refused in the last pass, or in that of the one it is like."""
+        if self._refused is not None:
+            return self._refused
         if not self.traces and isinstance(self._like, Examination):
             return self._like.refused_velocities()
         named = [(x.t, n) for x in self.traces for n in x.refused if n in VELOCITY]
         stamps = self.point.stamp(np.array([t for t, _ in named]))
         return Refused(zip(stamps.tolist(), (n for _, n in named), strict=True))
+
+    def let_epochs_go(self) -> None:
+        """Keep of them only which velocities were refused: of a day's flight they are much."""
+        self._refused = self.refused_velocities()
+        self.traces = []
 
     @property
     def absent(self) -> Array:

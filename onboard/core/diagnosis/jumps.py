@@ -20,6 +20,7 @@ from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.shocks import Shock
+from onboard.core.diagnosis.stepped import ReadyFlight
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect, Origin
@@ -39,18 +40,30 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     """Jumps at moments all over the flight.
 
     What shows a jump forwards or sideways is the half minute after it: then the tilt has taken it
-    over.  So each is gone through, some neighbours at once.
+    over.  So each is gone through, some neighbours at once.  Those about the best one once more, as
+    the flight is with a jump there: what is far from nothing bends a flight that is taken for one
+    without jumps, and another moment may be better.
     """
     moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
-    jump = BiasStep(Origin(full.point.skew_from))
+    ready = ReadyFlight(full)
     out: list[Looked] = []
     for i in range(0, len(moments), AT_ONCE):
-        some = moments[i : i + AT_ONCE]
-        fitter, before, fits = fitted(full, (), [jump.at(t) for t in some])
-        for t, (index, after) in zip(some, fits, strict=True):
-            known = np.diag(fitter.informed(after, index))
-            out.append(Looked(t, fitter.gain(before, after), known))
+        out += _looked(full, moments[i : i + AT_ONCE], ready)
+    if out:
+        best = max(range(len(out)), key=lambda i: out[i].gain)
+        about = slice(max(best - AT_ONCE // 2, 0), best + AT_ONCE // 2 + 1)
+        out[about] = _looked(full, moments[about], None)
     return out
+
+
+def _looked(full: Examination, moments: Sequence[float], ready: ReadyFlight | None) -> list[Looked]:
+    """Jumps at some neighbouring moments, each beside nothing else."""
+    jump = BiasStep(Origin(full.point.skew_from))
+    fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments], ready=ready)
+    return [
+        Looked(t, fitter.gain(before, after), np.diag(fitter.informed(after, index)))
+        for t, (index, after) in zip(moments, fits, strict=True)
+    ]
 
 
 def shown_from(

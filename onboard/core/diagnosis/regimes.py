@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.diagnosis.epochs import Epochs
 from onboard.core.diagnosis.records import RegimeResidual
-from onboard.core.filter.traces import EpochTrace
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
@@ -143,24 +143,33 @@ def axis_of(key: str) -> str | None:
 
 
 def regime_residuals(
-    traces: Sequence[EpochTrace], batches: Sequence[Batch], before: Array, after: Array
+    epochs: Epochs, blocks: Sequence[Block], batches: Sequence[Batch], before: Array, after: Array
 ) -> tuple[RegimeResidual, ...]:
-    """Whitened residual by regime, before and after."""
-    edges = [(float(c.fixes.t[0]) - 0.5, float(c.fixes.t[-1]) + 0.5, regime_of(c)) for c in batches]
+    """Residuals by regime with two sets of unknowns, (m,) each.
+
+    Args:
+        epochs: velocities.
+        blocks: sums of all that was measured.
+        batches: the flight of each block.
+        before: without what was found.
+        after: with it.
+    """
+    velocities = [epochs.residual(theta) ** 2 for theta in (before, after)]
+    seen = np.isfinite(velocities[0]).sum(axis=1)
     squares: dict[str, Array] = {}
-    for x in traces:
-        regime = next((r for a, b, r in edges if a <= x.t <= b), None)
-        if regime is None or len(x.y) == 0:
+    seconds: dict[str, float] = {}
+    of_epoch = [np.nansum(v, axis=1) for v in velocities]
+    by_block = [np.bincount(epochs.block, x, len(blocks)) for x in (*of_epoch, seen)]
+    for block, batch, one, two, count in zip(blocks, batches, *by_block, strict=True):
+        if block.sums.rows == 0:
             continue
-        one, two = x.y - x.h @ before, x.y - x.h @ after
-        v_one, v_two = x.innovation - x.columns @ before, x.innovation - x.columns @ after
+        regime, sums = regime_of(batch), block.sums
         s = squares.setdefault(regime, np.zeros(6))
-        sums = (one @ one, two @ two, len(one), v_one @ v_one, v_two @ v_two, len(v_one))
-        s += np.array(sums)
-    seconds = {r: sum(c.duration for c in batches if regime_of(c) == r) for r in squares}
+        s += (sums.residual(before), sums.residual(after), sums.rows, one, two, count)
+        seconds[regime] = seconds.get(regime, 0.0) + batch.duration
     out = []
     for r, s in sorted(squares.items()):
-        whitened = np.sqrt(s[:2] / s[2])
+        whitened = np.sqrt(np.maximum(s[:2], 0.0) / s[2])
         velocity = np.sqrt(s[3:5] / s[5]) if s[5] else np.full(2, np.nan)
         out.append(RegimeResidual(r, seconds[r], *map(float, (*whitened, *velocity))))
     return tuple(out)

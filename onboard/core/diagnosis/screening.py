@@ -81,7 +81,8 @@ def false_fixes(
     """
     doubted = [r for r in refused(full.batches, calibrator.trust.refusals) if r.reason in OPINIONS]
     levels, least, jumped = _robust(full, full.found().theta)
-    rejected = max(full.refused["velocity"], like.refused["velocity"])
+    every = (full.refused, full.refused_untuned, like.refused)
+    rejected = any(refused["velocity"] for refused in every)
     if not rejected and not jumped and not doubted:
         return None, list(full.batches)
     contradicted = contradictions(full, levels, doubted)

@@ -9,7 +9,7 @@ made anew from it.  Flight that has left the buffer stays in the sums as it was 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -28,6 +28,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
+from onboard.core.filter.limits import MADE_READY_AT_ONCE
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -50,17 +51,26 @@ class PassObserver(Protocol):
         """A batch has gone through it."""
 
 
-def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
+def through(
+    made: Pass, batch: Batch, coast_s: float, following: Sequence[Batch] = ()
+) -> PassResult:
     """One batch through a pass.
 
     Args:
         made: the pass; its filter begins anew where it has gone without fixes for too long.
         batch: flight.
         coast_s: longest dead reckoning, s.
+        following: flight that will go through it next.
     """
     if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
         made.restart()
-    return made.process(batch.segment, batch.fixes, batch.trusted)
+    return made.process(batch.segment, batch.fixes, batch.trusted, following)
+
+
+def _with_next(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Sequence[Batch]]]:
+    """Each batch with what is made ready beside it."""
+    for i, batch in enumerate(batches, 1):
+        yield batch, batches[i : i + MADE_READY_AT_ONCE]
 
 
 class Engine:
@@ -100,10 +110,14 @@ class Engine:
         self.aged: list[Block] = []
         self.blocks: list[Block] = []
         self.refused: Counter[str] = Counter()
+        self.refused_untuned: Counter[str] = Counter()
+        """What the gates refused with the levels from which those that hold were found."""
         self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
         self.trusted_s = 0.0
         self.left_brisk_s = 0.0
         """Of :attr:`brisk_s` what has left the buffer."""
+        self._waiting = 0
+        """Batches that were added and that no pass has gone through yet, at the end."""
         self._buffered_s = 0.0
         self._refined_s = 0.0
         self._frozen = False
@@ -173,16 +187,26 @@ class Engine:
     def add(self, batch: Batch) -> None:
         """Process a batch; refine when it is time."""
         self.batches.append(batch)
+        self._waiting += 1
+        self._solution = None
         self._buffered_s += batch.duration
         before, self.trusted_s = self.trusted_s, self.trusted_s + batch.trusted_s
-        self._run(batch)
+        if self.settings.at_once:
+            self._catch_up()
         due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         if due and self.settings.refine:
             self.refine()
         self._age()
 
-    def _run(self, batch: Batch) -> None:
-        result = through(self._pass, batch, self.settings.coast_s)
+    def _catch_up(self) -> None:
+        """Go through what waits."""
+        waiting = self.batches[len(self.batches) - self._waiting :]
+        self._waiting = 0
+        for batch, following in _with_next(waiting):
+            self._run(batch, following)
+
+    def _run(self, batch: Batch, following: Sequence[Batch] = ()) -> None:
+        result = through(self._pass, batch, self.settings.coast_s, following)
         if self._observer is not None:
             self._observer.take(result)
         self.blocks.append(result.block)
@@ -192,6 +216,8 @@ class Engine:
 
     def _age(self) -> None:
         """Let flight leave the buffer; forget slowly what has left it."""
+        if self._buffered_s > self.settings.buffer_s:
+            self._catch_up()
         while self._buffered_s > self.settings.buffer_s and len(self.batches) > 1:
             if not self._frozen:
                 self.refine()
@@ -232,8 +258,8 @@ class Engine:
         self.refused.clear()
         self.states.clear()
         self.blocks = []
-        for batch in self.batches:
-            self._run(batch)
+        self._waiting = len(self.batches)
+        self._catch_up()
 
     def tune(self, rounds: int, noise_rounds: int) -> None:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
@@ -244,11 +270,15 @@ class Engine:
         """
         search = NoiseSearch(noise_rounds)
         at, ready = self.point, Preparations()
+        sample = [self.batches] if self.sample is None else self.sample
         for turn in range(MOST_ROUNDS):
             if turn >= rounds and not search.unfinished:
                 break
             made = self._new_pass(search.members(turn, self.noise), ready)
-            self._seed = solve(self._over_sample(made), self.model)
+            results = self._over(sample, made)
+            self._seed = solve([result.block for result in results], self.model)
+            if turn == 0:
+                self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             before, at = at, moved(self.point, self.model, self._seed.theta)
             levels = search.better(self.noise, made.log_likelihoods())
             settled = search.settled(self.noise, levels)
@@ -266,12 +296,19 @@ class Engine:
         self.point, self.noise = point, levels
         self.model = self._model()
 
-    def _over_sample(self, made: Pass) -> list[Block]:
+    def _over(self, runs: Sequence[Sequence[Batch]], made: Pass) -> list[PassResult]:
+        """Some runs of batches through a pass, each from a new beginning."""
         out = []
-        for run in [self.batches] if self.sample is None else self.sample:
+        for run in runs:
             made.restart()
-            out += [through(made, batch, self.settings.coast_s).block for batch in run]
+            for batch, following in _with_next(run):
+                out.append(through(made, batch, self.settings.coast_s, following))
         return out
+
+    @property
+    def bias_b(self) -> Array:
+        """(3,) bias of the gyroscope at the end of the last pass, body axes, rad/s."""
+        return self._pass.bias_b
 
     @property
     def brisk_s(self) -> float:
@@ -317,6 +354,7 @@ class Engine:
     @property
     def all_blocks(self) -> list[Block]:
         """Aged and buffered blocks, in order of time."""
+        self._catch_up()
         return [*self.aged, *self.blocks]
 
     def solution(self) -> Solution | None:

@@ -19,6 +19,8 @@ class CalibratorSettings:
             (an accelerometer's offset wanders with temperature and age).
         refine_at_s: trusted seconds after which timing and noise are estimated anew.
         refine: estimate timing and noise at all; False where a diagnosis will do it itself.
+        at_once: go through flight as it comes; False where nobody asks before a diagnosis, which
+            goes through it by itself.
         minimum_s: trusted seconds below which nothing is called calibrated.
         coast_s: longest segment without an accepted fix that is bridged inertially, s.
         brisk_speed: m/s; a hover wanders slower.
@@ -33,6 +35,7 @@ class CalibratorSettings:
     memory_s: float = 1800.0
     refine_at_s: tuple[float, ...] = (30.0, 120.0, 480.0)
     refine: bool = True
+    at_once: bool = True
     minimum_s: float = 45.0
     coast_s: float = 30.0
     brisk_speed: float = 1.5

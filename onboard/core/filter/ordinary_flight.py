@@ -85,15 +85,16 @@ class Gone(NamedTuple):
             if v
         ]
 
-    def traces(self, ready: Epochs) -> list[EpochTrace]:
-        """What each of the epochs ``ready`` measured."""
-        rows, raw = self.rows[0].copy(), self.raw.copy()
+    def traces(self, ready: Epochs, *, whole: bool) -> list[EpochTrace]:
+        """What each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""
+        rows = self.rows[0].copy() if whole else self.rows[0, :0]
+        innovations, columns = self.raw[:, 0].copy(), self.raw[:, 1:].astype(np.float32)
         first = self.first_row.tolist()
         return [
             EpochTrace(
                 t,
-                raw[a : a + v, 0],
-                raw[a : a + v, 1:],
+                innovations[a : a + v],
+                columns[a : a + v],
                 rows[a:b, 0],
                 rows[a:b, 1:],
                 v,

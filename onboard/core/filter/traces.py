@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 
@@ -33,14 +36,15 @@ class EpochTrace:
     """What one epoch measured, for plots, gates and for finding where in a flight an effect is.
 
     The velocity residual at unknowns ``theta`` is ``innovation - columns @ theta``; the whitened
-    innovations there are ``y - h @ theta``.
+    innovations there are ``y - h @ theta``, which are many, and kept only if they are asked for.
 
     Attributes:
         t: time on the boot clock, s.
         innovation: (v,) velocity innovation at ``theta = 0``, NED, m/s.
-        columns: (v, m) its regressors.
-        y: (r,) whitened innovations at ``theta = 0``.
-        h: (r, m) their regressors.
+        columns: (v, m) its regressors, in single precision: a millionth of a residual matters to
+            nobody, an hour's bytes do.
+        y: (r,) whitened innovations at ``theta = 0``; empty if they are not kept.
+        h: (r, m) their regressors; (0, m) if they are not kept.
         velocities: v, how many of the r are of velocity: they come first.
         height: whether one of height follows; the rest are of attitude.
         refused: names of what the gates refused.
@@ -49,7 +53,7 @@ class EpochTrace:
 
     t: float
     innovation: Array
-    columns: Array
+    columns: NDArray[np.floating]
     y: Array
     h: Array
     velocities: int

@@ -33,6 +33,8 @@ class Signals:
         raw_s: (*S, 3) raw specific force, sensor axes, m/s^2.
         f_b: (*S, 3) specific force by the calibration of the linearisation, body axes, m/s^2.
         segment: where slow signals are looked up.
+        P: (K, n, 3, 3) body axes at each of n nodes in a row to those at the first of them; None
+            where the nodes are in no such rows.
     """
 
     t: Array
@@ -40,6 +42,7 @@ class Signals:
     raw_s: Array
     f_b: Array
     segment: Segment
+    P: Array | None = None
 
     def slow(self, name: str) -> Array | None:
         """Slow signal at these times, S or (*S, k); None if the recording lacks it."""
@@ -254,18 +257,15 @@ class NodeMaker:
         M = max(4, 2 * int(np.ceil(density * float(T.max()) / 2.0)))
         share = np.arange(2 * M + 1) / (2.0 * M)
         fine = self.signals(start[:, None] + T[:, None] * share)
-        coarse = Signals(
-            fine.t[:, ::2],
-            fine.w_b[:, ::2],
-            fine.raw_s[:, ::2],
-            fine.f_b[:, ::2],
-            self._segment,
-        )
+        t = fine.t[:, ::2]
         if self._recorded:
-            R = self._attitude(coarse.t)
+            R = self._attitude(t)
             P = np.swapaxes(R[:, :1], -1, -2) @ R
         else:
             P = turns_in_a_row(fine.w_b, T / M)
+        coarse = Signals(
+            t, fine.w_b[:, ::2], fine.raw_s[:, ::2], fine.f_b[:, ::2], self._segment, P
+        )
         weight = simpson_weights(M) * T[:, None]
         to_end = weight * (1.0 - share[::2]) * T[:, None]
         return Intervals(coarse, P, T, weight, to_end)

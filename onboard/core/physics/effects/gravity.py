@@ -28,7 +28,11 @@ class Gravity(Effect):
     unknowns = (Unknown("delta_g", "m/s^2", 0.0, 0.06),)
 
     def acceleration(self, nodes: Signals) -> Array:
-        """Down, in body axes by the recorded attitude."""
+        """Down, in body axes by the recorded attitude, and by the gyroscope from there on."""
+        if nodes.P is not None:
+            R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0])
+            turned: Array = (R_nb[:, None, 2:] @ nodes.P)[:, :, 0, :, None]
+            return turned
         flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
         down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
         return down[..., None]
