@@ -21,7 +21,7 @@ from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.solution import total
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.preparations import Kept, Preparations, Source, stretch
+from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -39,7 +39,6 @@ class ReadyFlight:
         model = calibration_model(full.point, full.prior, full.settings.needs, full.carried)
         self._pass = Pass(model, full.point, (full.noise,))
         self._last_bias_b = full.bias_b
-        self._batches = full.batches
         self._place = {_key(b): i for i, b in enumerate(full.batches)}
         self._kept: dict[int, Kept] = {}
         self._known = _known(full, model)
@@ -85,9 +84,7 @@ class ReadyFlight:
             return None
         if i not in self._kept or not self._kept[i].serves(bias_b):
             self._pass.bias_b = bias_b
-            segment, sources = stretch(source, self._batches[i + 1 :])
-            made = self._pass.all_ready(segment, sources)
-            self._kept |= {i + k: each for k, each in enumerate(made)}
+            self._kept[i] = self._pass.made_anew(source, source.segment)
         return self._kept[i]
 
 
@@ -110,7 +107,7 @@ class WithJumps(Preparations):
         if made is None:
             return None
         ready = jumping(made.ready, self._model, self._jumps, source.segment.R_bs)
-        return replace(made, of=source, ready=ready, rest=(source,))
+        return replace(made, of=source, ready=ready)
 
 
 def _known(full: Examination, model: Model) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ made anew from it.  Flight that has left the buffer stays in the sums as it was 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -28,7 +28,6 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve, total
-from onboard.core.filter.limits import MADE_READY_AT_ONCE
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -51,26 +50,17 @@ class PassObserver(Protocol):
         """A batch has gone through it."""
 
 
-def through(
-    made: Pass, batch: Batch, coast_s: float, following: Sequence[Batch] = ()
-) -> PassResult:
+def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
     """One batch through a pass.
 
     Args:
         made: the pass; its filter begins anew where it has gone without fixes for too long.
         batch: flight.
         coast_s: longest dead reckoning, s.
-        following: flight that will go through it next.
     """
     if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
         made.restart()
-    return made.process(batch.segment, batch.fixes, batch.trusted, following)
-
-
-def _with_next(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Sequence[Batch]]]:
-    """Each batch with what is made ready beside it."""
-    for i, batch in enumerate(batches, 1):
-        yield batch, batches[i : i + MADE_READY_AT_ONCE]
+    return made.process(batch.segment, batch.fixes, batch.trusted)
 
 
 class Engine:
@@ -202,11 +192,11 @@ class Engine:
         """Go through what waits."""
         waiting = self.batches[len(self.batches) - self._waiting :]
         self._waiting = 0
-        for batch, following in _with_next(waiting):
-            self._run(batch, following)
+        for batch in waiting:
+            self._run(batch)
 
-    def _run(self, batch: Batch, following: Sequence[Batch] = ()) -> None:
-        result = through(self._pass, batch, self.settings.coast_s, following)
+    def _run(self, batch: Batch) -> None:
+        result = through(self._pass, batch, self.settings.coast_s)
         if self._observer is not None:
             self._observer.take(result)
         self.blocks.append(result.block)
@@ -301,8 +291,7 @@ class Engine:
         out = []
         for run in runs:
             made.restart()
-            for batch, following in _with_next(run):
-                out.append(through(made, batch, self.settings.coast_s, following))
+            out += [through(made, batch, self.settings.coast_s) for batch in run]
         return out
 
     @property

@@ -86,9 +86,6 @@ MOST_PREPARED_LIVE_BYTES: Final = 22_000_000
 anew.  Five minutes with five fixes a second and every effect are 20 MB [cost]."""
 MOST_PREPARED_BYTES: Final = 66_000_000
 """The same in a program that goes over recordings [cost]."""
-MADE_READY_AT_ONCE: Final = 4
-"""Batches of flight: arrays of 40 s cost a third of four times those of 10 s, longer ones no less
-[cost]."""
 NEAR_BIAS_RAD_S: Final = 2e-3
 """rad/s; within it attitude is linear in a bias: over the half second to either side of a fix a
 turn changes by a milliradian [physics]."""

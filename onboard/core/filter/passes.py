@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +11,12 @@ from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
-from onboard.core.filter.preparations import Kept, Preparations, Source, stretch
+from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
 from onboard.core.filter.traces import EpochState, EpochTrace, PassResult
 from onboard.core.filter.whitening import Uses, WhiteningFilter
-from onboard.core.inputs.segments import Batch, Fixes, Segment
-from onboard.core.inputs.stretches import fixes_of
+from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import BankSums, NormalSums
@@ -73,8 +69,6 @@ class Pass:
         """Of all segments that are finished."""
         self.bias_b = np.zeros(3)
         self._preparations = preparations
-        self._ahead: dict[tuple[int, ...], Kept] = {}
-        """Of the stretch that the filter is in: made ready at once."""
         self._running = False
         self._before: Segment | None = None
         self._since_solve = 0
@@ -108,20 +102,13 @@ class Pass:
         """Log-likelihood of each member, the unknowns integrated out with their prior."""
         return self.sums.log_likelihoods(self.model.prior, self.model.prior_sigma)
 
-    def process(
-        self,
-        segment: Segment,
-        fixes: Fixes,
-        trusted: NDArray[np.bool_],
-        following: Sequence[Batch] = (),
-    ) -> PassResult:
+    def process(self, segment: Segment, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
         """Go through the epochs ``fixes``; when running, the first is the last one of before.
 
         Args:
             segment: samples that cover the epochs and 0.45 s to either side.
             fixes: n GPS epochs on the boot clock as stamped (latency not removed).
             trusted: (n,) whether the receiver is to be believed there.
-            following: flight that will be gone through next, to be made ready with this.
         """
         skipped = 0
         if not self._running:
@@ -129,8 +116,7 @@ class Pass:
             if len(fixes) - skipped < 2:
                 at = float(fixes.t[-1])
                 return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
-        source = Source(segment, fixes, trusted, self._before, skipped)
-        made = self._made_ready(source, following)
+        made = self._made_ready(Source(segment, fixes, trusted, self._before, skipped))
         self._before, ready = made.segment, made.ready
         if not self._running:
             self._start(made.segment, ready)
@@ -145,49 +131,34 @@ class Pass:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
         return result
 
-    def _made_ready(self, source: Source, following: Sequence[Batch]) -> Kept:
-        """The segment with its regressors, from another pass, made with those before it, or now."""
+    def _made_ready(self, source: Source) -> Kept:
+        """The segment with its regressors, from another pass or made now."""
         kept = self._preparations
-        found = self._ahead.get(source.key)
-        if found is None and kept is not None:
-            found = kept.of(source)
+        found = None if kept is None else kept.of(source)
         if found is not None and found.serves(self.bias_b):
             return found
         if found is None:
-            # A bias that nothing is known of would have all that follows made once more.
-            ahead = following if self.bias_b.any() else ()
-            segment, rest = stretch(source, ahead)
             before = source.before.slow if source.before else {}
-            segment = self.model.remembering(segment, before)
+            segment = self.model.remembering(source.segment, before)
         else:
-            segment, rest = found.segment, found.rest
-        made = self.all_ready(segment, rest)
-        self._ahead = {each.of.key: each for each in made}
+            segment = found.segment
+        made = self.made_anew(source, segment)
         if kept is not None:
-            for each in made:
-                kept.keep(each)
-        return made[0]
+            kept.keep(made)
+        return made
 
-    def all_ready(self, segment: Segment, sources: tuple[Source, ...]) -> list[Kept]:
-        """A stretch made ready, cut into its parts."""
-        first = sources[0]
-        cuts = [0, *np.cumsum([len(s.fixes) - 1 - s.skipped for s in sources]).tolist()]
+    def made_anew(self, source: Source, segment: Segment) -> Kept:
+        """A segment, with what effects remember in it, with its regressors."""
         ready = prepare(
             segment,
-            fixes_of([s.fixes for s in sources]).between(first.skipped, sys.maxsize),
-            np.concatenate([first.trusted[first.skipped :], *(s.trusted[1:] for s in sources[1:])]),
+            source.fixes.between(source.skipped, len(source.fixes)),
+            source.trusted[source.skipped :],
             self.model,
             self.point,
             self.bias_b,
             recorded_attitude=self.uses.recorded_attitude,
         )
-        parts = [ready] if len(sources) == 1 else [ready.between(i, j) for i, j in pairwise(cuts)]
-        # From one part to the next there is nothing to remember: the stretch is the same.
-        sources = (first, *(replace(s, before=segment) for s in sources[1:]))
-        return [
-            Kept(source, segment, part, self.bias_b, sources[i:])
-            for i, (source, part) in enumerate(zip(sources, parts, strict=True))
-        ]
+        return Kept(source, segment, ready, self.bias_b)
 
     def _start(self, segment: Segment, ready: Prepared) -> None:
         first = ready.epochs[0]

@@ -8,21 +8,18 @@ it goes on from a segment that was made ready with another one as soon as that s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.limits import (
-    MADE_READY_AT_ONCE,
     MOST_PREPARED_BYTES,
     MOST_PREPARED_LIVE_BYTES,
     NEAR_BIAS_RAD_S,
 )
 from onboard.core.filter.prepared import Prepared
-from onboard.core.inputs.segments import Batch, Fixes, Segment
-from onboard.core.inputs.stretches import continues, joined
+from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import preferred
 
@@ -35,8 +32,7 @@ class Source:
         segment: samples.
         fixes: GPS epochs.
         trusted: (n,) whether the receiver is to be believed there.
-        before: the segment before, with what effects remember of it, or the stretch that both are
-            of; None after a gap.
+        before: the segment before, with what effects remember of it; None after a gap.
         skipped: how many fixes from the first on are left out.
     """
 
@@ -59,49 +55,26 @@ class Kept:
 
     Attributes:
         of: what it was made of.
-        segment: the same with what effects remember; of a stretch that was made ready at once, all.
+        segment: the same with what effects remember.
         ready: what the filter goes through.
         bias_b: (3,) gyroscope bias that was subtracted, body axes, rad/s.
-        rest: what is of the same stretch from here on, this one first.
     """
 
     of: Source
     segment: Segment
     ready: Prepared
     bias_b: Array
-    rest: tuple[Source, ...]
 
     @property
     def size(self) -> int:
-        """Bytes that are its own, with its part of the stretch."""
-        s = self.segment
-        if s is self.of.segment:
-            return self.ready.size
-        arrays = [s.t, s.w_b, s.raw_s, s.t_attitude, s.R_attitude]
-        arrays += [x for signal in s.slow.values() for x in signal]
-        share = (self.ready.end - self.ready.start) / max(float(s.t[-1] - s.t[0]), 1e-9)
-        return self.ready.size + round(share * sum(x.nbytes for x in arrays))
+        """Bytes that are its own."""
+        old = self.of.segment.slow
+        own = [x for name, x in self.segment.slow.items() if name not in old]
+        return self.ready.size + sum(x.nbytes for signal in own for x in signal)
 
     def serves(self, bias_b: Array) -> bool:
         """Whether it does for a pass with this gyroscope bias (3,), rad/s."""
         return float(np.abs(self.bias_b - bias_b).max()) < NEAR_BIAS_RAD_S
-
-
-def stretch(first: Source, following: Sequence[Batch]) -> tuple[Segment, tuple[Source, ...]]:
-    """What is made ready at once: a segment, and all that it is for.
-
-    Args:
-        first: what has to be.
-        following: flight after it; as much of it as goes on without a break, and no more than
-            :data:`~onboard.core.filter.limits.MADE_READY_AT_ONCE`.
-    """
-    batches = [Batch(first.segment, first.fixes, first.trusted, fresh=True)]
-    for batch in following[: MADE_READY_AT_ONCE - 1]:
-        if not continues(batch, batches[-1]):
-            break
-        batches.append(batch)
-    segment = joined(batches)
-    return segment, (first, *(Source(b.segment, b.fixes, b.trusted, None, 0) for b in batches[1:]))
 
 
 class Preparations:

@@ -53,18 +53,6 @@ class Prepared:
         """Time of the last fix, latency removed, s."""
         return float(self.epochs.t[-1])
 
-    def between(self, first: int, last: int) -> Prepared:
-        """What leads from fix ``first`` to fix ``last``, both with it."""
-        ends = np.flatnonzero(self.measured == last)
-        begins = np.flatnonzero(self.measured == first)
-        cut = slice(int(begins[0]) + 1 if len(begins) else 0, int(ends[0]) + 1)
-        inside, measured = slice(first, last + 1), self.measured[cut]
-        return Prepared(
-            Steps(*(getattr(self.steps, f.name)[cut] for f in fields(Steps))),
-            np.where(measured < 0, -1, measured - first),
-            Epochs(*(getattr(self.epochs, f.name)[inside] for f in fields(Epochs))),
-        )
-
 
 def prepare(
     segment: Segment,
