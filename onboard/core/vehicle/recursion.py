@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from onboard.core.maths.arrays import Array, Mask
 
 NEGLIGIBLE = 1e-12
+SHORTEST_LAG_S = 0.005
+"""A tenth of a step of 0.05 s, of which exp(-10) is left a step later: a shorter lag acts in
+proportion to its length, and a law of that is what a fit needs at none [cost: rounding]."""
 
 
 def accumulated(z: Array, factor: float, starts: Mask | None = None) -> Array:

@@ -8,13 +8,11 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.recursion import lagged
+from onboard.core.vehicle.recursion import SHORTEST_LAG_S, lagged
 
 FLOOR_S = 0.03
 """Lags below this are within the steps of outputs logged at 10 Hz, s [data sheet]."""
 LONGEST_S = 1.0
-LEAST_S = 0.005
-"""Below it the lag acts in proportion: a tenth of a step of the outputs is no more than a slope."""
 
 
 class MotorLag(Effect):
@@ -36,7 +34,7 @@ class MotorLag(Effect):
         if air.commands is None:
             return
         lag = float(np.clip(values[0], -LONGEST_S, LONGEST_S))
-        tau = max(abs(lag), LEAST_S)
+        tau = max(abs(lag), SHORTEST_LAG_S)
         late = lagged(air.commands, tau, air.flight.piece, air.flight.step_s)
         air.commands = air.commands + lag / tau * (late - air.commands)
 

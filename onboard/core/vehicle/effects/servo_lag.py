@@ -8,11 +8,10 @@ import numpy as np
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.recursion import lagged
+from onboard.core.vehicle.recursion import SHORTEST_LAG_S, lagged
 
 NOMINAL_S = 0.14
 """SIM_SERVO_SPEED by default: the time constant of the simulator's servos, s."""
-LEAST_S = 0.005
 
 
 class ServoLag(Effect):
@@ -26,5 +25,5 @@ class ServoLag(Effect):
         """Slow the commands down."""
         if air.commands is None:
             return
-        tau = float(np.clip(values[0], LEAST_S, 1.0))
+        tau = float(np.clip(values[0], SHORTEST_LAG_S, 1.0))
         air.commands = lagged(air.commands, tau, air.flight.piece, air.flight.step_s)
