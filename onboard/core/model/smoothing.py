@@ -17,6 +17,8 @@ from onboard.core.maths.arrays import Array
 _FINE = 4001
 _KEPT = 16
 """Windows whose weights are kept: every segment of a pass asks for the same few [cost]."""
+RESOLVED_S = 0.125
+"""s; over a shorter span the slope of a force is mostly vibration."""
 SECOND_DERIVATIVE_S = 0.12
 """s; to either side, over which a second derivative is taken: shorter is noise, longer misses a
 manoeuvre of 1 Hz."""
@@ -107,9 +109,9 @@ def mean_slope(offset: Array, window: float) -> Array:
     Returns:
         (n,) 1/s.
     """
-    # Below two nodes a span is not resolved; its effect is the second derivative, whose best
-    # estimate from these nodes is that over a span which is.
-    resolved = max(window, 4.0 * (offset[1] - offset[0]))
+    # The effect of a shorter span is the second derivative, whose best estimate is that over one
+    # which is resolved.
+    resolved = max(window, RESOLVED_S)
     if window < resolved:
         limit: Array = mean_weights(offset, resolved) / resolved**2
         return limit

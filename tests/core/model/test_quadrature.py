@@ -14,8 +14,8 @@ from onboard.core.model.quadrature import (
     AROUND_COUNT,
     AROUND_SPAN_S,
     NodeMaker,
+    gregory_weights,
     rotation_increments,
-    simpson_weights,
 )
 from onboard.core.model.smoothing import (
     box_weights,
@@ -147,6 +147,29 @@ def test_around_an_epoch_forces_are_in_its_axes():
     assert np.abs(made.now.f_b - force(epoch)).max() < 2e-4
 
 
+@pytest.mark.parametrize("count", [8, 9, 30, 41])
+def test_what_alternates_from_node_to_node_is_not_taken_for_a_slow_force(count):
+    alternating = (-1.0) ** np.arange(count + 1)
+    ends = 2.0 * 2.0 / count
+    assert abs(gregory_weights(count) @ alternating) < ends
+
+
+@pytest.mark.parametrize("frequency", [30.0, 40.0, 45.0])
+def test_vibration_below_half_the_rate_of_the_samples_is_no_slow_force(frequency):
+    """As in the sum of the samples; of 45 Hz Simpson would see a tenth."""
+    rate, seconds, swing = 100.0, 0.2, 10.0
+    t = np.arange(0.0, 30.0, 1.0 / rate) - 1.0
+    shaken = np.zeros((len(t), 3))
+    shaken[:, 2] = swing * np.sin(2.0 * np.pi * frequency * t + 0.3)
+    level = np.broadcast_to(np.eye(3), (len(t), 3, 3))
+    start = np.arange(0.0033, 28.0, seconds)
+    nodes = NodeMaker(Segment(t, 0.0 * shaken, shaken, t, level, np.eye(3)), np.zeros(3), NOMINAL)
+    made = nodes.intervals(start, start + seconds)
+    gained = made.integrals(made.signals.f_b[..., None])[0][:, 2, 0]
+    # Whole swings; at either end a third of a node's weight is another than that of the middle.
+    assert np.abs(gained).max() < 2.0 / 3.0 * swing / (1.5 * rate)
+
+
 @pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45, 0.8])
 @pytest.mark.parametrize("recorded", [False, True])
 def test_a_lever_arm_is_seen_as_the_receiver_averages_it(window, recorded):
@@ -172,10 +195,10 @@ def test_bias_is_subtracted_and_the_six_applied():
 
 
 @pytest.mark.parametrize("count", [4, 8, 10])
-def test_simpson_is_exact_for_cubics(count):
+def test_gregory_is_exact_for_cubics(count):
     x = np.linspace(0.0, 1.0, count + 1)
     for power in range(4):
-        assert simpson_weights(count) @ x**power == pytest.approx(1.0 / (power + 1))
+        assert gregory_weights(count) @ x**power == pytest.approx(1.0 / (power + 1))
 
 
 @pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.2, 0.346, 0.45, 0.8])
