@@ -57,7 +57,7 @@ def calibration_model(
         HeightLatency(),
         GyroTiming(),
         GyroScale(),
-        AttitudeOffset(),
+        AttitudeOffset(point.heading),
         LeverArmError(),
     )
     gone = {f.instead_of for f in more}

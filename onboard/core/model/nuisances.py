@@ -96,7 +96,7 @@ class GpsSmoothing(Family):
     def __init__(self, taken: float, sigma: float = 0.2) -> None:
         """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
         self.unknowns = (
-            Unknown("window_squared", "s^2", 0.0, sigma),
+            Unknown("window_squared", "s^2", -(taken**2), sigma),
             Unknown("third_moment", "s^3", 0.0, THIRD_MOMENT),
         )
         self.taken = taken
@@ -150,8 +150,8 @@ class ImuDelay(Family):
     name = "imu_delay"
 
     def __init__(self, taken: float = 0.0, sigma: float = 0.2) -> None:
-        """Take the delay of the linearisation, s."""
-        self.unknowns = (Unknown("attitude_delay", "s", 0.0, sigma),)
+        """Take the delay of the linearisation, s; the prior's centre is none."""
+        self.unknowns = (Unknown("attitude_delay", "s", -taken, sigma),)
         self.taken = taken
 
     def attitude(self, around: Around) -> Direct:
@@ -192,12 +192,14 @@ class AttitudeOffset(Family):
 
     name = "attitude_offset"
 
-    def __init__(self, tilt_sigma: float = 0.03, heading_sigma: float = 0.1) -> None:
-        """Take the prior sigmas, rad."""
+    def __init__(
+        self, heading: float = 0.0, tilt_sigma: float = 0.03, heading_sigma: float = 0.1
+    ) -> None:
+        """Take the heading's error of the linearisation and the prior sigmas, rad."""
         self.unknowns = (
             Unknown("tilt_roll", "rad", 0.0, tilt_sigma),
             Unknown("tilt_pitch", "rad", 0.0, tilt_sigma),
-            Unknown("heading", "rad", 0.0, heading_sigma),
+            Unknown("heading", "rad", -heading, heading_sigma),
         )
 
     def attitude(self, around: Around) -> Direct:
