@@ -20,7 +20,7 @@ from math import log
 import numpy as np
 
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SEARCHED
-from onboard.core.diagnosis.score import needed, surprise
+from onboard.core.diagnosis.score import needed, surprise, time_sigma
 from onboard.core.estimate.limits import (
     FEWEST_WINDOWS,
     MISPLACED_M,
@@ -111,7 +111,8 @@ class Companions:
         if surprise(float(told.gain[i]), 3, len(t)) < -2.0 * log(SEARCHED):
             return None
         moment = float(t[i] - told.early[i] * SHARED_WINDOW_S)
-        return BiasStep(origin).at(moment, self._witness(imu, t, i))
+        sigma = time_sigma(t, told.gain, SHARED_WINDOW_S)
+        return BiasStep(origin).at(moment, self._witness(imu, t, i), sigma)
 
     def of(self, jump: BiasStep, imu: int) -> BiasStep:
         """A jump that was found without the others, with what they say of it if they can."""

@@ -10,7 +10,6 @@ import numpy as np
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
-from onboard.core.diagnosis.limits import SPACINGS_S
 from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
 from onboard.core.diagnosis.score import least
@@ -88,7 +87,7 @@ class Findings:
         }
         if f.onset is not None:
             quantities = {
-                "time": Quantity(f.onset - final.origin.t0, SPACINGS_S[-1], "s"),
+                "time": Quantity(f.onset - final.origin.t0, f.onset_sigma, "s"),
                 **quantities,
             }
         values = {k: q.value for k, q in quantities.items()}

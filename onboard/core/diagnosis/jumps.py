@@ -6,6 +6,7 @@ attitude a kick that dead reckoning knows nothing of; with little flight after i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from onboard.core.diagnosis.effort import AT_ONCE, FURTHEST
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
-from onboard.core.diagnosis.score import least, needed, surprise
+from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.diagnosis.stepped import ReadyFlight
 from onboard.core.estimate.pool import Pool
@@ -102,10 +103,13 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float, reach:
 
 
 def placed(full: Examination, seen: BiasStep) -> BiasStep:
-    """A jump that other accelerometers have seen, at the moment nearby that GPS likes best."""
-    at = (seen.moment - SPACINGS_S[-1], seen.moment, seen.moment + SPACINGS_S[-1])
-    jumps = [seen.at(t) for t in at if t > full.blocks[0].start]
-    return jumps[int(np.argmax(gains(full, (), jumps)))]
+    """A jump that other accelerometers have seen, where they and GPS together like it best."""
+    fine, sigma = SPACINGS_S[-1], seen.onset_sigma
+    reach = fine * math.ceil(2.0 * sigma / fine)  # 95 % of what they say
+    t = np.arange(-reach, reach + 1e-6, fine) + seen.moment
+    t = t[t > full.blocks[0].start]
+    gain = _scaled(full, (), [seen.at(float(m)) for m in t]) - ((t - seen.moment) / sigma) ** 2
+    return seen.at(float(t[np.argmax(gain)]), sigma=time_sigma(t, gain, fine))
 
 
 def halved(seen: BiasStep) -> BiasStep:
@@ -172,8 +176,15 @@ def _best(
     times = np.arange(centre - width, centre + width + 1e-6, spacing)
     times = np.maximum(times, settled_from(full.blocks))
     times = np.unique(times)
-    jumps = [jump.at(float(t)) for t in times]
-    return jumps[int(np.argmax(gains(full, chosen, jumps)))]
+    gain = _scaled(full, chosen, [jump.at(float(t)) for t in times])
+    return jump.at(float(times[np.argmax(gain)]), sigma=time_sigma(times, gain, spacing))
+
+
+def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasStep]) -> Array:
+    """Gain of each jump alone, by the variance of gains over what the sums say."""
+    fitter, before, fits = fitted(full, chosen, jumps)
+    gain = [fitter.gain(before, after) for _, after in fits]
+    return np.array(gain) / max(fitter.pool.variance, 1.0)
 
 
 def candidate_of(made: Examination, family: Effect) -> Candidate:

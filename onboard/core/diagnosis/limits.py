@@ -40,7 +40,7 @@ FORGOTTEN_S: Final = 35.0
 """s after which a filter that GPS corrects has forgotten nine tenths of what tells a jump of the
 accelerometer, and an EKF has settled [simulated planes and copters: 0.88 to 0.92]."""
 SPACINGS_S: Final = (2.0, 0.5)
-"""Spacing of the two rounds of a search, s; the last is also the sigma of what is found [cost]."""
+"""Spacing of the two rounds of a search, s [cost: the likelihood bends over a second]."""
 SEARCHED: Final = 0.1
 """Of a flight without a jump, that one is searched for in vain: it is decided later, with noise
 that is found with it in the model [cost]."""

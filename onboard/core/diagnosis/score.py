@@ -17,7 +17,10 @@ from collections.abc import Callable
 from functools import lru_cache
 from math import inf, log
 
+import numpy as np
+
 from onboard.core.diagnosis.limits import FALSE_ALARM
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import log_survival
 from onboard.core.maths.student import log_survival_f
 from onboard.core.physics.catalogue import kinds
@@ -52,6 +55,19 @@ def needed(
     if freedom < inf:
         variance /= _worth(unknowns, log(places), freedom)
     return max(variance, 1.0) * _certain(unknowns, -0.5 * least() - log(places))
+
+
+def time_sigma(t: Array, gain: Array, spacing: float) -> float:
+    """Standard deviation of a moment, s: of its posterior over those that were looked at.
+
+    Args:
+        t: (n,) moments, s.
+        gain: (n,) fall of chi-square by a jump at each, over its variance.
+        spacing: s between them; within it, it may be anywhere.
+    """
+    weight = np.exp(0.5 * (gain - gain.max()))
+    mean = np.average(t, weights=weight)
+    return float(np.sqrt(np.average((t - mean) ** 2, weights=weight) + spacing**2 / 12.0))
 
 
 def least() -> float:

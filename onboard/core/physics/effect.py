@@ -17,6 +17,7 @@ in the data themselves
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -138,6 +139,7 @@ class Effect(Family):
         untestable: why no recording can show it; empty if one can.
         bent_by_clipping: why it cannot be asked for beside clipping; empty if it can.
         onset: when it began, s on the boot clock; None if it was always there.
+        onset_sigma: of that, s.
     """
 
     effect: ClassVar[str]
@@ -166,6 +168,7 @@ class Effect(Family):
     keys: tuple[str, ...] = ()
     plausible: tuple[float, ...] = ()
     onset: float | None = None
+    onset_sigma: float = math.nan
 
     def __init_subclass__(cls, *, abstract: bool = False) -> None:
         """Refuse an effect that leaves a statement out: none of them has a safe default."""

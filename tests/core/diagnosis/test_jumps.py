@@ -9,6 +9,7 @@ from benchmarks.explaining import heard
 from onboard.core.diagnosis import jumps, onsets, testability
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.score import time_sigma
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -36,6 +37,17 @@ class Shock(ByAxis):
         kick = np.outer((since >= 0.0) & (since < 0.2), self.sizes)
         turn = np.array([*self.turn, 0.0])
         return kick + np.where(since[:, None] >= 0.1, np.cross(scene.f_b, turn), 0.0)
+
+
+@pytest.mark.parametrize("sigma", [0.4, 1.0, 2.5])
+def test_a_moment_is_known_as_its_likelihood_bends(sigma):
+    t = np.arange(-12.0, 12.0, 0.5)
+    gain = 40.0 - ((t - 0.2) / sigma) ** 2
+    assert time_sigma(t, gain, 0.5) == pytest.approx(np.hypot(sigma, 0.5 / np.sqrt(12.0)), rel=0.02)
+
+
+def test_one_moment_is_known_to_the_spacing_of_those_looked_at():
+    assert time_sigma(np.array([3.0]), np.array([9.0]), 0.6) == pytest.approx(0.6 / np.sqrt(12.0))
 
 
 @pytest.fixture(scope="module", params=["copter", "plane"])

@@ -70,10 +70,17 @@ class BiasStep(Effect):
     witness: Witness | None = None
     """Its prior, where other accelerometers have seen it."""
 
-    def at(self, moment: float, witness: Witness | None = None) -> Self:
-        """The jump at a moment, s on the boot clock, as the other accelerometers have seen it."""
+    def at(self, moment: float, witness: Witness | None = None, sigma: float | None = None) -> Self:
+        """The jump at a moment.
+
+        Args:
+            moment: s on the boot clock.
+            witness: what other accelerometers say of it; None: what was known of that.
+            sigma: of the moment, s; None: what was known of that.
+        """
         made = copy(self)
         made.onset = moment
+        made.onset_sigma = self.onset_sigma if sigma is None else sigma
         made.name = f"bias_step_{moment:.2f}"
         made.take_axes("m/s^2", LARGEST)
         made.witness = witness or self.witness
