@@ -9,7 +9,7 @@ from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
 from onboard.core.diagnosis.records import NotTestable
-from onboard.core.diagnosis.screening import false_fixes, unclipped
+from onboard.core.diagnosis.screening import doubted_of, false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
@@ -59,7 +59,8 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
         fault, batches = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
-        refused = refused_beside_a_jump(full, fault, origin.t0)
+        doubted = doubted_of(calibrator, full)
+        refused = refused_beside_a_jump(full, fault, origin.t0, doubted)
         if refused is not None:
             fault, batches = None, full.batches
         full = Examination(

@@ -120,10 +120,21 @@ class Examination(Engine):
             held, blind = None, False
         return self
 
-    def beside(self, more: Sequence[Family], refused: Refused | None = None) -> Examination:
-        """The same flight and columns with more of them, from where this one has come to."""
-        families = (*self._own, *more)
-        return Examination(self, families, t0=self.point.skew_from, start=self, refused=refused)
+    def beside(
+        self,
+        more: Sequence[Family],
+        refused: Refused | None = None,
+        batches: Sequence[Batch] | None = None,
+    ) -> Examination:
+        """The same flight and columns with more of them, from where this one has come to.
+
+        Args:
+            more: columns.
+            refused: velocities that are not to be used; None: what the gates refuse.
+            batches: the flight with other fixes believed; None: as here.
+        """
+        t0, families = self.point.skew_from, (*self._own, *more)
+        return Examination(self, families, t0=t0, start=self, refused=refused, batches=batches)
 
     def carrying(self, nuisance: Family) -> Examination:
         """The same flight and columns with a nuisance that whatever follows has to live with."""

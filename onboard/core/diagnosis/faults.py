@@ -88,17 +88,32 @@ def _with_contradicted(
 ) -> list[_Spell]:
     """Both kinds in order of time; what the gate refused right beside one is of the same fault."""
     out = list(spells)
-    for c in contradicted:
+    for c in _until_undone(contradicted):
         start, end = c.start - t0, c.end - t0
         near = [
             s.start <= end + LONGEST_FIX_GAP_S and s.end >= start - LONGEST_FIX_GAP_S for s in out
         ]
         beside = [s for s, is_near in zip(out, near, strict=True) if is_near]
-        start = min([start, *(s.start for s in beside)])
-        end = max([end, *(s.end for s in beside)])
+        same = [s for s in beside if not _undoes(s.off, c.off)]
+        start = min([start, *(s.start for s in same)])
+        end = max([end, *(s.end for s in same)])
         out = [s for s, is_near in zip(out, near, strict=True) if not is_near]
         out.append(_Spell(start, end, c.off, c.size, c.off, c.sigma))
     return sorted(out, key=lambda s: s.start)
+
+
+def _until_undone(contradicted: Sequence[Contradiction]) -> Iterator[Contradiction]:
+    """Each; of two of which the second takes the first back, one until the second begins.
+
+    Where a constant error was believed meanwhile, it is the receiver's being right again that
+    contradicts what the filter has taken for its velocity.
+    """
+    left = list(contradicted)
+    while left:
+        first = left.pop(0)
+        if left and left[0].start - first.end < LONGEST_FAULT_S and _undoes(left[0].off, first.off):
+            first = replace(first, end=left.pop(0).start)
+        yield first
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.faults import fault_effect
 from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
-from onboard.core.diagnosis.refusals import OPINIONS, refused
+from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine, through
 from onboard.core.filter.noise import NoiseLevels
@@ -71,6 +71,11 @@ def unclipped(
     return out
 
 
+def doubted_of(calibrator: Calibrator, full: Examination) -> list[Refused]:
+    """Where others doubted a receiver that had a fix."""
+    return [r for r in refused(full.batches, calibrator.trust.refusals) if r.reason in OPINIONS]
+
+
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
 ) -> tuple[Finding | None, list[Batch]]:
@@ -79,7 +84,7 @@ def false_fixes(
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
     """
-    doubted = [r for r in refused(full.batches, calibrator.trust.refusals) if r.reason in OPINIONS]
+    doubted = doubted_of(calibrator, full)
     levels, least, jumped = _robust(full, full.found().theta)
     every = (full.refused, full.refused_untuned, like.refused)
     rejected = any(refused["velocity"] for refused in every)

@@ -28,13 +28,13 @@ PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
 
 
-def complaining(health, begin, end):
-    bad = begin <= health.t <= end
+def complaining(health, complaints):
+    bad = any(begin <= health.t <= end for begin, end in complaints)
     return replace(health, flags=EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0))
 
 
-def flagged(seed, gps, complaint, *effects, duration=140.0):
-    """Diagnosed with an EKF that complains of GPS from and to the times of ``complaint``, s."""
+def flagged(seed, gps, complaints, *effects, duration=140.0):
+    """Diagnosed with an EKF that complains of GPS from and to the times of ``complaints``, s."""
     spec = FlightSpec(
         vehicle="copter",
         seed=seed,
@@ -46,7 +46,7 @@ def flagged(seed, gps, complaint, *effects, duration=140.0):
     made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):
-            made.feed(complaining(sample, *complaint) if isinstance(sample, EkfHealth) else sample)
+            made.feed(complaining(sample, complaints) if isinstance(sample, EkfHealth) else sample)
     made.finish()
     return diagnose(made, 1), made.first_sample
 
@@ -55,7 +55,7 @@ def flagged(seed, gps, complaint, *effects, duration=140.0):
 def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
     fault = concealed.GpsFault(start=60.0, end=93.0, north=1.2, east=-0.9)
     # After half a minute of coasting such a fault is five of its sigmas: seen in two of three.
-    said, first = flagged(71, NOISY, (61.0, 98.0), fault)
+    said, first = flagged(71, NOISY, [(61.0, 98.0)], fault)
     assert said.verdict is Verdict.EXPLAINED
     (effect,) = said.effects
     assert effect.name == "gps_fault"
@@ -70,8 +70,21 @@ def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
 
 
 @pytest.mark.slow
+def test_a_fault_that_was_believed_in_its_middle_is_no_jump_and_ends_when_the_receiver_is_right():
+    """What others doubted is true if the accelerometer has jumped: so it is asked, too."""
+    fault = concealed.GpsFault(start=60.0, end=77.5, north=1.6, east=-1.55)
+    said, first = flagged(72, PROMPT, [(60.3, 67.7), (70.9, 84.7)], fault)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    ((begin, end),) = effect.intervals
+    assert (begin + first, end + first) == pytest.approx((fault.start, fault.end), abs=1.0)
+    offset = effect.unknowns["offset"]
+    assert offset.value == pytest.approx(float(np.hypot(1.6, 1.55)), abs=3.0 * offset.sigma)
+
+
+@pytest.mark.slow
 def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_clean():
-    said, first = flagged(41, PROMPT, (60.0, 75.0), duration=110.0)
+    said, first = flagged(41, PROMPT, [(60.0, 75.0)], duration=110.0)
     assert said.verdict is Verdict.CLEAN
     (unused,) = said.unused
     assert unused.start_s + first == pytest.approx(60.0, abs=1.0)
