@@ -12,7 +12,7 @@ from onboard.answers.explain import Explanation
 from onboard.answers.knowledge import seen
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
+from onboard.core.physics.catalogue import danger_of, is_excluded, kind_of, title_of
 from onboard.core.physics.finding import Confounder, Finding, Where
 from onboard.push.diagnosed import severity_of_effect
 from onboard.report import residual_charts
@@ -24,7 +24,7 @@ TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
 MOST_RIVALS = 3
 """Effects that could stand for another, told one by one: the nearest; the rest in one line."""
-LEVELS = {"info": "worth knowing", "warning": "matters"}
+LEVELS = {"info": "worth knowing", "warning": "matters", "error": "dangerous"}
 """How much an effect matters, in words: whether it forbids to set the calibration."""
 
 
@@ -65,6 +65,7 @@ def explain_html(
         verdict=diagnosis.verdict.value,
         headline=verdict.headline(diagnosis),
         severity=verdict.severity(diagnosis),
+        dangers=verdict.dangers(diagnosis),
         missing=verdict.missing(diagnosis),
         sure=verdict.proof(diagnosis),
         change=verdict.cures(diagnosis, advice),
@@ -217,7 +218,8 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
         "charts": residual_charts.of_effect(e),
-        "level": LEVELS[severity_of_effect(e.name)],
+        "level": LEVELS[severity_of_effect(e.name, danger_of(e))],
+        "danger": danger_of(e),
         "rivals": [(title_of(r.name), words.number(r.delta_bic)) for r in rivals[:MOST_RIVALS]],
         "others": _others(rivals[MOST_RIVALS:]),
         "cure": e.cure,

@@ -80,10 +80,13 @@ def sentences(h: History) -> tuple[str, ...]:
         out += [f"accelerometer {a.imu}: {said}" for n in a.numbers for said in _said(n)]
         out += [f"accelerometer {a.imu}: {said}" for said in _merged(a)]
     out += [said for n in h.numbers for said in _said(n)]
+    asking: dict[str, list[int]] = {}
+    for imu, flight in _asking(h):
+        asking.setdefault(_flight(flight), []).append(imu)
     out += [
-        f"accelerometer {imu}: {_flight(flight)} asks for other parameters than are in force: "
+        f"{_accelerometers(imus)}: {flight} asks for other parameters than are in force: "
         "set them as its report says"
-        for imu, flight in _asking(h)
+        for flight, imus in asking.items()
     ]
     if not out and severity_of(h) is Severity.UNKNOWN:
         out = [f"accelerometer {i.calibration.imu}: {why_not(i)}" for i in h.vehicle.latest.imus]
@@ -101,7 +104,14 @@ def why_not(i: ImuRecord) -> str:
     """Why a recording has not calibrated an accelerometer, in a sentence."""
     if i.missing:
         return f"something is missing from the model: {i.missing}"
-    return i.calibration.note.rstrip(".") or "the flight does not show enough"
+    said = i.calibration.note.removeprefix(f"accelerometer {i.calibration.imu}: ").rstrip(".")
+    return said or "the flight does not show enough"
+
+
+def _accelerometers(imus: Sequence[int]) -> str:
+    if len(imus) == 1:
+        return f"accelerometer {imus[0]}"
+    return f"accelerometers {', '.join(map(str, imus[:-1]))} and {imus[-1]}"
 
 
 def _asking(h: History) -> Iterator[tuple[int, Flight]]:
