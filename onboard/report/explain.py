@@ -59,7 +59,7 @@ def explain_html(
         base,
         files=list(files),
         damage=list(damage),
-        autopilot=autopilot,
+        autopilot=words.autopilot_in_words(autopilot),
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
@@ -213,7 +213,7 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         "share": words.percent(e.share_of_mismatch),
         "sure": verdict.surely(e, ambiguous=ambiguous),
         "bic": words.number(e.delta_bic) if not is_excluded(e.name) else "",
-        "fit": _pair("Not used in the fit", "m/s", before, after, _longest((before, after)))
+        "fit": _pair("Error without and with it", "m/s", before, after, _longest((before, after)))
         if known
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
@@ -240,7 +240,7 @@ def _others(rivals: Sequence[Confounder]) -> str:
     """Rivals that are further away than those that are named."""
     if not rivals:
         return ""
-    return f"{len(rivals)} more (worse by {words.number(rivals[0].delta_bic)} or more)"
+    return f"{len(rivals)} more (BIC worse by {words.number(rivals[0].delta_bic)} or more)"
 
 
 def _intervals(e: Finding) -> list[str]:
@@ -261,7 +261,7 @@ def _parameters(d: Diagnosis, advice: Advice) -> list[dict[str, str]]:
             "value": f"{round(change.value, 4) + 0.0:.4f}"
             if change.number
             else words.setting(change.value),
-            "reason": change.reason,
+            "reason": change.reason.replace("degC", "°C"),  # plain in files of parameters
             "withheld": change.withheld,
         }
         for change in changes(d, advice)

@@ -46,7 +46,7 @@ def test_a_vehicle_on_which_nothing_happened_is_well_and_merged():
 
 
 def test_a_vehicle_that_flies_with_other_parameters_than_a_flight_asks_for_is_not_well():
-    old, new = tuple(np.zeros(6) + [1, 1, 1, 0, 0, 0]), tuple(TRUE)
+    old, new = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), tuple(TRUE)
     asking = flown("a.BIN", TRUE, day=0.0, asks=True, in_force=old)
     h = history([asking])
     assert severity_of(h) is Severity.TO_SET
