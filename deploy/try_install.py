@@ -146,7 +146,7 @@ def serve(root: CleanRoot, way: str) -> None:
     text = (root.place / unit / "onboard.service").read_text(encoding="utf-8")
     command = re.findall(r"^ExecStart=(.*)$", text, re.MULTILINE)[0].split()
     state = root.place / "var/lib/onboard"
-    state.mkdir(parents=True)
+    state.mkdir(parents=True, exist_ok=True)
     shutil.chown(state, "nobody")
     with ExitStack() as stack:
         for process in (
@@ -169,6 +169,16 @@ def wait_for_vehicle(root: CleanRoot) -> None:
             pass  # it does not answer yet
         time.sleep(0.2)
     raise SystemExit(f"no vehicle within {SEEN_WITHIN_S} s")
+
+
+def slim(root: CleanRoot) -> None:
+    """What docs/container.md offers to those who want less on the disk."""
+    site = next((root.place / INSTALLED["pipx"]).glob("venvs/*/lib/*/site-packages"))
+    inside = f"/{site.relative_to(root.place)}"
+    python = str(Path(inside).parents[2] / "bin" / "python")
+    root.run(python, "/source/deploy/slim.py", inside)
+    root.run(python, "-m", "compileall", "-q", inside)
+    serve(root, "deb")  # it still does, and needs no installation
 
 
 def packages(folder: Path) -> list[tuple[float, str]]:
@@ -200,6 +210,9 @@ def main() -> None:
     site = next(top.glob("venvs/*/lib/*/site-packages"), top)
     for size, name in packages(site)[:12]:
         sys.stdout.write(f"  {size:6.1f} MB  {name}\n")
+    if way == "pipx":
+        step("deploy/slim.py, compiled anew, started again", root, lambda: slim(root))
+        sys.stdout.write(f"{INSTALLED[way]}: {root.megabytes(INSTALLED[way]):.0f} MB\n")
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ def residual(imu: ImuView, written: WrittenView | None) -> str:
     before, after = imu.velocity_rms_before_m_s, imu.velocity_rms_after_m_s
     what = "residual"
     if written is not None and written.velocity_rms_before_m_s is not None:
-        before, what = written.velocity_rms_before_m_s, "residual by what was written"
+        before, what = written.velocity_rms_before_m_s, "residual through the last push"
         after = written.next_velocity_rms_m_s or written.velocity_rms_after_m_s
     if before is None or after is None:
         return ""
