@@ -3,9 +3,9 @@
 BASE is the root file system of a bare system, e.g. made by ``mmdebstrap --variant=minbase bookworm
 BASE``; WORK gets a copy.  There onboard is installed from this checkout, by pipx or as a Debian
 package that is built there too; a recording is calibrated; the service is installed, started as
-its unit starts it, and shown a simulated vehicle.  Each step is timed.  systemd does not run in a
-root, so ``--start`` is left out.  Needs root and the package registries; nothing outside WORK is
-written.
+its unit starts it, and shown a simulated vehicle.  Each step is timed.  systemd does not run
+there, so ``--start`` is left out: ``try_boot.py`` has it.  Needs root and the package registries;
+nothing outside WORK is written.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ SEEN_WITHIN_S = 60.0
 FLIGHT_S = 260.0
 ADDED = Path("/usr/local/share/ca-certificates")
 PIPX = {"PIPX_HOME": "/opt/pipx", "PIPX_BIN_DIR": "/usr/local/bin"}
+APT = ("apt-get", "install", "--yes", "--quiet", "--no-install-recommends")
 INSTALLED = {"pipx": "opt/pipx", "deb": "usr/lib/onboard"}
 """Where the program is, below the root."""
 
@@ -106,16 +107,15 @@ def prepare(root: CleanRoot) -> None:
 
 def install(root: CleanRoot, way: str, work: Path, base: Path) -> None:
     """By pipx, for the whole machine; or as a package that was built in a root of its own."""
-    apt = ("apt-get", "install", "--yes", "--quiet", "--no-install-recommends")
     step("apt-get update", root, lambda: root.run("apt-get", "update", "--quiet"))
     if way == "pipx":
-        step("apt-get install pipx", root, lambda: root.run(*apt, "ca-certificates", "pipx"))
+        step("apt-get install pipx", root, lambda: root.run(*APT, "ca-certificates", "pipx"))
         step("pipx install .", root, lambda: root.run("pipx", "install", "/source", **PIPX))
         return
     builder = CleanRoot(base, work / "builder")
     shutil.copytree(root.place / "source", builder.place / "source")
     builder.run("apt-get", "update", "--quiet")
-    builder.run(*apt, "ca-certificates", "python3-venv")
+    builder.run(*APT, "ca-certificates", "python3-venv")
     step(
         "deploy/debian.sh (elsewhere)",
         builder,
@@ -124,7 +124,7 @@ def install(root: CleanRoot, way: str, work: Path, base: Path) -> None:
     (package,) = builder.place.glob("*.deb")
     shutil.copy(package, root.place)
     sys.stdout.write(f"{package.name}: {package.stat().st_size / 1e6:.0f} MB\n")
-    step("apt-get install ./*.deb", root, lambda: root.run(*apt, f"/{package.name}"))
+    step("apt-get install ./*.deb", root, lambda: root.run(*APT, f"/{package.name}"))
 
 
 def calibrate(root: CleanRoot) -> None:
