@@ -52,6 +52,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.CLEAN:
         return "Nothing is missing from the model" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if is_named(e.name)]
+    named.sort(key=lambda e: not danger_of(e))  # what is dangerous is not "one more effect"
     if not named:
         return "Something is missing, and no known effect explains it"
     titles = [title_of(e.name) for e in named[:MOST_NAMED]]

@@ -25,8 +25,8 @@ class Saturation(Effect):
     def danger(cls, found: Finding) -> str:  # noqa: ARG003 - at the rail any size is too much
         """At its limit an accelerometer does not feel what it is exposed to."""
         return (
-            "while an accelerometer is at its limit, the autopilot does not know how it is "
-            "accelerated, and its height and velocity run away"
+            "meanwhile the autopilot does not know how it is accelerated, and its height and "
+            "velocity run away"
         )
 
     @classmethod
