@@ -143,7 +143,7 @@ def man_page() -> str:
     out += [".SH EXIT STATUS", *_roff_paragraphs(tuple(_epilog())), ".SH FILES"]
     for file, words in (
         ("/etc/onboard/onboard.toml", "The service's configuration, with every setting."),
-        ("/var/lib/onboard", "What the service has learnt, and its journal."),
+        ("/var/lib/onboard", "What the service has learned, and its journal."),
     ):
         out += [".TP", f".I {file}", _roff(words)]
     return "\n".join(out) + "\n"

@@ -66,8 +66,8 @@ def _misplaced(comparison: Comparison) -> Iterator[str]:
             return
     for (a, b), off in far.items():
         yield (
-            f"accelerometer {a}, as seen from {b}, is {_metres(off)} from where INS_POS{a} and "
-            f"INS_POS{b} have it"
+            f"seen from accelerometer {b}, accelerometer {a} is {_metres(off)} from where "
+            f"INS_POS{a} and INS_POS{b} have it"
         )
 
 

@@ -19,11 +19,12 @@ from onboard.answers.calibration_document import (
 )
 from onboard.answers.document_numbers import Number, finite, timing_document
 from onboard.answers.json_file import indented
-from onboard.answers.verdict import unused_in_words
+from onboard.answers.verdict import unused_in_words, verdict_of
 from onboard.answers.words import DISTRUST
 from onboard.core.diagnosis.records import Ambiguity, Diagnosis, Mismatch, NotTestable, Rung, Unused
+from onboard.core.physics.catalogue import danger_of
 from onboard.core.physics.finding import Finding, Where
-from onboard.push.diagnosed import headline, severity_of_effect
+from onboard.push.diagnosed import severity_of_effect
 
 EXPLAIN_SCHEMA = "onboard.explain/1"
 
@@ -54,7 +55,11 @@ class RivalDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EffectDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """One accepted effect; ``severity`` ``info``: every calibration has it, else ``warning``."""
+    """One accepted effect.
+
+    ``severity`` is ``info`` where every calibration has it, ``error`` where it is dangerous to fly
+    with (``danger`` says why), else ``warning``.
+    """
 
     name: str
     severity: str
@@ -71,6 +76,7 @@ class EffectDocument(msgspec.Struct, frozen=True, kw_only=True):
     formula: str = ""
     held_out_velocity_rms_before_m_s: float | None = None
     held_out_velocity_rms_after_m_s: float | None = None
+    danger: str = ""
 
 
 class MismatchDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -184,7 +190,7 @@ def explain_document(
     damage: Sequence[str] = (),
 ) -> ExplainDocument:
     """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
-    sentence, severity = headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])
+    sentence, severity = verdict_of(diagnosis)
     return ExplainDocument(
         recording=ExplainedRecording(
             files=list(files),
@@ -254,7 +260,8 @@ def _unused(u: Unused) -> UnusedDocument:
 def _effect(e: Finding, autopilot: str) -> EffectDocument:
     return EffectDocument(
         name=e.name,
-        severity=severity_of_effect(e.name),
+        severity=severity_of_effect(e.name, danger_of(e)),
+        danger=danger_of(e),
         unknowns={
             name: UnknownDocument(value=finite(q.value), sigma=finite(q.sigma), unit=q.unit)
             for name, q in e.unknowns.items()

@@ -31,7 +31,7 @@ from onboard.core.physics.effect import Bearing
 
 BESIDE = (Bearing.HARMLESS, Bearing.BESIDE)
 NOT_COMPARED = Apart(0.0, 0)
-HOVERED = "it hovered or stood: its numbers are those of the recorded attitude"
+HOVERED = "it hovered or stood still, so its numbers only repeat the recorded attitude"
 
 
 @dataclass(frozen=True, slots=True)

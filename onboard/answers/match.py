@@ -163,11 +163,11 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
     names = NAMES.get(kind, NAMES["copter"])
     why = ""
     if kind and kind not in (*COPTERS, *PLANES):
-        why = f"no airframe is known of a {kind}"
+        why = f"there is no model of the airframe of a {kind}"
     elif flight is None or len(flight) < FEWEST_STEPS:
         why = NOTHING
     elif not kind:
-        why = "nobody says what kind of vehicle"
+        why = "the recording does not say what kind of vehicle it is"
     if why or flight is None:
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
@@ -178,7 +178,7 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
         found = match_plane(flight, plane, sigma)
         if found is not None:
             return found
-        why = "it never flew as fast as a plane flies, below the stall"
+        why = "it never flew faster than a plane stalls"
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         why = f"its numbers fit no model ({error})"
     return VehicleMatch(kind, not_testable=tuple(NotTestable(n, why) for n in names), note=why)

@@ -253,15 +253,15 @@ SENTENCES: Mapping[str, Callable[[Values], str]] = {
     "ground_effect": _ground,
     "air_density": _density,
     "lift": _coefficients(
-        "The wing lifts unlike the simulation's",
+        "The wing's lift differs from the simulation's",
         {"c_lift_0": "at zero angle", "c_lift_a": "per radian"},
     ),
     "drag": _coefficients(
-        "The air brakes unlike the simulation's",
+        "The drag differs from the simulation's",
         {"c_drag_p": "profile drag", "induced": "drag by lift"},
     ),
     "side_force": _coefficients(
-        "The air pushes to the side unlike the simulation's",
+        "The side force differs from the simulation's",
         {"c_y_b": "per radian of sideslip", "c_y_deltar": "at full rudder"},
     ),
     "airspeed_scale": _airspeed,

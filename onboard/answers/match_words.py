@@ -90,11 +90,11 @@ def wind_sentence(match: Match) -> str:
     speed = math.hypot(wind.north, wind.east)
     sigma = math.hypot(wind.sigma_north, wind.sigma_east)
     if speed < 3.0 * sigma or speed < 0.3:
-        return f"calm: {speed:.2f} m/s (sigma {sigma:.2f})"
+        return f"calm: {speed:.2f} ± {sigma:.2f} m/s"
     origin = math.degrees(math.atan2(-wind.east, -wind.north)) % 360.0
-    said = f"{speed:.2f} m/s from {origin:.0f} deg at {wind.height:.0f} m (sigma {sigma:.2f})"
+    said = f"{speed:.2f} ± {sigma:.2f} m/s from {origin:.0f}° at a height of {wind.height:.0f} m"
     if wind.profile_exponent is not None:
-        said += f", grows with height to the power {wind.profile_exponent:.2f}"
+        said += f"; it grows with the height to the power {wind.profile_exponent:.2f}"
     if wind.turbulence_rms is not None:
         said += f", gusts of {wind.turbulence_rms:.1f} m/s RMS"
     return said

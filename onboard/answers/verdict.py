@@ -15,7 +15,13 @@ from onboard.answers.words import (
     signed,
 )
 from onboard.core.diagnosis.records import Diagnosis, Verdict
-from onboard.core.physics.catalogue import is_excluded, is_named, size_of, title_of
+from onboard.core.physics.catalogue import (
+    danger_of,
+    is_excluded,
+    is_named,
+    size_of,
+    title_of,
+)
 from onboard.core.physics.finding import Finding
 from onboard.push import diagnosed
 from onboard.push.policy import PHYSICS_MISSING, Objection
@@ -46,6 +52,7 @@ def headline(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.CLEAN:
         return "Nothing is missing from the model" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if is_named(e.name)]
+    named.sort(key=lambda e: not danger_of(e))  # what is dangerous is not "one more effect"
     if not named:
         return "Something is missing, and no known effect explains it"
     titles = [title_of(e.name) for e in named[:MOST_NAMED]]
@@ -59,9 +66,22 @@ def headline(diagnosis: Diagnosis) -> str:
     return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f", and {found[-1]}"
 
 
+def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
+    """A sentence that needs no sizes, and ``good``, ``info``, ``warning`` or ``error``."""
+    names = [e.name for e in diagnosis.effects]
+    dangerous = any(danger_of(e) for e in diagnosis.effects)
+    return diagnosed.headline(diagnosis.verdict.value, names, dangerous=dangerous)
+
+
 def severity(diagnosis: Diagnosis) -> str:
     """``good``, ``info``, ``warning`` or ``error``."""
-    return diagnosed.headline(diagnosis.verdict.value, [e.name for e in diagnosis.effects])[1]
+    return verdict_of(diagnosis)[1]
+
+
+def dangers(diagnosis: Diagnosis) -> list[str]:
+    """Why one should not fly before something is cured: one sentence for each effect."""
+    said = [(title_of(e.name), danger_of(e)) for e in diagnosis.effects]
+    return [f"{title}: {why}. Do not fly before it is cured." for title, why in said if why]
 
 
 def missing(diagnosis: Diagnosis) -> list[str]:

@@ -9,9 +9,11 @@ from onboard.core.physics.finding import Quantity
 from onboard.core.physics.wording import DEGREE, UNKNOWN, fixed, listed, unit_in_words
 
 __all__ = [
+    "AUTOPILOTS",
     "DISTRUST",
     "TIMING",
     "UNKNOWN",
+    "autopilot_in_words",
     "capital",
     "fixed",
     "listed",
@@ -50,6 +52,14 @@ DISTRUST = {
     "end_of_data": "no more data",
 }
 """Why GPS is not trusted."""
+
+
+AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
+
+
+def autopilot_in_words(name: str) -> str:
+    """Its name as its makers write it."""
+    return AUTOPILOTS.get(name, name)
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -38,7 +38,7 @@ def check_rows(name: str, rows: int) -> None:
         ArraysError: there are too few.
     """
     if rows < FEWEST_ROWS:
-        raise ArraysError(f"{name}: {rows} rows are no flight")
+        raise ArraysError(f"{name}: {rows} rows are too few for a flight")
 
 
 def check_clock(name: str, t: Array) -> None:
@@ -50,7 +50,7 @@ def check_clock(name: str, t: Array) -> None:
     check_rows(name, len(t))
     step = float(np.median(np.diff(t)))
     if not SHORTEST_STEP_S < step < LONGEST_STEP_S:
-        raise ArraysError(f"{name}: samples are {step:.3g} apart, which are no seconds")
+        raise ArraysError(f"{name}: samples are {step:.3g} apart: times have to be in seconds")
 
 
 def check_force(name: str, f_b: Array) -> None:
@@ -79,7 +79,7 @@ def check_angles(name: str, angles: Array, most: float) -> None:
     """
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
     if largest > most * (1.0 + 1e-6):
-        raise ArraysError(f"{name}: reaches {largest:.4g}, which are no radians")
+        raise ArraysError(f"{name}: reaches {largest:.4g}: angles have to be in radians")
 
 
 def check_velocity(name: str, v_n: Array) -> None:
@@ -91,7 +91,7 @@ def check_velocity(name: str, v_n: Array) -> None:
     speed = np.linalg.norm(np.nan_to_num(v_n), axis=1)
     fast = float(np.percentile(speed, 95)) if speed.size else 0.0  # a few false fixes are no unit
     if fast > FASTEST_M_S:
-        raise ArraysError(f"{name}: its speed comes to {fast:.4g}, which are no m/s")
+        raise ArraysError(f"{name}: its speed comes to {fast:.4g}: velocities have to be in m/s")
 
 
 def check_together(t: Array, euler: Array, t_f: Array, f_b: Array, w_b: Array | None) -> None:

@@ -22,6 +22,7 @@ from onboard.cli.replay import write_bytes, write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.physics.catalogue import title_of
 from onboard.core.physics.finding import Finding
 from onboard.report.mcap import mcap
 from onboard.report.parameters import explanation_text
@@ -117,6 +118,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
         found = [f"{said[:-1]} ({named(e)})." for said, e in zip(found, d.effects, strict=False)]
         found += verdict.missing(d)[len(d.effects) :]
     rows = [
+        ("Danger", verdict.dangers(d)),
         ("To know" if verdict.severity(d) == "info" else "Missing", found),
         ("Proof", [verdict.proof(d)]),
         ("To fly" if refused else "To do", verdict.cures(d, advice)),
@@ -143,13 +145,13 @@ def _limits(d: Diagnosis) -> Iterator[RenderableType]:
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
     for k, a in enumerate(d.ambiguous):
-        apart = f"{' and '.join(a.names)}. To tell: {a.tell_apart}."
+        apart = f"{' / '.join(title_of(n) for n in a.names)}. To tell: {a.tell_apart}."
         table.add_row("" if k else "Not told apart", _plain(apart))
     for k, sentence in enumerate(verdict.to_fly(d)):
         table.add_row("" if k else "Not shown", _plain(sentence))
     if d.not_testable:
-        names = dict.fromkeys(n.name for n in d.not_testable)
-        table.add_row("Not tested", _plain(", ".join(names) + "."))
+        names = dict.fromkeys(title_of(n.name) for n in d.not_testable)
+        table.add_row("Not tested", _plain("; ".join(names) + "."))
     if table.row_count:
         yield from ("", table)
 

@@ -9,34 +9,37 @@ from collections.abc import Iterator, Sequence
 from rich.text import Text
 
 from onboard.answers.fleet.history import History
-from onboard.answers.fleet.record import Flown
+from onboard.answers.fleet.record import Flown, ImuRecord
 from onboard.answers.fleet.severity import (
     SAID,
     Severity,
     sentences,
     severity_of,
     shared_sentence,
+    state_in_words,
 )
 from onboard.answers.fleet.shared_numbers import Comparison
 from onboard.answers.knowledge import determined
 from onboard.core.estimate.result import Calibration, Status
 
-NAME = 26
+NAME = 23
+STATE = 15
 WIDTH = 80
 UNKNOWN = "-"
 STATES = {
-    Status.CALIBRATED: ("calibrated", "green"),
-    Status.COLLECTING: ("too short", "yellow"),
-    Status.INSUFFICIENT: ("not shown", "yellow"),
-    Status.INVALID: ("invalid", "red"),
+    Status.CALIBRATED: "green",
+    Status.COLLECTING: "yellow",
+    Status.INSUFFICIENT: "yellow",
+    Status.INVALID: "red",
 }
 COLOURS = {
     Severity.CONTRADICTED: "red",
     Severity.CHANGED: "yellow",
+    Severity.TO_SET: "yellow",
     Severity.UNKNOWN: "",
     Severity.WELL: "green",
 }
-ROW = "{:<26} {:>3} {:<10} {:>5} {:>7} {:>8} {:>14}"
+ROW = "{:<23} {:>3} {:<15} {:>5} {:>6} {:>7} {:>14}"
 HEAD = ROW.format("recording", "imu", "state", "cover", "scale", "offset", "residual")
 
 
@@ -47,7 +50,7 @@ def lines(one: Flown) -> Iterator[Text]:
         yield from _wrapped(f"{name:<{NAME}} {one.error.removeprefix(f'{one.path}: ')}", "red")
     else:
         for imu in one.record.imus:
-            yield _line(name, imu.calibration)
+            yield _line(name, imu)
             name = ""
         for damage in one.record.document.recording.damage:
             yield from _wrapped(f"{'':<{NAME}} damage: {damage}", "yellow")
@@ -69,22 +72,22 @@ def vehicle_lines(histories: Sequence[History], compared: Comparison) -> Iterato
         yield from _wrapped(shared_sentence(common), "", 2)
 
 
-def _line(name: str, c: Calibration) -> Text:
-    words, style = STATES[c.status]
+def _line(name: str, one: ImuRecord) -> Text:
+    c = one.calibration
     scale = _largest(c, (0, 1, 2), c.scale, c.in_force_scale)
     offset = _largest(c, (3, 4, 5), c.offset, c.in_force_offset)
-    residual = f"{_fixed(c.velocity_rms_before, 2)} > {_fixed(c.velocity_rms_after, 2)}"
+    residual = f"{_fixed(c.velocity_rms_before, 2)} -> {_fixed(c.velocity_rms_after, 2)}"
     row = ROW.format(
         name,
         c.imu,
-        words,
+        state_in_words(one),
         f"{c.coverage.percent:.0f} %",
         f"{100.0 * scale:+.2f}" if math.isfinite(scale) else UNKNOWN,
         f"{offset:+.3f}" if math.isfinite(offset) else UNKNOWN,
         residual,
     )
     line = Text(row)
-    line.stylize(style, NAME + 5, NAME + 15)
+    line.stylize(STATES[c.status], NAME + 5, NAME + 5 + STATE)
     return line
 
 

@@ -44,11 +44,11 @@ VERBS: dict[str, Verb] = {
         simulates=True,
     ),
     "run": Verb("onboard.cli.run", "run", "The service: calibrate an autopilot while it flies."),
-    "status": Verb("onboard.cli.status", "status", "What the running service has learnt."),
+    "status": Verb("onboard.cli.status", "status", "What the running service has learned."),
     "approve": Verb("onboard.cli.status", "approve", "Let the service write what it proposes."),
     "reject": Verb("onboard.cli.status", "reject", "Decline what the service proposes."),
     "rollback": Verb("onboard.cli.status", "rollback", "Put the previous parameters back."),
-    "reset": Verb("onboard.cli.status", "reset", "Forget what was learnt and start again."),
+    "reset": Verb("onboard.cli.status", "reset", "Forget what was learned and start again."),
     "replay": Verb("onboard.cli.replay", "replay", "Calibrate from recordings: .BIN, .tlog, .ulg."),
     "explain": Verb(
         "onboard.cli.explain", "explain", "Find the physics that a recording has left out."

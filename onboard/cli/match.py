@@ -57,7 +57,7 @@ TABLE = ".csv"
     "ardupilot",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Of --verify: the folder of ArduPilot's SITL, which flies it then.",
+    help="With --verify: the folder of ArduPilot's SITL, which then flies it.",
 )
 @click.option(
     "--columns",

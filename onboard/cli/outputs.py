@@ -30,7 +30,7 @@ def refuse_overwriting(inputs: Iterable[Path | str | None], *outputs: Path | str
         if place.exists() and any(_is_same(place, other) for other in read):
             raise UsageError(f"{file}: is read, and would be overwritten")
         if place.resolve() in given:
-            raise UsageError(f"{file}: is to be two results at once")
+            raise UsageError(f"{file}: two results cannot be one file")
         given.add(place.resolve())
 
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from onboard.answers.words import DISTRUST
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.view.snapshot import ImuView, Snapshot, WrittenView
+from onboard.daemon.view.snapshot import AccountView, ImuView, Snapshot, WrittenView
 
 JOURNAL_LINES = 5
 NOT_SEEN = {"no": "not seen yet", "together": "with its axis"}
@@ -42,7 +42,7 @@ def residual(imu: ImuView, written: WrittenView | None) -> str:
     before, after = imu.velocity_rms_before_m_s, imu.velocity_rms_after_m_s
     what = "residual"
     if written is not None and written.velocity_rms_before_m_s is not None:
-        before, what = written.velocity_rms_before_m_s, "residual by what was written"
+        before, what = written.velocity_rms_before_m_s, "residual through the last push"
         after = written.next_velocity_rms_m_s or written.velocity_rms_after_m_s
     if before is None or after is None:
         return ""
@@ -155,7 +155,10 @@ def _held_back(snapshot: Snapshot, imu: int) -> list[str]:
 
 def _written(written: WrittenView) -> RenderableType:
     """What the last push has changed, and what it has brought."""
-    parts: list[RenderableType] = [Text(f" written {_moment(written.at)}:"), changes(written)]
+    parts: list[RenderableType] = [Text(f" written {_moment(written.at)}:")]
+    if written.account is not None:
+        parts += _told(written.account)
+    parts.append(changes(written))
     rows = (
         ("velocity residual", written.velocity_rms_before_m_s, written.velocity_rms_after_m_s),
         ("held-out residual", written.held_out_before, written.held_out_after),
@@ -171,6 +174,21 @@ def _written(written: WrittenView) -> RenderableType:
         found = "" if seen is None else f"; velocity residual {seen:.3g} m/s"
         parts.append(Text(f" the flight after it: {written.verdict_sentence}{found}"))
     return Group(*parts)
+
+
+def _told(account: AccountView) -> list[RenderableType]:
+    """What was wrong, what was written, what it improved, what to do next."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for question, sentence in (
+        (" was wrong", account.wrong),
+        (" was written", account.written),
+        (" improved", account.improved),
+        (" to do next", account.next),
+    ):
+        table.add_row(question, Text(sentence))
+    return [table]
 
 
 def changes(written: WrittenView, now: Mapping[str, float] | None = None) -> Table:

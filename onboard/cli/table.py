@@ -15,6 +15,7 @@ from onboard.answers.answer import Answer
 from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import LACKING, about_six
+from onboard.answers.words import AUTOPILOTS
 from onboard.cli.flights_table import flights
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Estimate, Status
@@ -26,7 +27,6 @@ STATUS_WORDS = {
     Status.INSUFFICIENT: ("the flight does not show enough", "bold yellow"),
     Status.INVALID: ("no valid result", "bold red"),
 }
-AUTOPILOT_WORDS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 UNKNOWN = "-"
 KNOWN_STYLE = {YES: "green", ROUGHLY: "cyan", TOGETHER: "cyan"}
 
@@ -55,7 +55,7 @@ def replay_report(result: Replay) -> Iterator[RenderableType]:
 
 
 def _recordings(result: Replay) -> RenderableType:
-    kind = AUTOPILOT_WORDS.get(result.autopilot, "an unknown autopilot")
+    kind = AUTOPILOTS.get(result.autopilot, "an unknown autopilot")
     rows: list[tuple[str, str]] = []
     for recording in result.recordings:
         rows.append(("recording", f"{recording.path.name}: {kind}, {recording.duration_s:.0f} s"))
@@ -113,7 +113,7 @@ def _pairs(comparison: Comparison) -> Table:
     """Each axis of each pair: what is left of the difference with each set of parameters."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
-    for header in ("in force", "estimate", "itself", "sigma", "chi2 of 3"):
+    for header in ("in force", "estimates", "pair itself", "sigma", "chi2 of 3"):
         table.add_column(header, justify="right", no_wrap=True)
     for pair in comparison.pairs:
         rows = zip("xyz", pair.in_force, pair.estimated, pair.own, pair.own_sigma, strict=True)

@@ -260,7 +260,9 @@ class Course:
         self.progress.rounds += 1
         self.progress.axis_undone = False
         if self.progress.rounds > self._settings.undo_rounds:
-            return self.stuck(Reason.REVERTED, "what is undone does not stay undone", now)
+            return self.stuck(
+                Reason.REVERTED, "the old values were written back, but do not stay", now
+            )
         if self.undo_until is not None and now >= self.undo_until:
             return self.out_of_time(now)
         return self.write_next(now)

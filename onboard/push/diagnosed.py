@@ -25,18 +25,27 @@ KNOWN_ALREADY = (
 )
 
 
-def severity_of_effect(name: str) -> str:
-    """``info`` for what forbids nothing, ``warning`` for what the calibration lacks."""
+def severity_of_effect(name: str, danger: str = "") -> str:
+    """``info`` for what forbids nothing, ``warning`` for what the calibration lacks.
+
+    ``error`` is for what is a danger to the vehicle (:func:`~onboard.core.physics.catalogue.
+    danger_of`), whatever it means for the calibration.
+    """
+    if danger:
+        return "error"
     return "info" if bearing_of(name) is Bearing.HARMLESS else "warning"
 
 
-def headline(verdict: str, effects: Collection[str]) -> tuple[str, str]:
+def headline(verdict: str, effects: Collection[str], *, dangerous: bool = False) -> tuple[str, str]:
     """A diagnosis in one sentence, and its severity: good, info, warning or error.
 
     Args:
         verdict: a value of :class:`onboard.core.diagnosis.records.Verdict`.
         effects: names of what was found.
+        dangerous: whether one of them is a danger to the vehicle.
     """
+    if dangerous:
+        return HEADLINES[verdict], "error"
     if verdict == "explained" and all(severity_of_effect(n) == "info" for n in effects):
         return KNOWN_ALREADY, "info"
     severity = {"clean": "good", "unexplained": "error"}

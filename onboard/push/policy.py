@@ -248,7 +248,8 @@ def _estimate(plan: PushPlan, calibration: Calibration, settings: PolicySettings
         found.append(_no(Objection.NOT_CALIBRATED, sentence))
     if not calibration.parameters_known:
         sentence = (
-            "the parameters in force during the flight are not known, so neither is the raw sensor"
+            "it is not known which parameters were in force during the flight, "
+            "nor what the sensor read"
         )
         found.append(_no(Objection.PARAMETERS_UNKNOWN, sentence))
     if all(c.kept for c in plan.changes):
@@ -266,7 +267,7 @@ def _estimate(plan: PushPlan, calibration: Calibration, settings: PolicySettings
         found.append(_no(Objection.NOT_SURE, sentence))
     if plan.contradiction > plan.contradiction_limit:
         kept = ", ".join(c.name for c in plan.changes if c.kept)
-        sentence = f"the flight contradicts leaving {kept} as it is, without showing its value"
+        sentence = f"the flight shows that {kept} is wrong as it is, but not what it should be"
         found.append(_no(Objection.CONTRADICTED, sentence))
     return found + _held_out(plan, calibration, settings)
 

@@ -119,7 +119,7 @@ def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: no table of text ({error})") from None
     if len(rows) < FEWEST_ROWS:
-        raise RecordingError(f"{path}: {len(rows)} rows are no flight")
+        raise RecordingError(f"{path}: {len(rows)} rows are too few for a flight")
     every = np.array(rows, dtype=np.float64)
     return {name: every[:, k] for k, name in enumerate(wanted)}
 

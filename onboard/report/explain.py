@@ -12,7 +12,7 @@ from onboard.answers.explain import Explanation
 from onboard.answers.knowledge import seen
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.physics.catalogue import is_excluded, kind_of, title_of
+from onboard.core.physics.catalogue import danger_of, is_excluded, kind_of, title_of
 from onboard.core.physics.finding import Confounder, Finding, Where
 from onboard.push.diagnosed import severity_of_effect
 from onboard.report import residual_charts
@@ -24,7 +24,7 @@ TEMPLATE = "explain.html.j2"
 MOST_SPANS = 8
 MOST_RIVALS = 3
 """Effects that could stand for another, told one by one: the nearest; the rest in one line."""
-LEVELS = {"info": "worth knowing", "warning": "matters"}
+LEVELS = {"info": "worth knowing", "warning": "matters", "error": "dangerous"}
 """How much an effect matters, in words: whether it forbids to set the calibration."""
 
 
@@ -59,12 +59,13 @@ def explain_html(
         base,
         files=list(files),
         damage=list(damage),
-        autopilot=autopilot,
+        autopilot=words.autopilot_in_words(autopilot),
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
         headline=verdict.headline(diagnosis),
         severity=verdict.severity(diagnosis),
+        dangers=verdict.dangers(diagnosis),
         missing=verdict.missing(diagnosis),
         sure=verdict.proof(diagnosis),
         change=verdict.cures(diagnosis, advice),
@@ -212,12 +213,13 @@ def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, An
         "share": words.percent(e.share_of_mismatch),
         "sure": verdict.surely(e, ambiguous=ambiguous),
         "bic": words.number(e.delta_bic) if not is_excluded(e.name) else "",
-        "fit": _pair("Not used in the fit", "m/s", before, after, _longest((before, after)))
+        "fit": _pair("Error without and with it", "m/s", before, after, _longest((before, after)))
         if known
         else None,
         "noise": f"{words.number(e.held_out_before)} → {words.number(e.held_out_after)}",
         "charts": residual_charts.of_effect(e),
-        "level": LEVELS[severity_of_effect(e.name)],
+        "level": LEVELS[severity_of_effect(e.name, danger_of(e))],
+        "danger": danger_of(e),
         "rivals": [(title_of(r.name), words.number(r.delta_bic)) for r in rivals[:MOST_RIVALS]],
         "others": _others(rivals[MOST_RIVALS:]),
         "cure": e.cure,
@@ -238,7 +240,7 @@ def _others(rivals: Sequence[Confounder]) -> str:
     """Rivals that are further away than those that are named."""
     if not rivals:
         return ""
-    return f"{len(rivals)} more (worse by {words.number(rivals[0].delta_bic)} or more)"
+    return f"{len(rivals)} more (BIC worse by {words.number(rivals[0].delta_bic)} or more)"
 
 
 def _intervals(e: Finding) -> list[str]:
@@ -259,7 +261,7 @@ def _parameters(d: Diagnosis, advice: Advice) -> list[dict[str, str]]:
             "value": f"{round(change.value, 4) + 0.0:.4f}"
             if change.number
             else words.setting(change.value),
-            "reason": change.reason,
+            "reason": change.reason.replace("degC", "°C"),  # plain in files of parameters
             "withheld": change.withheld,
         }
         for change in changes(d, advice)

@@ -19,6 +19,7 @@ from onboard.answers.fleet.severity import (
     severity_of,
     shared_sentence,
     sized,
+    state_in_words,
 )
 from onboard.answers.fleet.shared_numbers import Comparison
 from onboard.answers.fleet.vehicles import Flight
@@ -33,14 +34,15 @@ TEMPLATE = "fleet.html.j2"
 LOOKS = {
     Severity.CONTRADICTED: "error",
     Severity.CHANGED: "warn",
+    Severity.TO_SET: "warn",
     Severity.UNKNOWN: "info",
     Severity.WELL: "good",
 }
 STATES = {
-    Status.CALIBRATED: ("calibrated", "good"),
-    Status.COLLECTING: ("too short", "warn"),
-    Status.INSUFFICIENT: ("not shown", "warn"),
-    Status.INVALID: ("invalid", "bad"),
+    Status.CALIBRATED: "good",
+    Status.COLLECTING: "warn",
+    Status.INSUFFICIENT: "warn",
+    Status.INVALID: "bad",
 }
 HOUR_S = 3600.0
 
@@ -71,7 +73,7 @@ def fleet_html(
         TEMPLATE,
         look="error" if unread else LOOKS[severity_of(by_severity[0])] if by_severity else "info",
         vehicles=[_vehicle(h, pages) for h in by_severity],
-        counts=[(n, s.value, SAID[s]) for s, n in counts if n],
+        counts=[(n, s.value, _plain(s), SAID[s]) for s, n in counts if n],
         recordings=len(flown),
         hours=f"{seconds / HOUR_S:.1f}",
         unread=[(o.name, o.error.removeprefix(f"{o.path}: ")) for o in unread],
@@ -96,6 +98,7 @@ def _vehicle(h: History, pages: Mapping[str, str]) -> dict[str, Any]:
         "identified": h.vehicle.identified_by,
         "look": LOOKS[severity],
         "severity": severity.value,
+        "severity_said": _plain(severity),
         "what": [capital(s) for s in said] or [f"{capital(SAID[severity])}."],
         "count": len(flights),
         "span": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "",
@@ -143,7 +146,10 @@ def _number(n: Number) -> dict[str, Any]:
 
 
 def _flight(f: Flight, pages: Mapping[str, str]) -> dict[str, Any]:
-    imus = [(i.calibration.imu, *STATES[i.calibration.status], i.why) for i in f.record.imus]
+    imus = [
+        (i.calibration.imu, state_in_words(i), STATES[i.calibration.status], i.missing or i.why)
+        for i in f.record.imus
+    ]
     return {
         "name": f.flown.name,
         "page": _address(pages.get(f.flown.name)),
@@ -156,6 +162,10 @@ def _flight(f: Flight, pages: Mapping[str, str]) -> dict[str, Any]:
             x.removeprefix(f"{f.record.name}: ") for x in f.record.document.recording.damage
         ],
     }
+
+
+def _plain(severity: Severity) -> str:
+    return severity.value.replace("_", " ")
 
 
 def _address(page: str | None) -> str | None:

@@ -78,7 +78,7 @@ def replay_html(result: Replay, chronicle: Drawn, base: str = PAGE) -> str:
         TEMPLATE,
         base,
         files=[r.path.name for r in result.recordings],
-        autopilot=result.autopilot,
+        autopilot=words.autopilot_in_words(result.autopilot),
         duration=words.fixed(result.duration_s, 0),
         status=worst.value,
         headline=headline,
@@ -175,8 +175,8 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
         what = f"{words.capital(knowledge(c))}."
         if math.isfinite(c.velocity_rms_before) and math.isfinite(c.velocity_rms_after):
             what += (
-                f" When it is integrated for {FREE_S:.0f} s without GPS, the velocity is wrong by "
-                f"{c.velocity_rms_after:.2f} m/s; with the parameters in force, by "
+                f" With them, the velocity is off by {c.velocity_rms_after:.2f} m/s after "
+                f"{FREE_S:.0f} s without GPS; with the parameters in force, by "
                 f"{c.velocity_rms_before:.2f} m/s."
             )
     else:

@@ -146,4 +146,13 @@
     });
   }
   if (charts.length) document.querySelector("#reading").hidden = false;
+  /* A table that is wider than the screen is scrolled by keyboard, too; others are no stop on the way. */
+  const reach = () => {
+    for (const part of document.querySelectorAll(".scroll")) {
+      if (part.scrollWidth > part.clientWidth) part.tabIndex = 0;
+      else part.removeAttribute("tabindex");
+    }
+  };
+  addEventListener("resize", reach);
+  reach();
 })();

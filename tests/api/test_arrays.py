@@ -121,13 +121,16 @@ def changed(columns, stream, **new):
         ),
         (lambda c: changed(c, "inertial", w_b=np.degrees(c["inertial"].w_b)), "w_b turns 5"),
         (lambda c: changed(c, "inertial", w_b=-c["inertial"].w_b), "w_b turns -"),
-        (lambda c: changed(c, "inertial", t=1e3 * c["inertial"].t), "which are no seconds"),
+        (lambda c: changed(c, "inertial", t=1e3 * c["inertial"].t), "times have to be in seconds"),
         (lambda c: changed(c, "inertial", t=1e3 + c["inertial"].t), "no time in common"),
         (
             lambda c: changed(c, "attitude", pitch=np.degrees(c["attitude"].pitch)),
-            "attitude, pitch: reaches .* no radians",
+            "attitude, pitch: reaches .* in radians",
         ),
-        (lambda c: changed(c, "velocity", v_n=1e3 * c["velocity"].v_n), "which are no m/s"),
+        (
+            lambda c: changed(c, "velocity", v_n=1e3 * c["velocity"].v_n),
+            "velocities have to be in m/s",
+        ),
         (
             lambda c: changed(c, "velocity", latitude=c["velocity"].t),
             "latitude and longitude belong together",
@@ -143,7 +146,7 @@ def changed(columns, stream, **new):
         (lambda c: c | {"inertial": []}, "inertial is no Inertial"),
         (
             lambda c: c | {"velocity": onboard.Velocity(t=[0.0], v_n=[[0.0, 0.0, 0.0]])},
-            "velocity: 1 rows are no flight",
+            "velocity: 1 rows are too few for a flight",
         ),
     ],
 )

@@ -88,6 +88,24 @@ def test_the_labels_of_the_extension_are_those_of_the_program(stages):
     assert json.loads(labels["tags"])
 
 
+def test_the_commands_of_the_manuals_are_those_that_are_tried_in_a_clean_root():
+    tried = loaded("try_install")
+    environment = " ".join(f"{name}={value}" for name, value in tried.PIPX.items())
+    for manual in ("README.md", "systemd/README.md", "docs/raspberry-pi.md"):
+        text = (ROOT / manual).read_text(encoding="utf-8")
+        assert f"sudo {environment} pipx install ." in text, manual
+        asked = re.findall(r"^sudo onboard (service install .*--start)", text, re.MULTILINE)
+        assert asked, manual
+        for words in asked:
+            group = main.cli.get_command(click.Context(main.cli), "service")
+            verb, *given = words.split()[1:]
+            command = group.get_command(click.Context(group), verb)
+            with click.Context(command, info_name=verb) as context:
+                command.parse_args(context, given)
+                assert context.params["start"]
+                assert context.params["endpoints"]
+
+
 def test_what_is_taken_out_is_not_what_is_imported(tmp_path):
     """A folder as pip makes it, with a dialect too many; the proof is a process of its own."""
     slim = loaded("slim")

@@ -68,13 +68,19 @@ def flown(
     device=7,
     receiver="u-blox 000A0000",
     seed=None,
+    asks=False,
+    missing="",
+    status=Status.CALIBRATED,
+    in_force=None,
 ):
     """A recording of 200 s with one accelerometer; ``seed`` adds noise of the claimed sigmas."""
     rng = np.random.default_rng(seed) if seed is not None else None
     noise = np.zeros(6) if rng is None else SIGMA * rng.standard_normal(6)
     value = np.asarray(six) + noise
     late = delay + (0.0 if rng is None else 0.005 * rng.standard_normal())
-    c = replace(calibration(value, delay=late), trusted_s=trusted)
+    c = replace(calibration(value, delay=late, status=status), trusted_s=trusted)
+    if in_force is not None:
+        c = replace(c, in_force_scale=tuple(in_force[:3]), in_force_offset=tuple(in_force[3:]))
     path = Path(folder) / name
     start = START + day * DAY
     p = Provenance(
@@ -102,6 +108,8 @@ def flown(
         said=None if why else Said.of(flight(value)),
         why=why,
         antenna=Antenna([float(x) for x in place], [0.02, 0.02, 0.02]),
+        asks=asks,
+        missing=missing,
     )
     return Flown(
         path,

@@ -13,6 +13,7 @@ from onboard.answers.fleet.severity import Severity, sentences, severity_of, sha
 from onboard.answers.fleet.shared_numbers import common_of
 from onboard.answers.fleet.vehicles import vehicles_of
 from onboard.core.estimate.joint import FLOOR
+from onboard.core.estimate.result import Status
 from onboard.core.maths.chi_square import survival
 from tests.fleet.records_by_hand import TRUE, flown
 
@@ -42,6 +43,32 @@ def test_a_vehicle_on_which_nothing_happened_is_well_and_merged():
     merged = h.accelerometers[0].merged
     assert len(merged.counted) == 10
     assert np.all(np.abs(merged.value - TRUE) < 4.0 * merged.sigma)
+
+
+def test_a_vehicle_that_flies_with_other_parameters_than_a_flight_asks_for_is_not_well():
+    old, new = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), tuple(TRUE)
+    asking = flown("a.BIN", TRUE, day=0.0, asks=True, in_force=old)
+    h = history([asking])
+    assert severity_of(h) is Severity.TO_SET
+    (said,) = sentences(h)
+    assert "accelerometer 1: a.BIN" in said
+    # A later flight that shows too little does not answer the question.
+    short = flown("b.BIN", TRUE, day=1.0, status=Status.INSUFFICIENT, in_force=old)
+    assert severity_of(history([asking, short])) is Severity.TO_SET
+    # Once they are in force, nothing is asked for.
+    set_since = flown("b.BIN", TRUE, day=1.0, status=Status.INSUFFICIENT, in_force=new)
+    assert severity_of(history([asking, set_since])) is Severity.WELL
+    agreed = flown("b.BIN", TRUE, day=1.0, in_force=new)
+    assert severity_of(history([asking, agreed])) is Severity.WELL
+
+
+def test_why_no_flight_has_calibrated_a_vehicle_is_said():
+    drifting = "the offset follows the temperature"
+    h = history([flown("a.BIN", TRUE, status=Status.INSUFFICIENT, missing=drifting)])
+    assert severity_of(h) is Severity.UNKNOWN
+    (said,) = sentences(h)
+    assert "missing from the model" in said
+    assert drifting in said
 
 
 def test_nothing_is_said_of_vehicles_on_which_nothing_happened():

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 from pymavlink.mavparm import MAVParmDict
 
@@ -20,6 +26,9 @@ from tests.report.diagnoses_by_hand import (
     told_apart_not,
     unknown,
 )
+
+STATIONS = Path(__file__).resolve().parents[2] / "build" / "stations"
+"""Where the loaders of other programs are, if they could be installed."""
 
 
 def param_file(made, parameters=IN_FORCE, *, qgc: bool = False) -> str:
@@ -116,6 +125,15 @@ def test_a_replay_gives_what_was_observed_of_every_accelerometer():
     assert "not set, not calibrated: INS_ACC2" in text
 
 
+def test_mission_planner_reads_it_and_stops_at_no_line():
+    """As its ParamFile does: a line with NOTE: is a dialogue, two words are a setting."""
+    text = param_file(diagnosis())
+    assert "NOTE:" not in text
+    words = [re.split(r"[ ,\t]+", x) for x in text.splitlines() if not x.startswith("#")]
+    assert all(len(pair) == 2 for pair in words)
+    assert {name: float(value) for name, value in words} == loaded(text)
+
+
 def test_mavproxys_own_loader_reads_it(tmp_path, capsys):
     path = tmp_path / "cure.param"
     path.write_text(param_file(diagnosis()), encoding="utf-8")
@@ -123,3 +141,27 @@ def test_mavproxys_own_loader_reads_it(tmp_path, capsys):
     assert station.load(str(path))
     assert dict(station) == loaded(path.read_text(encoding="utf-8"))
     assert "Unrecognised" not in capsys.readouterr().out
+
+
+READ = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ardupilot_methodic_configurator.data_model_par_dict import ParDict
+print(json.dumps({name: one.value for name, one in ParDict.from_file(sys.argv[2]).items()}))
+"""
+
+
+def test_methodic_configurators_own_loader_reads_it(tmp_path):
+    if not (STATIONS / "ardupilot_methodic_configurator").is_dir():
+        pytest.skip("no MethodicConfigurator (tests/stations/requirements.lock)")
+    path = tmp_path / "50_calibration.param"
+    path.write_text(param_file(diagnosis()), encoding="utf-8")
+    answer = subprocess.run(  # noqa: S603 - this Python
+        [sys.executable, "-I", "-c", READ, str(STATIONS), str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    settings = loaded(path.read_text(encoding="utf-8"))
+    assert settings
+    assert json.loads(answer) == settings

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from onboard.answers.verdict import cures, headline, missing, proof, remarks, sized, to_fly
+from onboard.answers.verdict import (
+    cures,
+    dangers,
+    headline,
+    missing,
+    proof,
+    remarks,
+    severity,
+    sized,
+    to_fly,
+)
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.physics.catalogue import kinds, size_of, title_of
 from onboard.core.physics.finding import Quantity
@@ -115,3 +125,14 @@ def test_the_note_is_sorted_into_what_to_fly_and_the_rest():
     )
     assert to_fly(d) == ["x scale is not excited enough: brake hard."]
     assert [r for r in remarks(d) if "fixes" not in r] == ["a remark."]
+
+
+def test_what_is_dangerous_is_named_first_and_told_with_what_to_do():
+    clipped = effect("saturation", unknowns={"limit": Quantity(78.5, 0.0, "m/s^2")})
+    d = diagnosis(effects=(effect(), effect("bias_ramp"), effect("cross_axis"), clipped))
+    assert headline(d).startswith("The accelerometer hit its limit")
+    (said,) = dangers(d)
+    assert said.startswith("The accelerometer hit its limit: ")
+    assert said.endswith("Do not fly before it is cured.")
+    assert severity(d) == "error"
+    assert dangers(diagnosis()) == []

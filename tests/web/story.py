@@ -6,6 +6,7 @@ import msgspec
 
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.daemon.view.snapshot import (
+    AccountView,
     CalibrationView,
     ChangeView,
     CoverageView,
@@ -21,6 +22,8 @@ from onboard.daemon.view.snapshot import (
     Snapshot,
     StateView,
     TrustView,
+    WrittenValue,
+    WrittenView,
 )
 from onboard.daemon.view.state import next_step
 
@@ -223,6 +226,32 @@ def holding(held_back, *, approvable=False):
         for p in push.proposals
     )
     return msgspec.structs.replace(push, approval_needed=False, proposals=proposals)
+
+
+def wrote(push):
+    """Accelerometer 1 was written, and flown since."""
+    values = (WrittenValue(name="INS_ACCSCAL_X", before=1.001, written=1.024, read_back=1.024),)
+    written = WrittenView(
+        imu=1,
+        at=T0,
+        values=values,
+        in_force=True,
+        held_out_before=4.2,
+        held_out_after=1.1,
+        velocity_rms_before_m_s=0.61,
+        velocity_rms_after_m_s=0.051,
+        verdict="kept",
+        verdict_sentence="the residual has not grown",
+        next_held_out=1.05,
+        next_velocity_rms_m_s=0.055,
+        account=AccountView(
+            wrong="The x scale was off by 2.3 %.",
+            written="6 values, each read back from the autopilot.",
+            improved="After 10 s without GPS the velocity was off by 0.61 m/s.",
+            next="Nothing: the next flight confirms it (the residual has not grown).",
+        ),
+    )
+    return msgspec.structs.replace(push, can_roll_back=(1,), written=(written,))
 
 
 DIAGNOSIS = {

@@ -3,9 +3,8 @@
 import msgspec
 import pytest
 
-from onboard.daemon.view.snapshot import WrittenValue, WrittenView
 from tests.web.page_server import PageServer
-from tests.web.story import T0, holding, story
+from tests.web.story import holding, story, wrote
 
 ROLL_BACK = """document.querySelector('#confirm').close();
 document.querySelector('#push-all [data-action="rollback"]').click(); return true;"""
@@ -117,26 +116,6 @@ def test_a_token_is_asked_for_and_then_works(browser, tmp_path):
         browser.element("#confirm-yes").click()
         browser.until_says("#push-result", "Approve taken")
         assert served.told.asked == [("approve", (1,))]
-
-
-def wrote(push):
-    """Accelerometer 1 was written, and flown since."""
-    values = (WrittenValue(name="INS_ACCSCAL_X", before=1.001, written=1.024, read_back=1.024),)
-    written = WrittenView(
-        imu=1,
-        at=T0,
-        values=values,
-        in_force=True,
-        held_out_before=4.2,
-        held_out_after=1.1,
-        velocity_rms_before_m_s=0.61,
-        velocity_rms_after_m_s=0.051,
-        verdict="kept",
-        verdict_sentence="the residual has not grown",
-        next_held_out=1.05,
-        next_velocity_rms_m_s=0.055,
-    )
-    return msgspec.structs.replace(push, can_roll_back=(1,), written=(written,))
 
 
 def standing(**changes):

@@ -63,6 +63,8 @@ class ImuRecord(msgspec.Struct, frozen=True, kw_only=True):
     """One accelerometer in one recording.
 
     ``said`` is what it says to other flights; ``why`` says in words why that is nothing.
+    ``missing`` is the physics that spoils the calibration, in words; ``asks`` is whether it asks
+    for other parameters than are in force, and the policy would set them.
     """
 
     calibration: Calibration
@@ -71,6 +73,8 @@ class ImuRecord(msgspec.Struct, frozen=True, kw_only=True):
     said: Said | None
     why: str
     antenna: Antenna | None
+    missing: str = ""
+    asks: bool = False
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -141,12 +145,15 @@ def record_of(
         sha256=sha256,
         vehicle_kind=recorded.calibrator.kind,
         provenance=where_from,
-        imus=[_imu(answer, recorded) for answer in result.answers],
+        imus=[
+            _imu(answer, recorded, asks=advice is not None and advice.settable)
+            for answer, advice in zip(result.answers, result.advice, strict=True)
+        ],
         document=result.document(),
     )
 
 
-def _imu(answer: Answer, recorded: Recorded) -> ImuRecord:
+def _imu(answer: Answer, recorded: Recorded, *, asks: bool) -> ImuRecord:
     c = answer.calibration
     said, why = None, NOT_ASKED
     if answer.imu in recorded.imus:
@@ -161,6 +168,8 @@ def _imu(answer: Answer, recorded: Recorded) -> ImuRecord:
         said=None if said is None else Said.of(said),
         why=why,
         antenna=None if engine is None else _antenna(engine),
+        missing=answer.missing,
+        asks=asks,
     )
 
 

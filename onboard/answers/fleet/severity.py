@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from enum import Enum
 
 from onboard.answers.fleet.history import Accelerometer, History, Number
+from onboard.answers.fleet.record import ImuRecord
 from onboard.answers.fleet.shared_numbers import Common
 from onboard.answers.fleet.vehicles import Flight
 from onboard.core.estimate.result import Status
@@ -24,11 +25,20 @@ NAMES = {
 UNITS = {"1": "", "m/s^2": " m/s²", "s": " s", "m": " m"}
 
 
+STATES = {
+    Status.CALIBRATED: "calibrated",
+    Status.COLLECTING: "too short",
+    Status.INSUFFICIENT: "not shown",
+    Status.INVALID: "invalid",
+}
+
+
 class Severity(Enum):
     """What there is to do, the most urgent first."""
 
     CONTRADICTED = "contradicted"
     CHANGED = "changed"
+    TO_SET = "to_set"
     UNKNOWN = "unknown"
     WELL = "well"
 
@@ -36,6 +46,7 @@ class Severity(Enum):
 SAID = {
     Severity.CONTRADICTED: "flights contradict each other, or have no valid result",
     Severity.CHANGED: "a number has changed",
+    Severity.TO_SET: "a flight asks for other parameters than are in force",
     Severity.UNKNOWN: "no flight has calibrated it",
     Severity.WELL: "nothing to do",
 }
@@ -56,6 +67,8 @@ def severity_of(h: History) -> Severity:
         n.course.odd for n in h.numbers
     ):
         return Severity.CHANGED
+    if any(_asking(h)):
+        return Severity.TO_SET
     statuses = {i.calibration.status for f in h.vehicle.counting for i in f.record.imus}
     return Severity.WELL if Status.CALIBRATED in statuses else Severity.UNKNOWN
 
@@ -67,7 +80,55 @@ def sentences(h: History) -> tuple[str, ...]:
         out += [f"accelerometer {a.imu}: {said}" for n in a.numbers for said in _said(n)]
         out += [f"accelerometer {a.imu}: {said}" for said in _merged(a)]
     out += [said for n in h.numbers for said in _said(n)]
+    asking: dict[str, list[int]] = {}
+    for imu, flight in _asking(h):
+        asking.setdefault(_flight(flight), []).append(imu)
+    out += [
+        f"{_accelerometers(imus)}: {flight} asks for other parameters than are in force: "
+        "set them as its report says"
+        for flight, imus in asking.items()
+    ]
+    if not out and severity_of(h) is Severity.UNKNOWN:
+        out = [f"accelerometer {i.calibration.imu}: {why_not(i)}" for i in h.vehicle.latest.imus]
     return tuple(out)
+
+
+def state_in_words(i: ImuRecord) -> str:
+    """What one recording says of an accelerometer, in two words at most."""
+    if i.calibration.status is Status.INSUFFICIENT and i.missing:
+        return "missing physics"
+    return STATES[i.calibration.status]
+
+
+def why_not(i: ImuRecord) -> str:
+    """Why a recording has not calibrated an accelerometer, in a sentence."""
+    if i.missing:
+        return f"something is missing from the model: {i.missing}"
+    said = i.calibration.note.removeprefix(f"accelerometer {i.calibration.imu}: ").rstrip(".")
+    return said or "the flight does not show enough"
+
+
+def _accelerometers(imus: Sequence[int]) -> str:
+    if len(imus) == 1:
+        return f"accelerometer {imus[0]}"
+    return f"accelerometers {', '.join(map(str, imus[:-1]))} and {imus[-1]}"
+
+
+def _asking(h: History) -> Iterator[tuple[int, Flight]]:
+    """Accelerometers whose last calibrating flight was flown with what is in force, and asks."""
+    for latest in h.vehicle.latest.imus:
+        c = latest.calibration
+        for flight in reversed(h.vehicle.counting or h.vehicle.flights):
+            said = next((i for i in flight.record.imus if i.calibration.imu == c.imu), None)
+            if said is None or said.calibration.status is not Status.CALIBRATED:
+                continue
+            then = said.calibration
+            if said.asks and (then.in_force_scale, then.in_force_offset) == (
+                c.in_force_scale,
+                c.in_force_offset,
+            ):
+                yield c.imu, flight
+            break
 
 
 def shared_sentence(c: Common) -> str:

@@ -169,7 +169,7 @@ class Judge:
         if not mismatch.supported:
             return Verdict.INSUFFICIENT, (
                 f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "
-                "flight, and of more than half that do not nothing tells which are false. " + note
+                "flight; where more than half do not, nothing tells which are false. " + note
             )
         left = self.final.solution.variance_inflation > CONTRADICTION
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
@@ -180,7 +180,7 @@ class Judge:
             )
         if too_far(self.engine, self.final.solution):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, (
-                "what is found makes up for what is not in the model. " + note
+                "what was found may stand for something that is not in the model. " + note
             )
         if effects:
             if left:

@@ -76,14 +76,14 @@ def in_words(changes: tuple[CommonChange, ...], count: int, vertical: int) -> tu
     if level:
         tilt = math.degrees(math.atan(math.hypot(*(c.change for c in level)) / STANDARD_GRAVITY))
         out.append(
-            f"{who} ask for {_named(level)}: rather the board is tilted by {tilt:.2g} degrees, or "
-            f"the ground was when they were calibrated, than {sensors}"
+            f"{who} ask for {_named(level)}: it is likelier that the board is tilted by {tilt:.2g} "
+            f"degrees, or that the ground was when they were calibrated, than that {sensors}"
         )
     upright = [c for c in changes if c.axis == vertical]
     if upright:
         out.append(
-            f"{who} ask for {_named(upright)}: rather the way they were calibrated, or the "
-            f"receiver's vertical speed, is wrong than {sensors}"
+            f"{who} ask for {_named(upright)}: it is likelier that the way they were calibrated, "
+            f"or the receiver's vertical speed, is wrong than that {sensors}"
         )
     return tuple(out)
 

@@ -92,6 +92,11 @@ def size_of(found: Finding) -> str:
     return (kind_of(found.name) or Effect).size(found)
 
 
+def danger_of(found: Finding) -> str:
+    """Why one should not fly with it before it is cured, in words; empty if one may."""
+    return (kind_of(found.name) or Effect).danger(found)
+
+
 def phrase_of(found: Finding) -> str:
     """A finding as part of a sentence, with its size and its name."""
     kind = kind_of(found.name)

@@ -31,6 +31,7 @@ from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family, Unknown
+from onboard.core.physics import danger
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.response_curves import Response
 from onboard.core.physics.wording import each
@@ -241,6 +242,11 @@ class Effect(Family):
     def size(cls, found: Finding) -> str:
         """The size in a few words: ``by 259 ± 8 ms``."""
         return each(found.unknowns)
+
+    @classmethod
+    def danger(cls, found: Finding) -> str:
+        """Why one should not fly with it before it is cured, in words; empty if one may."""
+        return danger.of_response(found)
 
     @classmethod
     def condition(cls, found: Finding, offset: float, change: float) -> str:  # noqa: ARG003

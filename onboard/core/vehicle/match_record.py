@@ -136,7 +136,7 @@ def windless(untested: tuple[NotTestable, ...], m: Matched) -> tuple[NotTestable
     """A calm has no profile: that is the reason, not the flight."""
     if "wind" in m.chosen.effects:
         return untested
-    why = "there was no wind to have one"
+    why = "there was no wind whose profile could show"
     return tuple(replace(n, why=why) if n.name == "wind_profile" else n for n in untested)
 
 

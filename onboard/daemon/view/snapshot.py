@@ -195,13 +195,22 @@ class WrittenValue(Record, frozen=True, kw_only=True):
     read_back: float | None
 
 
+class AccountView(Record, frozen=True, kw_only=True):
+    """The account of a push, a sentence each (:mod:`onboard.push.account`)."""
+
+    wrong: str
+    written: str
+    improved: str
+    next: str
+
+
 class WrittenView(Record, frozen=True, kw_only=True):
     """One push that was completed, as the journal has it; ``at`` is Unix time.
 
     Residuals ``before`` and ``after`` are of the flight that taught the values: with those that
     were in force then, and with those written.  ``next_*`` are of the flight after it, with the
     values written; ``verdict`` is what that flight said.  ``in_force``: nothing has been written
-    since, and it was not taken back.
+    since, and it was not taken back.  ``account`` is all of it in sentences.
     """
 
     imu: int
@@ -216,6 +225,7 @@ class WrittenView(Record, frozen=True, kw_only=True):
     verdict_sentence: str = ""
     next_held_out: float | None = None
     next_velocity_rms_m_s: float | None = None
+    account: AccountView | None = None
 
 
 class JudgedView(Record, frozen=True, kw_only=True):

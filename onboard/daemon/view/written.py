@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from onboard.daemon.view.snapshot import WrittenValue, WrittenView
+from onboard.daemon.view.snapshot import AccountView, WrittenValue, WrittenView
+from onboard.push.account import account
 from onboard.push.entries import Closed, Entry, Planned, Purpose, Result, Watched
 
 LATEST_SHOWN = 4
@@ -65,6 +66,7 @@ def _view(
     planned: Planned, at: float, closed: Closed, watched: Watched | None, *, in_force: bool
 ) -> WrittenView:
     plan, baseline = planned.plan, planned.plan.baseline
+    told = account(plan, watched, in_force=in_force)
     return WrittenView(
         imu=plan.imu,
         at=at,
@@ -83,4 +85,7 @@ def _view(
         verdict_sentence="" if watched is None else watched.sentence,
         next_held_out=None if watched is None else watched.held_out,
         next_velocity_rms_m_s=None if watched is None else watched.velocity_rms,
+        account=AccountView(
+            wrong=told.wrong, written=told.written, improved=told.improved, next=told.next
+        ),
     )

@@ -3,6 +3,8 @@
 import { byId, h, renew } from "./dom.js";
 import { brief, capital, effectInWords, measured, plain, toneOf, unitInWords } from "./words.js";
 
+const LEVELS = { info: "worth knowing, in every calibration", warning: "matters", error: "dangerous" };
+
 export function showDiagnosis(diagnosis, push) {
   const held = (push?.proposals ?? []).filter((p) => p.held_back.physics_missing).map((p) => `IMU ${p.imu}`);
   renew(byId("diagnosis-body"), [diagnosis ?? null, held], () => {
@@ -40,11 +42,12 @@ function proof(mismatch, found) {
 
 function effect(found) {
   const share = [
-    found.severity === "info" ? "worth knowing, in every calibration" : "",
+    LEVELS[found.severity] ?? "",
     typeof found.share_of_mismatch === "number" ? `${Math.round(100 * found.share_of_mismatch)} % of the mismatch` : "",
   ].filter(Boolean).join("; ");
   const facts = Object.entries(found.unknowns ?? {}).map(([name, u]) => [plain(name), `${measured(u.value, u.sigma)} ± ${brief(u.sigma, 2)}\u00a0${unitInWords(u.unit)}`]);
   if (found.formula) facts.push(["formula", found.formula]);
+  if (found.danger) facts.push(["danger", `${found.danger}. Do not fly before it is cured.`]);
   if (found.cure) facts.push(["to do", found.cure]);
   // As it is typed into a ground station: a plain minus sign.
   const settings = Object.entries(found.parameters ?? {}).map(([name, value]) => h("span", { class: "name", text: `${name} = ${brief(value, 4).replace("−", "-")}` }));

@@ -137,7 +137,7 @@ export class Imus {
     const drift = view.dead_reckoning;
     const rows = [
       ["Velocity residual", view.velocity_rms_before_m_s, view.velocity_rms_after_m_s, "m/s"],
-      ["Whitened residual (1 is noise)", view.whitened_rms_before, view.whitened_rms_after, ""],
+      ["Residual in units of the noise (1 is ideal)", view.whitened_rms_before, view.whitened_rms_after, ""],
       ["The same on parts that the fit did not see", view.held_out_before, view.held_out_after, ""],
     ];
     if (drift) rows.push([`Drift without GPS over ${fixed(drift.horizon_s, 0)} s`, drift.drift_before_m_s, drift.drift_after_m_s, "m/s"]);

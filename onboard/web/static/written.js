@@ -28,15 +28,23 @@ function oneOf(push) {
     "div",
     { class: "effect" },
     h("h3", { text: when }),
-    h("div", { class: "scroll" }, h(
+    ...told(push),
+    h("details", { "data-key": `residuals-${push.imu}-${push.at}`, open: !push.account }, h("summary", { text: "Residuals" }), h("div", { class: "scroll" }, h(
       "table",
       { class: "compare" },
       h("thead", {}, h("tr", {}, ...["", "old values", "new values", "next flight"].map((text) => h("th", { scope: "col", text })))),
       h("tbody", {}, ...rows.map(([name, ...values]) => h("tr", {}, h("th", { scope: "row", text: name }), ...values.map((value) => h("td", { class: "number", text: brief(value) }))))),
-    )),
-    push.verdict ? h("p", { class: BETTER[push.verdict] ?? "", text: `The flight after it: ${push.verdict_sentence}.` }) : h("p", { class: "soft", text: "The next flight will say whether it was right." }),
+    ))),
+    ...(push.account ? [] : [push.verdict ? h("p", { class: BETTER[push.verdict] ?? "", text: `The flight after it: ${push.verdict_sentence}.` }) : h("p", { class: "soft", text: "The next flight will say whether it was right." })]),
     h("details", { "data-key": `values-${push.imu}-${push.at}` }, h("summary", { text: "The values" }), valuesTable(push.values)),
   );
+}
+
+/** What was wrong, what was written, what it improved, what to do next. */
+function told({ account, verdict }) {
+  if (!account) return [];
+  const rows = [["What was wrong", account.wrong], ["What was written", account.written], ["What it improved", account.improved], ["What to do next", account.next]];
+  return [h("dl", { class: "account" }, ...rows.flatMap(([name, text]) => [h("dt", { text: name }), h("dd", { class: text === account.next ? BETTER[verdict] : null, text })]))];
 }
 
 /** Old and new of each value; with what is in force `now`, by name: of the way back. */

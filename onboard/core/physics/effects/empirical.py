@@ -32,7 +32,7 @@ class Empirical(Effect):
     meaning = "a `formula`"
     bearing = Bearing.WITHIN
     source = "search among products of measured signals"
-    cure = "look for what the formula stands for; nothing in the catalogue does"
+    cure = "find out what the formula stands for: no effect of the catalogue has this form"
     apart = "fly the manoeuvre in which the signal changes and nothing else does"
     named = False
     written = ""

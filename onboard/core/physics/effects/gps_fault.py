@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from onboard.core.physics import danger
 from onboard.core.physics.effect import Bearing, Effect
 from onboard.core.physics.finding import Finding
 from onboard.core.physics.wording import fixed, times
@@ -20,6 +21,13 @@ class GpsFault(Effect):
     cure = "look at the antenna's view of the sky, at jamming, at the receiver's power"
     apart = "fly the same place again: a multipath returns there, a failing receiver anywhere"
     excluded = True
+
+    @classmethod
+    def danger(cls, found: Finding) -> str:
+        """How far it would have led an autopilot astray, by the longest of the spells."""
+        off = found.unknowns.get("offset")
+        longest = max((b - a for a, b in found.intervals), default=0.0)
+        return "" if off is None else danger.of_false_velocity(off.value, longest)
 
     @classmethod
     def size(cls, found: Finding) -> str:

@@ -61,4 +61,7 @@ class GpsLatency(Effect):
                 f"; the log stamps fixes {1e3 * clock.late:.0f} ms later than the time that the "
                 "EKF counts from"
             )
-        return Cure(words, {clock.name: clock.setting(delay)})
+        value = clock.setting(delay)
+        if 1e3 * (delay - clock.late) - value > 1e3 * cls.least:
+            words += f" ({value:.0f} ms is the most that it takes)"
+        return Cure(words, {clock.name: value})

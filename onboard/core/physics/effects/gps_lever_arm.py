@@ -23,7 +23,7 @@ class GpsLeverArm(Effect):
     effect = "gps_lever_arm"
     code = 3
     title = "The GPS antenna is away from the IMU"
-    sentence = "the GPS antenna is {size:.2g} m away from the IMU and that is not told"
+    sentence = "the autopilot is not told that the GPS antenna is {size:.2g} m away from the IMU"
     meaning = "`x`, `y`, `z`, m forward, right, down, on top of `GPS1_POS_*`"
     bearing = Bearing.BESIDE
     instead_of = "antenna_place"

@@ -16,7 +16,7 @@ class Gravity(Effect):
     effect = "gravity"
     code = 18
     title = "Gravity differs from the expected value"
-    sentence = "gravity is not the expected"
+    sentence = "gravity differs from the expected value"
     meaning = "`delta_g`, m/s²"
     bearing = Bearing.WITHIN
     source = "Somigliana's formula says what to expect"

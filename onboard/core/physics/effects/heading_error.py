@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from onboard.core.model.linearisation import Linearisation
+from onboard.core.physics import danger
 from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import DEGREE, first, measured
@@ -47,6 +48,11 @@ class HeadingError(Effect):
     def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
         """True north."""
         return {"heading": -point.heading}
+
+    @classmethod
+    def danger(cls, found: Finding) -> str:
+        """By the constant error alone."""
+        return danger.of_heading(first(found.unknowns).value)
 
     @classmethod
     def size(cls, found: Finding) -> str:

@@ -155,7 +155,7 @@ def attitude_cure(extra: Array, six: Array, parameters: ParametersInForce, imu: 
         return Cure("set the calibration that was found: the autopilot levels with this sensor")
     if imu != 1:
         return Cure(
-            "mount the boards alike: the recorded attitude is that of another one's sensors"
+            "mount the boards alike: the recorded attitude is that of another board's sensors"
         )
     if "AHRS_TRIM_X" not in parameters.values:
         return Cure(f"nothing, if AHRS_TRIM is {_pair(-extra)}: the recording does not have it")

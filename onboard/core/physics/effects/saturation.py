@@ -22,6 +22,14 @@ class Saturation(Effect):
     excluded = True
 
     @classmethod
+    def danger(cls, found: Finding) -> str:  # noqa: ARG003 - at the rail any size is too much
+        """At its limit an accelerometer does not feel what it is exposed to."""
+        return (
+            "meanwhile the autopilot does not know how it is accelerated, and its height and "
+            "velocity run away"
+        )
+
+    @classmethod
     def size(cls, found: Finding) -> str:
         """``of 78.5 m/s², 3 times``."""
         q = found.unknowns.get("limit")
