@@ -122,6 +122,28 @@ async def test_a_burst_of_datagrams_arrives_whole_in_few_calls():
     peer.close()
 
 
+async def test_what_waits_is_read_when_somebody_wants_it_or_sooner_from_then_on():
+    """A wake-up for many packets, and none is left lying when an answer is waited for."""
+    for hurry in (lambda t: t.read(), lambda t: t.pace(0.0)):
+        inbox = Inbox()
+        transport = await open_transport(
+            Endpoint.parse("udpin:127.0.0.1:0"), inbox.receive, inbox.lost, linger=3600.0
+        )
+        peer = udp_socket()
+        to = ("127.0.0.1", transport.port)
+        peer.sendto(b"first", to)
+        await inbox.until(lambda i: i.data == b"first")
+        for _ in range(2):
+            peer.sendto(b"+", to)
+            await asyncio.sleep(0.05)
+        assert inbox.data == b"first"  # an hour is not over
+        hurry(transport)
+        await inbox.until(lambda i: i.data == b"first++")
+        transport.close()
+        hurry(transport)
+        peer.close()
+
+
 async def test_a_port_in_use_is_named():
     taken = udp_socket()
     endpoint = Endpoint.parse(f"udpin:127.0.0.1:{taken.getsockname()[1]}")
