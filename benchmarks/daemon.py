@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import resource
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,6 +30,7 @@ from typing import Any
 
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
+from onboard.mavlink import framing
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message, mavlink
 
@@ -163,12 +165,21 @@ def live(seconds: float, speed: float = 1.0) -> tuple[float, float, dict[str, An
     return share, memory, snapshot
 
 
-def later(message: Message, seconds: float) -> None:
-    """Move the message's stamp on the boot clock."""
-    if hasattr(message, "time_usec"):
-        message.time_usec += round(seconds * 1e6)
-    if hasattr(message, "time_boot_ms"):
-        message.time_boot_ms += round(seconds * 1e3)
+def later(frame: bytes, seconds: float) -> bytes:
+    """The frame with its stamp moved on the boot clock."""
+    kind = mavlink.mavlink_map[framing.message_id(frame, 0)]
+    for name, unit, form in (("time_usec", 1e-6, "<Q"), ("time_boot_ms", 1e-3, "<I")):
+        if name in kind.ordered_fieldnames:
+            before = kind.ordered_fieldnames[: kind.ordered_fieldnames.index(name)]
+            letters = kind.native_format.decode()[1 : 1 + len(before)]
+            at, body = 10 + struct.calcsize("<" + letters), bytearray(frame[:-2])
+            body = body.ljust(at + struct.calcsize(form), b"\0")  # zeros at its end were left out
+            (stamp,) = struct.unpack_from(form, body, at)
+            struct.pack_into(form, body, at, stamp + round(seconds / unit))
+            body[1] = len(body) - 10
+            summed = bytes(body[1:]) + bytes((kind.crc_extra,))
+            return bytes(body) + framing.checksum(summed).to_bytes(2, "little")
+    return frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +230,8 @@ async def day(hours: float) -> Day:
             codec = Codec()
             for t, raw in frames(flight):
                 now = number * FLIGHT_S + t
-                for frame in codec.feed(raw):
+                for frame in codec.feed(later(raw, number * FLIGHT_S)):
                     if frame.message is not None:
-                        later(frame.message, number * FLIGHT_S)
                         heard(service, now, frame.message)
                         service.on_message(now, frame.message)
                 if now >= next_tick:

@@ -280,7 +280,7 @@ class Link:
             self.connections[way[0]].peers.believe(peer, now)
         for event in heard.events:
             self._tell(event, peer, now)
-        if heard.whose in {Whose.STANDBY, Whose.FOREIGN}:
+        if heard.whose is Whose.STANDBY or heard.whose is Whose.FOREIGN:
             return False
         if self._signing is not None:
             self._signing.act_on(frame.raw)
