@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import multiprocessing
 import os
@@ -94,8 +95,24 @@ def frames(path: Path) -> Iterator[tuple[float, bytes]]:
             yield 1e-6 * (stamp - first), head[8:] + flags + rest
 
 
+def answers(packer: mavlink.MAVLink, data: bytes) -> Iterator[bytes]:
+    """What an autopilot says to this: any rate is granted, every parameter has a value."""
+    for frame in Codec().feed(data):
+        question = frame.message
+        if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+            accepted = mavlink.MAV_RESULT_ACCEPTED
+            yield mavlink.MAVLink_command_ack_message(question.command, accepted).pack(packer)
+        elif frame.message_id == mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
+            name = question.param_id
+            value = 1.0 if "ACCSCAL" in name else 0.0
+            kind = mavlink.MAV_PARAM_TYPE_REAL32
+            told = mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1000, 0)
+            yield told.pack(packer)
+
+
 def play(port: int, path: str, speed: float) -> None:
     """In a process of its own: the flight, so many times as fast, a datagram per message."""
+    packer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(("127.0.0.1", port))
         began = time.monotonic()
@@ -104,6 +121,11 @@ def play(port: int, path: str, speed: float) -> None:
             if wait > 0.0:
                 time.sleep(wait)
             sender.send(frame)
+            with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+                while question := sender.recv(2048, socket.MSG_DONTWAIT):
+                    packer.seq = frame[4]
+                    for answer in answers(packer, question):
+                        sender.send(answer)
 
 
 def in_a_process(function: Callable[..., None], *arguments: object) -> SpawnProcess:
