@@ -87,7 +87,8 @@ class Gone(NamedTuple):
 
     def traces(self, ready: Epochs, *, whole: bool) -> list[EpochTrace]:
         """What each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""
-        rows = self.rows[0].copy() if whole else self.rows[0, :0]
+        # Not a view of none of them: that would keep all of them.
+        rows = self.rows[0].copy() if whole else np.zeros((0, self.rows.shape[2]))
         innovations, columns = self.raw[:, 0].copy(), self.raw[:, 1:].astype(np.float32)
         first = self.first_row.tolist()
         return [
