@@ -33,12 +33,14 @@ class Pace:
     def change(self, linger: float) -> None:
         """From now on ``linger`` seconds; what waits already does not wait for longer than that."""
         self._linger = linger
-        if self._timer is not None and self._timer.when() > self._loop.time() + linger:
+        if self._closed or self._timer is None:
+            return
+        if self._timer.when() > self._loop.time() + linger:
             self._wait_for(linger)
 
     def now(self) -> None:
         """Drain what has come, if it is left alone; what is watched is read as it comes."""
-        if self._timer is not None:
+        if self._timer is not None and not self._closed:
             self._timer.cancel()
             self._again()
 
