@@ -190,14 +190,16 @@ def live(seconds: float, speed: float = 1.0) -> tuple[float, float, dict[str, An
 def later(frame: bytes, seconds: float) -> bytes:
     """The frame with its stamp moved on the boot clock."""
     kind = mavlink.mavlink_map[framing.message_id(frame, 0)]
-    for name, unit, form in (("time_usec", 1e-6, "<Q"), ("time_boot_ms", 1e-3, "<I")):
+    letters = kind.native_format.decode()[1:]
+    for name, unit in (("time_usec", 1e-6), ("time_boot_ms", 1e-3)):
         if name in kind.ordered_fieldnames:
-            before = kind.ordered_fieldnames[: kind.ordered_fieldnames.index(name)]
-            letters = kind.native_format.decode()[1 : 1 + len(before)]
-            at, body = 10 + struct.calcsize("<" + letters), bytearray(frame[:-2])
+            place = kind.ordered_fieldnames.index(name)
+            form = "<" + letters[place]
+            at, body = 10 + struct.calcsize("<" + letters[:place]), bytearray(frame[:-2])
             body = body.ljust(at + struct.calcsize(form), b"\0")  # zeros at its end were left out
             (stamp,) = struct.unpack_from(form, body, at)
-            struct.pack_into(form, body, at, stamp + round(seconds / unit))
+            stamp = (stamp + round(seconds / unit)) % (1 << 8 * struct.calcsize(form))
+            struct.pack_into(form, body, at, stamp)
             body[1] = len(body) - 10
             summed = bytes(body[1:]) + bytes((kind.crc_extra,))
             return bytes(body) + framing.checksum(summed).to_bytes(2, "little")
