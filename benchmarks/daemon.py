@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import multiprocessing
 import os
 import resource
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,6 +31,7 @@ from typing import Any
 
 from onboard.daemon.process.service import Service
 from onboard.daemon.setup.configuration import from_mapping
+from onboard.mavlink import framing
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.dialect import Message, mavlink
 
@@ -92,8 +95,24 @@ def frames(path: Path) -> Iterator[tuple[float, bytes]]:
             yield 1e-6 * (stamp - first), head[8:] + flags + rest
 
 
+def answers(packer: mavlink.MAVLink, data: bytes) -> Iterator[bytes]:
+    """What an autopilot says to this: any rate is granted, every parameter has a value."""
+    for frame in Codec().feed(data):
+        question = frame.message
+        if frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+            accepted = mavlink.MAV_RESULT_ACCEPTED
+            yield mavlink.MAVLink_command_ack_message(question.command, accepted).pack(packer)
+        elif frame.message_id == mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
+            name = question.param_id
+            value = 1.0 if "ACCSCAL" in name else 0.0
+            kind = mavlink.MAV_PARAM_TYPE_REAL32
+            told = mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1000, 0)
+            yield told.pack(packer)
+
+
 def play(port: int, path: str, speed: float) -> None:
     """In a process of its own: the flight, so many times as fast, a datagram per message."""
+    packer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(("127.0.0.1", port))
         began = time.monotonic()
@@ -102,6 +121,11 @@ def play(port: int, path: str, speed: float) -> None:
             if wait > 0.0:
                 time.sleep(wait)
             sender.send(frame)
+            with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+                while question := sender.recv(2048, socket.MSG_DONTWAIT):
+                    packer.seq = frame[4]
+                    for answer in answers(packer, question):
+                        sender.send(answer)
 
 
 def in_a_process(function: Callable[..., None], *arguments: object) -> SpawnProcess:
@@ -163,12 +187,23 @@ def live(seconds: float, speed: float = 1.0) -> tuple[float, float, dict[str, An
     return share, memory, snapshot
 
 
-def later(message: Message, seconds: float) -> None:
-    """Move the message's stamp on the boot clock."""
-    if hasattr(message, "time_usec"):
-        message.time_usec += round(seconds * 1e6)
-    if hasattr(message, "time_boot_ms"):
-        message.time_boot_ms += round(seconds * 1e3)
+def later(frame: bytes, seconds: float) -> bytes:
+    """The frame with its stamp moved on the boot clock."""
+    kind = mavlink.mavlink_map[framing.message_id(frame, 0)]
+    letters = kind.native_format.decode()[1:]
+    for name, unit in (("time_usec", 1e-6), ("time_boot_ms", 1e-3)):
+        if name in kind.ordered_fieldnames:
+            place = kind.ordered_fieldnames.index(name)
+            form = "<" + letters[place]
+            at, body = 10 + struct.calcsize("<" + letters[:place]), bytearray(frame[:-2])
+            body = body.ljust(at + struct.calcsize(form), b"\0")  # zeros at its end were left out
+            (stamp,) = struct.unpack_from(form, body, at)
+            stamp = (stamp + round(seconds / unit)) % (1 << 8 * struct.calcsize(form))
+            struct.pack_into(form, body, at, stamp)
+            body[1] = len(body) - 10
+            summed = bytes(body[1:]) + bytes((kind.crc_extra,))
+            return bytes(body) + framing.checksum(summed).to_bytes(2, "little")
+    return frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +254,8 @@ async def day(hours: float) -> Day:
             codec = Codec()
             for t, raw in frames(flight):
                 now = number * FLIGHT_S + t
-                for frame in codec.feed(raw):
+                for frame in codec.feed(later(raw, number * FLIGHT_S)):
                     if frame.message is not None:
-                        later(frame.message, number * FLIGHT_S)
                         heard(service, now, frame.message)
                         service.on_message(now, frame.message)
                 if now >= next_tick:

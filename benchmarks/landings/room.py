@@ -62,6 +62,12 @@ class Line:
         if self.receive is not None:
             self._send(data)
 
+    def pace(self, _linger: float) -> None:
+        """Nothing waits on this line."""
+
+    def read(self) -> None:
+        """Nothing waits on this line."""
+
     def close(self) -> None:
         """Nothing is received after this."""
         self.receive = None

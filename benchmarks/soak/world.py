@@ -12,8 +12,7 @@ from pathlib import Path
 
 from benchmarks.daemon import frames, later
 from onboard.daemon.process.service import Service
-from onboard.mavlink.codec import Codec
-from onboard.mavlink.dialect import Message
+from onboard.mavlink.dialect import mavlink
 
 HOUR = 3600.0
 
@@ -68,24 +67,17 @@ class World:
     async def _fly(self) -> None:
         """The recorded flight, on the vehicle's clock."""
         self.happened["flight"] += 1
-        vehicle, codec, began = self.vehicle, Codec(), self._loop.time()
+        vehicle, opener, began = self.vehicle, mavlink.MAVLink(None), self._loop.time()
         vehicle.stop_talking()
         shift = vehicle.boot_ms * 1e-3
         for t, raw in frames(self._flight):
             if (wait := began + t - self._loop.time()) > 0.0:
                 await asyncio.sleep(wait)
-            for frame in codec.feed(raw):
-                if frame.message is not None and frame.message.get_type() != "PARAM_VALUE":
-                    vehicle.send(self._shifted(frame.message, shift))
+            message = opener.decode(bytearray(later(raw, shift)))
+            if message.get_type() != "PARAM_VALUE":
+                vehicle.send(message)
         vehicle.boot_ms += 1e3 * (self._loop.time() - began)
         self._speak_again()
-
-    @staticmethod
-    def _shifted(message: Message, seconds: float) -> Message:
-        later(message, seconds)
-        if message.get_type() == "SERVO_OUTPUT_RAW":
-            message.time_usec %= 1 << 32
-        return message
 
     def _speak_again(self) -> None:
         vehicle = self.vehicle

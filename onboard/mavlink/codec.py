@@ -1,9 +1,10 @@
 """MAVLink as a sans-IO codec: bytes to frames and messages, messages to bytes.
 
-Where a frame begins and whether it is right is said by :mod:`onboard.mavlink.framing`; pymavlink
-builds and packs the message objects.  Its own parser is not used because after a false start it
-throws the whole supposed frame away, up to 280 bytes and several good messages with it, where this
-one resumes one byte later; and because messages that nobody wants need never become objects.
+Where a frame begins and whether it is right is said by :mod:`onboard.mavlink.framing`; messages of
+numbers are read by :mod:`onboard.mavlink.plain`, others by pymavlink, which also packs them all.
+Its own parser is not used because after a false start it throws the whole supposed frame away, up
+to 280 bytes and several good messages with it, where this one resumes one byte later; and because
+messages that nobody wants need never become objects.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.mavlink import framing, limits
+from onboard.mavlink import framing, limits, plain
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.signing import Signing
 
@@ -151,7 +152,7 @@ class Codec:
         """Verify one supposed frame.  None: not a frame; message id -1: refused."""
         raw = bytes(buffer[start : start + length])
         statistics = self.statistics
-        message_id, system, component, sequence, signed, _ = framing.header(raw, 0)
+        message_id, system, component, sequence, signed, payload = framing.header(raw, 0)
         known = message_id in mavlink.mavlink_map
         if known and not framing.is_valid(raw, 0, message_id):
             statistics.bad_frames += 1
@@ -170,13 +171,23 @@ class Codec:
             return Frame(raw, -1, system, component, sequence, None)
         message = None
         if self.wanted is None or message_id in self.wanted:
-            try:
-                message = self._decoder.decode(bytearray(raw))
-            except mavlink.MAVError:
-                # The checksum held, so the sender meant it: a payload that our dialect's
-                # definition cannot hold.  Pass it on as a frame without a message.
-                statistics.unknown += 1
+            form = plain.layout(message_id)
+            if form is None:
+                message = self._decode(raw)
+            else:
+                body = raw[payload : payload + raw[1]]
+                message = plain.read(form, body, system, component)
         return Frame(raw, *key, message)
+
+    def _decode(self, raw: bytes) -> Message | None:
+        """A message with text or arrays, by pymavlink."""
+        try:
+            return self._decoder.decode(bytearray(raw))
+        except mavlink.MAVError:
+            # The checksum held, so the sender meant it: a payload that our dialect's
+            # definition cannot hold.  Pass it on as a frame without a message.
+            self.statistics.unknown += 1
+            return None
 
     def _count(self, frame: Frame) -> None:
         statistics = self.statistics

@@ -72,7 +72,7 @@ class Connection:
             reason), and when it is over.
         clock: monotonic time, s.
         rng: source of the jitter.
-        linger: see :mod:`onboard.mavlink.transport`.
+        linger: see :mod:`onboard.mavlink.transport`; :meth:`pace` changes it.
     """
 
     def __init__(
@@ -143,6 +143,18 @@ class Connection:
         else:
             self._transport.write(data, self.peers.answered(self._clock()))
 
+    def pace(self, linger: float) -> None:
+        """From now on a message waits for ``linger`` seconds at most."""
+        if linger != self._linger:
+            self._linger = linger
+            if self._transport is not None:
+                self._transport.pace(linger)
+
+    def read(self) -> None:
+        """Read what has come, without waiting for its time."""
+        if self._transport is not None:
+            self._transport.read()
+
     def check(self, now: float) -> None:
         """See whether trouble is over; break a TCP or serial line that is silent for too long."""
         over = self.outage.over(now)
@@ -193,6 +205,7 @@ class Connection:
             return "timed out"
         except OSError as error:
             return error.strerror or str(error)
+        self._transport.pace(self._linger)  # it may have changed meanwhile
         self.connects += 1
         self.peers.begin_anew()
         since = self.last_received = self._clock()

@@ -11,7 +11,9 @@ MAVLink 1: magic, payload length, sequence, system, component, message number, p
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from mmap import mmap
+from struct import Struct
 from typing import NamedTuple, TypeAlias
 
 from onboard.mavlink.dialect import mavlink
@@ -27,11 +29,17 @@ _START = re.compile(rb"\xfe|\xfd(?:.[\x00\x01]|.?\Z)", re.DOTALL)
 _SIGNED = 0x01
 _HEADER_V1, _HEADER_V2 = 6, 10
 _CHECKSUM = 2
+_CHECKSUM_BEGINS = 0xFFFF
 _SIGNATURE = 13
 _EXTRA = {kind: bytes((message.crc_extra,)) for kind, message in mavlink.mavlink_map.items()}
 """The byte that the sender adds to what is summed, by message number."""
 _LONGEST = {kind: message.unpacker.size for kind, message in mavlink.mavlink_map.items()}
 """bytes of payload that MAVLink 1 can have, by message number; later fields are MAVLink 2's."""
+
+
+_checksum: Callable[[bytes, int], int] | None = mavlink.mcrf4xx
+"""CRC-16/MCRF4XX in compiled code, where pymavlink has found some."""
+_HEAD_V1, _HEAD_V2 = Struct("<xxBBBB").unpack_from, Struct("<xxBxBBBHB").unpack_from
 
 
 class Header(NamedTuple):
@@ -73,16 +81,11 @@ def message_id(data: Bytes, at: int) -> int:
 def header(data: Bytes, at: int) -> Header:
     """The header of a packet that is there as a whole."""
     if data[at] == MAGIC_V1:
-        kind, system, component, sequence = data[at + 5], data[at + 3], data[at + 4], data[at + 2]
-        return Header(kind, system, component, sequence, signed=False, payload=at + _HEADER_V1)
-    return Header(
-        data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16,
-        data[at + 5],
-        data[at + 6],
-        data[at + 4],
-        bool(data[at + 2] & _SIGNED),
-        at + _HEADER_V2,
-    )
+        sequence, system, component, kind = _HEAD_V1(data, at)
+        return Header(kind, system, component, sequence, False, at + _HEADER_V1)  # noqa: FBT003 - hundreds a second
+    flags, sequence, system, component, low, high = _HEAD_V2(data, at)
+    signed = flags & _SIGNED == _SIGNED
+    return Header(low | high << 16, system, component, sequence, signed, at + _HEADER_V2)
 
 
 def is_valid(data: Bytes, at: int, kind: int) -> bool:
@@ -94,8 +97,14 @@ def is_valid(data: Bytes, at: int, kind: int) -> bool:
     if extra is None or (data[at] == MAGIC_V1 and data[at + 1] > _LONGEST[kind]):
         return False
     end = at + (_HEADER_V1 if data[at] == MAGIC_V1 else _HEADER_V2) + data[at + 1]
-    crc = mavlink.x25crc(bytes(data[at + 1 : end]) + extra).crc
-    return bool(crc == int.from_bytes(data[end : end + _CHECKSUM], "little"))
+    return checksum(bytes(data[at + 1 : end]) + extra) == data[end] | data[end + 1] << 8
+
+
+def checksum(summed: bytes) -> int:
+    """CRC-16/MCRF4XX, as all packets have it."""
+    if _checksum is not None:
+        return _checksum(summed, _CHECKSUM_BEGINS)
+    return int(mavlink.x25crc(summed).crc)
 
 
 def next_start(data: Bytes, start: int) -> int:

@@ -13,8 +13,17 @@ from typing import Final
 # Bytes: transports, codec, endpoints
 
 LINGER_S: Final = 0.02
-"""s that a descriptor is left alone after a read: 50 wake-ups per second, and inertial samples come
-every 20 ms [data]."""
+"""s that a descriptor is left alone after a read while an answer is waited for or a push is under
+way: 50 wake-ups per second, and inertial samples come every 20 ms [data]."""
+REST_S: Final = 0.15
+"""s that it is left alone at all other times.  The link reads with each tick, which comes sooner,
+so that one wake-up does for both [cost]."""
+SERIAL_LINGER_S: Final = 0.04
+"""s that a serial line is left alone at the most: at 921600 baud it brings 3.7 kB in that time, and
+the system keeps 4 kB of a terminal before it holds the sender back or loses bytes [data]."""
+ASKING_S: Final = 1.0
+"""s after a question for which its answer is waited for: the first of all waits [tuned: what one
+question of the rates waits]."""
 CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536

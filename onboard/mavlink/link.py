@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import random
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -60,7 +61,9 @@ class Link:
         clock: monotonic time, s; what handlers and participants get as ``now``.
         wall_clock: unix time, s, for the recording.
         rng: jitter of the back-off.
-        linger: longest delay of a message for the sake of fewer wake-ups, s.
+        linger: longest delay of a message for the sake of fewer wake-ups, s, while somebody waits
+            for an answer or a push is under way.
+        rest: the same at all other times; each tick reads what has come by then.
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class Link:
         wall_clock: Callable[[], float] = time.time,
         rng: random.Random | None = None,
         linger: float = limits.LINGER_S,
+        rest: float = limits.REST_S,
     ) -> None:
         self.boot_clock = BootClock()
         self.presence = Presence(system, component)
@@ -103,6 +107,8 @@ class Link:
             for number, endpoint in enumerate(endpoints)
         )
         self._participants: list[Participant] = []
+        self._linger, self._rest = linger, max(linger, rest)
+        self._asked_at = -math.inf
         self._next_beat = 0.0
         self._found = asyncio.Event()
         self._stopped: asyncio.Future[None] | None = None
@@ -205,6 +211,8 @@ class Link:
     def send(self, message: Message) -> None:
         """Send a message under our ids: to where its target was heard, else everywhere."""
         recorder = self._recorder
+        if getattr(message, "target_system", 0):
+            self._wait_for_answers()
         for connection, address in self._ways_to(message):
             if connection.is_up:
                 frame = connection.codec.encode(message)
@@ -219,6 +227,12 @@ class Link:
         if way is not None and self.connections[way[0]].is_up:
             return ((self.connections[way[0]], way[1]),)
         return ((connection, None) for connection in self.connections)
+
+    def _wait_for_answers(self) -> None:
+        """Somebody was asked or told something: the answer is not to be left lying."""
+        self._asked_at = self._clock()
+        for connection in self.connections:
+            connection.pace(self._linger)
 
     # Receiving
 
@@ -266,7 +280,7 @@ class Link:
             self.connections[way[0]].peers.believe(peer, now)
         for event in heard.events:
             self._tell(event, peer, now)
-        if heard.whose in {Whose.STANDBY, Whose.FOREIGN}:
+        if heard.whose is Whose.STANDBY or heard.whose is Whose.FOREIGN:
             return False
         if self._signing is not None:
             self._signing.act_on(frame.raw)
@@ -318,10 +332,16 @@ class Link:
 
     async def _tick_forever(self) -> None:
         while True:
+            # Before anything is asked or written: what has come may forbid it.
+            for connection in self.connections:
+                connection.read()
             self._tick(self._clock())
             await asyncio.sleep(limits.TICK_S)
 
     def _tick(self, now: float) -> None:
+        brief = self.presence.held() or now - self._asked_at < limits.ASKING_S
+        for connection in self.connections:
+            connection.pace(self._linger if brief else self._rest)
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
             self.send(

@@ -16,7 +16,7 @@ handed on.  The pin moves in four cases, and never while it is held (a push is u
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TypeAlias
 
@@ -33,7 +33,7 @@ from onboard.mavlink.claims import Claim, Claims, Source, Way
 from onboard.mavlink.decode import is_armed, is_autopilot
 from onboard.mavlink.dialect import Message, mavlink
 
-Events: TypeAlias = list[AutopilotFound | AutopilotReturned | RivalHeard]
+Events: TypeAlias = tuple[AutopilotFound | AutopilotReturned | RivalHeard, ...]
 AUTOPILOT1 = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
 
 
@@ -46,12 +46,15 @@ class Whose(Enum):
     FOREIGN = auto()
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Heard:
     """What a packet amounts to; ``events`` are to be told before it is handed on."""
 
     whose: Whose
-    events: Events = field(default_factory=list)
+    events: Events = ()
+
+
+_OF_VEHICLE, _OF_SOMEBODY = Heard(Whose.VEHICLE), Heard(Whose.SOMEBODY)
 
 
 class Presence:
@@ -154,21 +157,21 @@ class Presence:
         pinned = self._pinned
         if pinned is None:
             if claim is None or not beats:
-                return Heard(Whose.SOMEBODY)
+                return _OF_SOMEBODY
             return Heard(Whose.VEHICLE, self._take(claim, now))
         if claim is pinned:
-            return Heard(Whose.VEHICLE, self._back() if beats else [])
+            return Heard(Whose.VEHICLE, self._back()) if beats else _OF_VEHICLE
         if claim is not None and not self.held() and self._better(claim, pinned, now, beats=beats):
             return Heard(Whose.VEHICLE, self._take(claim, now))
         if source != pinned.source:
             self.foreign += claim is not None
-            return Heard(Whose.SOMEBODY)
+            return _OF_SOMEBODY
         other = way[0] != pinned.way[0]
         self.standby += other
         self.foreign += not other
-        events: Events = []
+        events: Events = ()
         if claim is not None and beats:
-            events.append(RivalHeard(claim.armed, same_clock=claim.continues(pinned, now)))
+            events = (RivalHeard(claim.armed, same_clock=claim.continues(pinned, now)),)
         return Heard(Whose.STANDBY if other else Whose.FOREIGN, events)
 
     def _better(self, claim: Claim, pinned: Claim, now: float, *, beats: bool) -> bool:
@@ -203,18 +206,18 @@ class Presence:
         if before is not None and before.source == claim.source:
             if claim.continues(before, now) and self.state is AutopilotState.PRESENT:
                 claim.beat = max(claim.beat, before.beat)
-                return []
+                return ()
             self.state = AutopilotState.PRESENT
-            return [AutopilotReturned()]
+            return (AutopilotReturned(),)
         self.autopilot = Autopilot(*claim.source, claim.vehicle_type, claim.firmware)
         self.state = AutopilotState.PRESENT
-        return [AutopilotFound(self.autopilot)]
+        return (AutopilotFound(self.autopilot),)
 
     def _back(self) -> Events:
         if self.state is not AutopilotState.SILENT:
-            return []
+            return ()
         self.state = AutopilotState.PRESENT
-        return [AutopilotReturned()]
+        return (AutopilotReturned(),)
 
 
 def _no() -> bool:

@@ -1,10 +1,7 @@
 """Byte transports on the asyncio loop: UDP, TCP and serial behind one small protocol.
 
-All three read from a file descriptor that the loop watches.  Small packets arrive by the
-hundred per second (a UART even hands over a few bytes at a time), and a wake-up of the loop
-costs more than parsing what it brings.  So after each read the descriptor is left alone for
-``linger`` seconds and then drained, which bounds the wake-ups to ``1 / linger`` per second
-and delays a message by ``linger`` at most; a quiet line goes back to being watched.
+All three read from a file descriptor that the loop watches, in turns (:mod:`.pace`): after each
+read it is left alone for ``linger`` seconds, which delays a message by so much at most.
 """
 
 from __future__ import annotations
@@ -12,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import math
 import os
 import socket
 from collections.abc import Callable, Sequence
@@ -20,6 +18,7 @@ from typing import Protocol
 
 from onboard.mavlink import limits
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
+from onboard.mavlink.pace import Pace
 from onboard.mavlink.peers import Address
 from onboard.mavlink.serialport import open_serial
 from onboard.mavlink.waiting import Waiting
@@ -49,6 +48,12 @@ class Transport(Protocol):
         ``to``: addresses, for a listening datagram socket; all others have one other end.
         """
 
+    def pace(self, linger: float) -> None:
+        """From now on a message waits for ``linger`` s at most, one that has come already, too."""
+
+    def read(self) -> None:
+        """Read what has come, without waiting for its time."""
+
     def close(self) -> None:
         """Let go of the descriptor; nothing is received after this.  May be called twice."""
 
@@ -67,7 +72,7 @@ async def open_transport(
         endpoint: where to.
         receive: called with what was read and the address that it came from (None: the only one).
         lost: called once with the reason when the connection breaks by itself.
-        linger: longest delay of a message, s (see the module's text).
+        linger: longest delay of a message, s, until :meth:`Transport.pace` says otherwise.
         first: whether what an address sent to a listening socket goes before what others sent.
 
     Raises:
@@ -106,54 +111,6 @@ async def open_transport(
         except BaseException:
             sock.close()
             raise
-
-
-class Pace:
-    """Calls ``drain`` when the descriptor is readable, but not oftener than ``linger`` allows.
-
-    ``drain`` reads and hands on ``BYTES_PER_TURN`` at the most, so that a flood leaves the loop to
-    others in between; it returns how many there were.
-    """
-
-    def __init__(self, descriptor: int, drain: Callable[[], int], linger: float) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._descriptor = descriptor
-        self._drain = drain
-        self._linger = linger
-        self._timer: asyncio.TimerHandle | None = None
-        self._closed = False
-        self._loop.add_reader(descriptor, self._readable)
-
-    def _readable(self) -> None:
-        size = self._drain()
-        wait = self._wait(size)
-        if wait > 0.0 and not self._closed:
-            self._loop.remove_reader(self._descriptor)
-            self._timer = self._loop.call_later(wait, self._again)
-
-    def _again(self) -> None:
-        size = self._drain()
-        if self._closed:
-            return
-        wait = self._wait(size)
-        if size and wait > 0.0:
-            self._timer = self._loop.call_later(wait, self._again)
-        else:
-            self._timer = None
-            self._loop.add_reader(self._descriptor, self._readable)
-
-    def _wait(self, size: int) -> float:
-        """Until the next turn, s: short if this one may have left something."""
-        return limits.FULL_TURN_PAUSE_S if size >= limits.BYTES_PER_TURN else self._linger
-
-    def close(self) -> None:
-        """Stop reading."""
-        if self._closed:
-            return
-        self._closed = True
-        self._loop.remove_reader(self._descriptor)
-        if self._timer is not None:
-            self._timer.cancel()
 
 
 class DatagramTransport:
@@ -203,6 +160,20 @@ class DatagramTransport:
                 self._send(data, address)
         else:
             self._send(data, None)
+
+    def pace(self, linger: float) -> None:
+        """See :class:`Transport`."""
+        self._linger = linger
+        for pace in self._paces():
+            pace.change(linger)
+
+    def read(self) -> None:
+        """See :class:`Transport`."""
+        for pace in self._paces():
+            pace.now()
+
+    def _paces(self) -> tuple[Pace, ...]:
+        return (self._pace,) if self._line_pace is None else (self._line_pace, self._pace)
 
     def close(self) -> None:
         """Stop and release the port."""
@@ -300,7 +271,8 @@ class StreamTransport:
         self._loop = asyncio.get_running_loop()
         self._waiting = bytearray()
         self._closed = False
-        self._pace = Pace(self._descriptor, self._drain, linger)
+        self._longest = math.inf if self._socket is not None else limits.SERIAL_LINGER_S
+        self._pace = Pace(self._descriptor, self._drain, min(linger, self._longest))
 
     @property
     def refused(self) -> int:
@@ -316,6 +288,14 @@ class StreamTransport:
         self._waiting += data
         if idle:
             self._flush()
+
+    def pace(self, linger: float) -> None:
+        """See :class:`Transport`."""
+        self._pace.change(min(linger, self._longest))
+
+    def read(self) -> None:
+        """See :class:`Transport`."""
+        self._pace.now()
 
     def close(self) -> None:
         """Stop and release the descriptor."""

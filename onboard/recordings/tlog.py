@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
-from mmap import ACCESS_READ, mmap
+from mmap import ACCESS_READ, MADV_DONTNEED, mmap
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +99,7 @@ def open_tlog(path: Path) -> Recording:
         data = mmap(file.fileno(), 0, access=ACCESS_READ)
     index = index_tlog(data, WANTED)
     vehicles = _vehicles(index)
+    _let_go(data)
     damage = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
     source, notes = _choose(vehicles, path, damage)
     vehicle = vehicles[source]
@@ -225,4 +226,11 @@ def _decoded(data: Bytes, offsets: Integers, decoder: Decoder) -> Iterator[list[
         with no_collection():
             messages = unpack(octets, offsets[start : start + BLOCK])
             samples = [s for m in messages if m is not None for s in decoder.decode(m)]
+        _let_go(data)
         yield samples
+
+
+def _let_go(data: Bytes) -> None:
+    """What was read of the file need not stay in this process's memory: the system has it."""
+    if isinstance(data, mmap):
+        data.madvise(MADV_DONTNEED)

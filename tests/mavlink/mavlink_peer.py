@@ -59,6 +59,8 @@ class FakeTransport:
         self.lost = lost
         self.dropped = self.refused = 0
         self.closed = False
+        self.lingers: list[float] = []
+        self.reads = 0
         self.codec = Codec(system=1, component=1)
         listening = endpoint.kind is EndpointKind.UDP_IN
         self.address = ("127.0.0.1", 40_000) if listening else None
@@ -73,6 +75,12 @@ class FakeTransport:
             if self.answer is not None:
                 for message in self.answer(frame.message):
                     asyncio.get_running_loop().call_soon(self.say, message)
+
+    def pace(self, linger: float) -> None:
+        self.lingers.append(linger)
+
+    def read(self) -> None:
+        self.reads += 1
 
     def close(self) -> None:
         self.closed = True

@@ -27,11 +27,14 @@ from onboard.mavlink.connection import (
 from onboard.mavlink.dialect import mavlink
 from onboard.mavlink.endpoint import Endpoint, EndpointError
 from onboard.mavlink.limits import (
+    ASKING_S,
     BACKOFF_BASE_S,
     BACKOFF_CAP_S,
     HEARTBEAT_TIMEOUT_S,
+    LINGER_S,
     SILENCE_S,
     STABLE_S,
+    TICK_S,
 )
 from onboard.mavlink.link import Link
 from onboard.mavlink.streams import StreamRequest, Streams
@@ -76,6 +79,45 @@ async def beat(transport, seconds, *messages):
         for message in (heartbeat(), *messages):
             transport.say(message)
         await asyncio.sleep(1.0)
+
+
+class TestPace:
+    """How long a message may wait for the sake of fewer wake-ups."""
+
+    @virtual_time
+    async def test_what_has_come_is_read_before_anything_is_said(self, air):
+        async with running(UDP):
+            (transport,) = air.transports
+            reads = []
+            write = transport.write
+            transport.write = lambda data, to=(): (reads.append(transport.reads), write(data, to))
+            transport.say(heartbeat())
+            await asyncio.sleep(10.0)
+            assert len(reads) >= 9
+            assert all(after > before for before, after in pairwise(reads))
+
+    @virtual_time
+    async def test_answers_are_not_left_lying(self, air):
+        async with running(UDP) as link:
+            (transport,) = air.transports
+            await beat(transport, 5.0)
+            assert transport.lingers[-1] > TICK_S  # the tick reads sooner
+            for message, brief in (
+                (mavlink.MAVLink_statustext_message(6, b"to whom it may concern"), False),
+                (mavlink.MAVLink_param_request_read_message(1, 1, b"INS_ACCSCAL_X", -1), True),
+            ):
+                link.send(message)
+                assert (transport.lingers[-1] == LINGER_S) == brief
+            await beat(transport, ASKING_S + 1.0)
+            assert transport.lingers[-1] > TICK_S
+
+    @virtual_time
+    async def test_nor_is_anything_while_a_push_is_under_way(self, air):
+        async with running(UDP) as link:
+            (transport,) = air.transports
+            link.presence.held = lambda: True
+            await beat(transport, 5.0)
+            assert transport.lingers[-1] == LINGER_S
 
 
 class TestConnection:

@@ -122,6 +122,54 @@ async def test_a_burst_of_datagrams_arrives_whole_in_few_calls():
     peer.close()
 
 
+async def test_what_waits_is_read_when_somebody_wants_it_or_sooner_from_then_on():
+    """A wake-up for many packets, and none is left lying when an answer is waited for."""
+    for hurry in (lambda t: t.read(), lambda t: t.pace(0.0)):
+        inbox = Inbox()
+        transport = await open_transport(
+            Endpoint.parse("udpin:127.0.0.1:0"), inbox.receive, inbox.lost, linger=3600.0
+        )
+        peer = udp_socket()
+        to = ("127.0.0.1", transport.port)
+        peer.sendto(b"first", to)
+        await inbox.until(lambda i: i.data == b"first")
+        for _ in range(2):
+            peer.sendto(b"+", to)
+            await asyncio.sleep(0.05)
+        assert inbox.data == b"first"  # an hour is not over
+        hurry(transport)
+        await inbox.until(lambda i: i.data == b"first++")
+        peer.sendto(b"too late", to)
+        transport.close()
+        hurry(transport)  # whose descriptor may be somebody else's by now
+        await asyncio.sleep(0.05)
+        assert inbox.data == b"first++"
+        peer.close()
+
+
+async def test_a_line_that_broke_is_not_read_again(tmp_path):
+    """Its descriptor may be somebody else's by then."""
+    inbox = Inbox()
+    async with Server() as server:
+        transport = await open_transport(
+            Endpoint.parse(f"tcp:127.0.0.1:{server.port}"), inbox.receive, inbox.lost, linger=3600.0
+        )
+        _, writer = await server.client
+        writer.write(b"first")
+        await inbox.until(lambda i: i.data == b"first")
+        transport.close()
+        other = (tmp_path / "other").open("wb+")  # takes the number that has become free
+        other.write(b"not ours")
+        other.flush()
+        other.seek(0)
+        for hurry in (transport.read, lambda: transport.pace(0.0)):
+            hurry()
+            await asyncio.sleep(0.01)
+        assert inbox.data == b"first"
+        assert other.read() == b"not ours"
+        other.close()
+
+
 async def test_a_port_in_use_is_named():
     taken = udp_socket()
     endpoint = Endpoint.parse(f"udpin:127.0.0.1:{taken.getsockname()[1]}")

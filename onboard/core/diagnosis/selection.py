@@ -192,7 +192,7 @@ class Fitter:
         A = self._information(self.sums, index) + np.diag(self.prior_information[index])
         scores = scores_of(N, b, gram, fit.theta)[:, index]
         inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
-        return Scatter(N[:, index][:, :, index], scores, inverse)
+        return Scatter(N, scores, inverse, index)
 
     def rms(self, fit: Fit) -> float:
         """Whitened root mean square of a fit."""

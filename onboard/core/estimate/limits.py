@@ -50,6 +50,9 @@ MOST_STATES: Final = 12000
 MOST_AGED: Final = 24
 """Blocks of flight that has left the buffer: enough for folds and clusters [cost]."""
 
+BLOCKS_TOGETHER: Final = 64
+"""Blocks whose information is multiplied at once: 5 MB [cost: more saves no time]."""
+
 # Streams (calibrator).
 
 OTHER_CLOCK_S: Final = 60.0

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.estimate.limits import FEWEST_FREEDOM, KNOWN
+from onboard.core.estimate.limits import BLOCKS_TOGETHER, FEWEST_FREEDOM, KNOWN
 from onboard.core.estimate.pool import TINY, Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
@@ -24,12 +24,18 @@ from onboard.core.maths.blocks import Block
 class Scatter:
     """Scores of the blocks of a flight beyond one fit, and what the sums expect of them."""
 
-    def __init__(self, N: Array, scores: Array, inverse: Array) -> None:
-        """Take the blocks' information (b, m, m), scores (b, m), and the fit's covariance (m, m).
+    def __init__(
+        self, N: Array, scores: Array, inverse: Array, index: list[int] | None = None
+    ) -> None:
+        """Take what the blocks say, and the fit.
 
-        The covariance is that of the sums with the prior.
+        Args:
+            N: (b, n, n) information of the blocks.
+            scores: (b, m) of the fit's unknowns.
+            inverse: (m, m) the fit's covariance, that of the sums with the prior.
+            index: the m of the n unknowns that the fit has; None: all.
         """
-        self._N, self._scores, self.inverse = N, scores, inverse
+        self._N, self._scores, self.inverse, self._index = N, scores, inverse, index
 
     @classmethod
     def of(
@@ -101,10 +107,19 @@ class Scatter:
 
         What is expected of a block is less than its information: the fit has followed it.
         """
-        NX = self._N @ X
-        followed = np.einsum("bmk,bmk->bk", NX, self.inverse @ NX)
-        expected = np.einsum("mk,bmk->bk", X, NX) - followed
-        return (self._scores @ X) ** 2, np.maximum(expected, 0.0)
+        found = (self._scores @ X) ** 2
+        expected = np.empty_like(found)
+        for first in range(0, len(found), BLOCKS_TOGETHER):
+            part = slice(first, first + BLOCKS_TOGETHER)
+            NX = self._of(part) @ X
+            followed = np.einsum("bmk,bmk->bk", NX, self.inverse @ NX)
+            expected[part] = np.einsum("mk,bmk->bk", X, NX) - followed
+        return found, np.maximum(expected, 0.0)
+
+    def _of(self, part: slice) -> Array:
+        """(b, m, m) information of some blocks: copies of all of them are much of an hour."""
+        N = self._N[part]
+        return N if self._index is None else N[:, self._index][:, :, self._index]
 
 
 def _counted(expected: Array) -> Array:

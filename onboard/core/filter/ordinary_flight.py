@@ -87,14 +87,19 @@ class Gone(NamedTuple):
 
     def traces(self, ready: Epochs, *, whole: bool) -> list[EpochTrace]:
         """What each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""
-        rows = self.rows[0].copy() if whole else self.rows[0, :0]
-        innovations, columns = self.raw[:, 0].copy(), self.raw[:, 1:].astype(np.float32)
-        first = self.first_row.tolist()
+        # Not a view of none of them: that would keep all of them.
+        rows = self.rows[0].copy() if whole else np.zeros((0, self.rows.shape[2]))
+        # Velocity comes first in each epoch; the rows of height and attitude are not shown.
+        many = np.diff(self.first_row)
+        place = np.arange(len(self.raw)) - np.repeat(self.first_row[:-1], many)
+        shown = self.raw[place < np.repeat(self.velocities, many)]
+        innovations, columns = shown[:, 0].copy(), shown[:, 1:].astype(np.float32)
+        first, seen = self.first_row.tolist(), np.cumsum(self.velocities).tolist()
         return [
             EpochTrace(
                 t,
-                innovations[a : a + v],
-                columns[a : a + v],
+                innovations[c - v : c],
+                columns[c - v : c],
                 rows[a:b, 0],
                 rows[a:b, 1:],
                 v,
@@ -102,12 +107,13 @@ class Gone(NamedTuple):
                 (),
                 _NONE,
             )
-            for t, v, h, a, b in zip(
+            for t, v, h, a, b, c in zip(
                 ready.t[self.epochs].tolist(),
                 self.velocities.tolist(),
                 self.heights.tolist(),
                 first,
                 first[1:],
+                seen,
                 strict=False,
             )
         ]

@@ -102,7 +102,9 @@ class Handover:
     def take(self, message: Message) -> tuple[Sample, ...]:
         """Decode a message of the autopilot and put its samples into the next batch."""
         samples = self._consistent(self._plausible(self.decoder.decode(message)))
-        if samples and self._arrived is None:
+        if not samples:
+            return samples
+        if self._arrived is None:
             self._arrived = self._clock()
         self._samples += samples
         if len(self._samples) > limits.WAITING_LIMIT:
@@ -113,8 +115,9 @@ class Handover:
 
     def _consistent(self, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
         """Without those that contradict one of the same stamp, which is taken back, too."""
+        contradicts, now = self.repetitions.contradicts, self._clock()
         for sample in samples:
-            before = self.repetitions.contradicts(sample, self._clock())
+            before = contradicts(sample, now)
             if before is not None:
                 self.counters["samples_contradict"] += 1
                 self._samples = [s for s in self._samples if s is not before]

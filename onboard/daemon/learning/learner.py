@@ -283,6 +283,7 @@ class Learner:
             return
         self._stale = self._urgent = False
         self._answers = answers(self._calibrator)
+        trim()  # what a refinement and the solution have left
         self._next_solution = began + (self._clock() - began) / limits.SOLVING_SHARE
         for imu, answer in self._answers.items():
             if answer.status is Status.CALIBRATED and imu not in self._calibrated:

@@ -242,8 +242,9 @@ class Service:
         self.parts.traffic.count(message.get_type())
         if is_autopilot(message):
             self.contact.heartbeat(now, armed=is_armed(message))
+        observe = self.parts.observed.feed
         for sample in self.handover.take(message):
-            self.parts.observed.feed(sample, now)
+            observe(sample, now)
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.score import least, surprise
+from onboard.core.estimate.limits import BLOCKS_TOGETHER
 from onboard.core.estimate.pool import Pool
 from onboard.core.estimate.scatter import Scatter
 from onboard.core.estimate.weighing import Weighing, directions_of
@@ -60,9 +61,9 @@ def test_moderated_variances_are_nearer_to_the_true_ones_than_their_own_or_one_f
     assert mine < 0.8 * common
 
 
-def test_scores_of_blocks_are_held_against_the_hat_matrix():
+@pytest.mark.parametrize(("n", "count"), [(240, 8), (2 * 3 * BLOCKS_TOGETHER, 3 * BLOCKS_TOGETHER)])
+def test_scores_of_blocks_are_held_against_the_hat_matrix(n, count):
     """What is expected of a block follows from the covariance of all residuals, written out."""
-    n, count = 240, 8
     h, y = flight(3, n, noise=1.0)
     inverse = np.linalg.inv(h.T @ h + np.diag(PRIOR))
     theta = inverse @ (h.T @ y + PRIOR * MODEL.prior)

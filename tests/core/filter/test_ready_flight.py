@@ -67,3 +67,23 @@ def test_columns_of_a_jump_are_those_of_the_offset_from_its_moment_on(batches):
         # In the step in which it jumps, both have the share of it that is left.
         np.testing.assert_allclose(a[~whole], b[~whole], atol=0.05)
     assert np.abs(a[-1, 0:3, -3:]).max() > 0.1
+
+
+def test_traces_keep_nothing_alive_but_themselves(batches):
+    """Of an hour's flight they are kept; a view of something larger keeps all of that."""
+    made = a_pass(calibration_model(POINT))
+    made.keep_traces = True
+    arrays = [
+        array
+        for batch in batches
+        for trace in made.process(batch.segment, batch.fixes, batch.trusted).traces
+        for array in (trace.innovation, trace.columns, trace.y, trace.h, trace.refused_by)
+    ]
+    assert arrays
+    roots = {}
+    for array in arrays:
+        root = array
+        while isinstance(root.base, np.ndarray):
+            root = root.base
+        roots[id(root)] = root.nbytes
+    assert sum(roots.values()) < 1.1 * sum(array.nbytes for array in arrays)
