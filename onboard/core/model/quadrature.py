@@ -27,6 +27,9 @@ NODES_PER_SAMPLE = 1.5
 as it does in the sum of the samples.  Nodes as far apart as the samples would take it for slow
 [physics; 2, 3 and 4 give the same answers to a hundredth of a sigma]."""
 
+EPOCHS_AT_ONCE = 16
+"""Of which all nodes are in memory together: a megabyte at 200 Hz [cost]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Signals:
@@ -106,7 +109,6 @@ class Around:
 
     Attributes:
         offset: (2 J + 1,) s.
-        signals: at the nodes, S = (K, 2 J + 1).
         f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
         f_antenna: (K, 2 J + 1, 3) the same at the antenna, whose velocity it is that a receiver
             averages and reports late.
@@ -118,7 +120,6 @@ class Around:
     """
 
     offset: Array
-    signals: Signals
     f_epoch: Array
     f_antenna: Array
     f_mean: Array
@@ -290,29 +291,30 @@ class NodeMaker:
         """
         J = max(AROUND_COUNT, int(np.ceil(NODES_PER_SAMPLE * self._rate * AROUND_SPAN_S)))
         offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
-        fine = self.signals(epoch[:, None] + np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 4 * J + 1))
-        nodes = Signals(
-            fine.t[:, ::2],
-            fine.w_b[:, ::2],
-            fine.raw_s[:, ::2],
-            fine.f_b[:, ::2],
-            self._segment,
-        )
+        lever = self._segment.lever_arm_b + (0.0 if antenna is None else antenna)
+        parts = [
+            self._around(epoch[i : i + EPOCHS_AT_ONCE], offset, window, lever)
+            for i in range(0, len(epoch), EPOCHS_AT_ONCE)
+        ]
+        f_epoch, f_antenna, swing = map(np.concatenate, zip(*parts, strict=True))
+        f_mean = np.einsum("j,kja->ka", mean_now(offset, window), f_antenna)
+        return Around(offset, f_epoch, f_antenna, f_mean, self.signals(epoch), swing)
+
+    def _around(
+        self, epoch: Array, offset: Array, window: float, lever: Array
+    ) -> tuple[Array, Array, Array]:
+        """``f_epoch``, ``f_antenna`` and ``swing`` of some epochs."""
+        J = len(offset) // 2
+        halves = np.linspace(offset[0], offset[-1], 4 * J + 1)
+        fine = self.signals(epoch[:, None] + halves)
         if self._recorded:
-            R = self._attitude(nodes.t)
+            R = self._attitude(fine.t[:, ::2])
             P = np.swapaxes(R[:, J : J + 1], -1, -2) @ R
         else:
-            h = np.full(len(epoch), offset[1] - offset[0])
-            P = turns_in_a_row(fine.w_b, h, J)
-        f_epoch = (P @ nodes.f_b[..., None])[..., 0]
-        now = Signals(
-            nodes.t[:, J], nodes.w_b[:, J], nodes.raw_s[:, J], nodes.f_b[:, J], self._segment
-        )
-        lever = self._segment.lever_arm_b + (0.0 if antenna is None else antenna)
+            P = turns_in_a_row(fine.w_b, np.full(len(epoch), offset[1] - offset[0]), J)
+        f_epoch = (P @ fine.f_b[:, ::2, :, None])[..., 0]
         f_antenna = f_epoch + _second_derivative(offset, P) @ lever
-        swing = _swing(offset, P, now.w_b, window)
-        f_mean = np.einsum("j,kja->ka", mean_now(offset, window), f_antenna)
-        return Around(offset, nodes, f_epoch, f_antenna, f_mean, now, swing)
+        return f_epoch, f_antenna, _swing(offset, P, fine.w_b[:, 2 * J], window)
 
     def _attitude(self, t: Array) -> Array:
         flat = interpolate_rotation(t.ravel(), self._segment.t_attitude, self._segment.R_attitude)

@@ -8,15 +8,10 @@ mean is a weighted sum: ``mean(V) - V(t) = integral kappa(s) a(t + s) ds`` with
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 
-_FINE = 4001
-_KEPT = 16
-"""Windows whose weights are kept: every segment of a pass asks for the same few [cost]."""
 RESOLVED_S = 0.125
 """s; over a shorter span the slope of a force is mostly vibration."""
 SECOND_DERIVATIVE_S = 0.12
@@ -27,8 +22,8 @@ manoeuvre of 1 Hz."""
 def mean_weights(offset: Array, window: float) -> Array:
     """Weights of the samples of ``a`` at ``offset`` whose sum is ``mean(V) - V``.
 
-    ``a`` is taken as straight lines between the nodes, the kernel is integrated exactly enough
-    (0.25 ms steps) on each hat function.
+    ``a`` is taken as straight lines between the nodes.  The integral of a function times a hat is
+    the second difference of what has the function as its second derivative.
 
     Args:
         offset: (n,) equidistant s around zero.
@@ -39,20 +34,19 @@ def mean_weights(offset: Array, window: float) -> Array:
     """
     if window <= 0.0:
         return np.zeros(len(offset))
-    return _mean_weights(float(offset[0]), float(offset[-1]), len(offset), float(window))
+    step = float(offset[1] - offset[0])
+    wider = np.concatenate([[offset[0] - step], offset, [offset[-1] + step]])
+    out: Array = np.diff(_twice_integrated(wider, window / 2.0), 2) / step
+    return out
 
 
-@lru_cache(maxsize=_KEPT)
-def _mean_weights(first: float, last: float, count: int, window: float) -> Array:
-    """The same for ``count`` equidistant nodes; not to be written to, for it is kept."""
-    s, offset = np.linspace(first, last, _FINE), np.linspace(first, last, count)
-    half = window / 2.0
-    kernel = np.where(np.abs(s) < half, np.sign(s) * (half - np.abs(s)) / window, 0.0)
-    step = offset[1] - offset[0]
-    hats = np.clip(1.0 - np.abs(s[:, None] - offset) / step, 0.0, None)
-    weights: Array = np.trapezoid(kernel[:, None] * hats, s, axis=0)
-    weights.flags.writeable = False
-    return weights
+def _twice_integrated(s: Array, half: float) -> Array:
+    """What has ``kappa`` of a span of twice ``half`` (s) as its second derivative, s."""
+    inside = np.minimum(np.abs(s), half)
+    cubic = half * inside**2 / 2.0 - inside**3 / 6.0
+    beyond = (np.abs(s) - inside) * half**2 / 2.0
+    out: Array = np.sign(s) * (cubic + beyond) / (2.0 * half)
+    return out
 
 
 def box_weights(offset: Array, centre: float, width: float) -> Array:
