@@ -177,7 +177,7 @@ def test_an_attitude_levelled_with_a_wrong_offset_wants_the_calibration_not_a_tr
 @pytest.mark.parametrize(
     ("parameters", "imu", "words"),
     [
-        (told(), 2, "another one's"),
+        (told(), 2, "another board's"),
         (ParametersInForce(), 1, "nothing, if AHRS_TRIM is X -0.030, Y 0.000"),
         (told(AHRS_TRIM_X=0.02), 1, "X 0.050, Y 0.000 in all"),
     ],
