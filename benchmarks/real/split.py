@@ -99,7 +99,13 @@ FLIGHTS = (
 
 LOOKS: tuple[str, ...] = ()
 """Comparisons that were made on the choosing flights, one line each, in order."""
-JUDGED: tuple[str, ...] = ("2026-11-23", "2026-11-23-2", "2026-11-23-3", "2026-11-23-4")
+JUDGED: tuple[str, ...] = (
+    "2026-11-23",
+    "2026-11-23-2",
+    "2026-11-23-3",
+    "2026-11-23-4",
+    "2026-11-23-5",
+)
 """Releases that have been judged."""
 
 
