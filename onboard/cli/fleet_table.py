@@ -22,9 +22,11 @@ from onboard.answers.fleet.shared_numbers import Comparison
 from onboard.answers.knowledge import determined
 from onboard.core.estimate.result import Calibration, Status
 
-NAME = 23
-STATE = 15
 WIDTH = 80
+NAME = 23
+"""Characters of a recording's name; with the other columns, the terminal's width."""
+STATE = 15
+"""Of the longest state, "missing physics"."""
 UNKNOWN = "-"
 STATES = {
     Status.CALIBRATED: "green",
@@ -39,7 +41,7 @@ COLOURS = {
     Severity.UNKNOWN: "",
     Severity.WELL: "green",
 }
-ROW = "{:<23} {:>3} {:<15} {:>5} {:>6} {:>7} {:>14}"
+ROW = f"{{:<{NAME}}} {{:>3}} {{:<{STATE}}} {{:>5}} {{:>6}} {{:>7}} {{:>14}}"
 HEAD = ROW.format("recording", "imu", "state", "cover", "scale", "offset", "residual")
 
 

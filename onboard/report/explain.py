@@ -74,9 +74,7 @@ def explain_html(
         charts=residual_charts.of_flight(diagnosis, duration_s),
         shading=residual_charts.shading(diagnosis),
         fits=_fits(diagnosis),
-        where=[_where(w) for w in diagnosis.mismatch.where]
-        if residual_charts.is_located(diagnosis)
-        else [],
+        where=_places(diagnosis),
         regimes=_regimes(diagnosis),
         effects=[_card(e, advice, ambiguous=e.name in unclear) for e in diagnosis.effects],
         ladder=_ladder(diagnosis),
@@ -193,6 +191,13 @@ def _step(name: str) -> tuple[str, str]:
         title = title_of(effect)
         return "+ " + (title if title[:2].isupper() else title[:1].lower() + title[1:]), effect
     return name, ""
+
+
+def _places(diagnosis: Diagnosis) -> list[str]:
+    """Where the mismatch is, if it is anywhere more than elsewhere."""
+    if not residual_charts.is_located(diagnosis):
+        return []
+    return [_where(w) for w in diagnosis.mismatch.where]
 
 
 def _where(w: Where) -> str:

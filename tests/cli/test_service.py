@@ -72,7 +72,7 @@ def test_a_program_that_the_unit_hides_is_not_installed_as_a_service(monkeypatch
     assert "ProtectHome=yes" in unit
     assert "PrivateTmp=yes" in unit
     monkeypatch.setattr(service, "_install", lambda *_, **__: pytest.fail("it was installed"))
-    for home in ("/home/pi/.local/share/pipx/venvs/onboard-calibration", "/root/x"):
+    for home in (f"{hidden}/pi/.local/share/pipx/venvs/onboard" for hidden in service.HIDDEN):
         monkeypatch.setattr(service, "_program", lambda home=home: f"{home}/bin/onboard")
         assert run(["service", "install"]) == 2
         said = capsys.readouterr().err

@@ -1,16 +1,12 @@
-"""The link in virtual time, its sockets replaced."""
+"""The link in virtual time, its sockets replaced: the autopilot, traffic, participants."""
 
 from __future__ import annotations
 
 import asyncio
-import random
-from contextlib import asynccontextmanager
-from itertools import pairwise
 
 import pytest
 
 from onboard.errors import LinkError
-from onboard.mavlink import connection as connection_module
 from onboard.mavlink.autopilot import (
     AutopilotFound,
     AutopilotRebooted,
@@ -20,214 +16,17 @@ from onboard.mavlink.autopilot import (
 )
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.connection import (
-    TRANSITIONS,
-    Backoff,
     ConnectionState,
 )
 from onboard.mavlink.dialect import mavlink
-from onboard.mavlink.endpoint import Endpoint, EndpointError
 from onboard.mavlink.limits import (
-    ASKING_S,
-    BACKOFF_BASE_S,
-    BACKOFF_CAP_S,
     HEARTBEAT_TIMEOUT_S,
-    LINGER_S,
-    SILENCE_S,
-    STABLE_S,
-    TICK_S,
 )
 from onboard.mavlink.link import Link
 from onboard.mavlink.streams import StreamRequest, Streams
-from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat, raw_imu
+from tests.mavlink.mavlink_peer import attitude, heartbeat, raw_imu
+from tests.mavlink.running_link import TCP, UDP, beat, events, running
 from tests.mavlink.virtual_time import virtual_time
-
-UDP = Endpoint.parse("udpin:127.0.0.1:14550")
-TCP = Endpoint.parse("tcp:127.0.0.1:5760")
-
-
-@pytest.fixture
-def air(monkeypatch):
-    air = FakeAir()
-    monkeypatch.setattr(connection_module, "open_transport", air.open)
-    return air
-
-
-@asynccontextmanager
-async def running(*endpoints, **kwargs):
-    """A link under way, with the events it emitted; stopped at the end."""
-    clock = asyncio.get_running_loop().time
-    kwargs = {"rng": random.Random(1), **kwargs}
-    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, **kwargs)
-    link.events = []
-    link.subscribe_events(lambda now, event: link.events.append(event))
-    task = asyncio.create_task(link.run())
-    await asyncio.sleep(0.01)
-    try:
-        yield link
-    finally:
-        link.close()
-        await task
-
-
-def events(link, kind):
-    return [event for event in link.events if isinstance(event, kind)]
-
-
-async def beat(transport, seconds, *messages):
-    """A heartbeat a second, and the messages with it."""
-    for _ in range(round(seconds)):
-        for message in (heartbeat(), *messages):
-            transport.say(message)
-        await asyncio.sleep(1.0)
-
-
-class TestPace:
-    """How long a message may wait for the sake of fewer wake-ups."""
-
-    @virtual_time
-    async def test_what_has_come_is_read_before_anything_is_said(self, air):
-        async with running(UDP):
-            (transport,) = air.transports
-            reads = []
-            write = transport.write
-            transport.write = lambda data, to=(): (reads.append(transport.reads), write(data, to))
-            transport.say(heartbeat())
-            await asyncio.sleep(10.0)
-            assert len(reads) >= 9
-            assert all(after > before for before, after in pairwise(reads))
-
-    @virtual_time
-    async def test_answers_are_not_left_lying(self, air):
-        async with running(UDP) as link:
-            (transport,) = air.transports
-            await beat(transport, 5.0)
-            assert transport.lingers[-1] > TICK_S  # the tick reads sooner
-            for message, brief in (
-                (mavlink.MAVLink_statustext_message(6, b"to whom it may concern"), False),
-                (mavlink.MAVLink_param_request_read_message(1, 1, b"INS_ACCSCAL_X", -1), True),
-            ):
-                link.send(message)
-                assert (transport.lingers[-1] == LINGER_S) == brief
-            await beat(transport, ASKING_S + 1.0)
-            assert transport.lingers[-1] > TICK_S
-
-    @virtual_time
-    async def test_nor_is_anything_while_a_push_is_under_way(self, air):
-        async with running(UDP) as link:
-            (transport,) = air.transports
-            link.presence.held = lambda: True
-            await beat(transport, 5.0)
-            assert transport.lingers[-1] == LINGER_S
-
-
-class TestConnection:
-    @virtual_time
-    async def test_refused_connections_are_tried_again_with_growing_jittered_waits(self, air):
-        air.failures = [ConnectionRefusedError(111, "Connection refused") for _ in range(60)]
-        async with running(TCP) as link:
-            await asyncio.sleep(800.0)
-            assert link.connections[0].connects >= 1
-            waits = [b - a for a, b in pairwise(air.opened_at[:61])]
-            assert all(wait <= BACKOFF_CAP_S + 1e-6 for wait in waits)
-            assert waits[0] <= 0.5 + 1e-6
-            assert max(waits) > 5.0
-
-    @virtual_time
-    async def test_after_a_connection_that_lasted_the_waits_begin_anew(self, air):
-        refused = ConnectionRefusedError(111, "Connection refused")
-        for lasted, most in ((STABLE_S + 1.0, BACKOFF_BASE_S), (0.1, BACKOFF_CAP_S)):
-            waits = []
-            for seed in range(20):
-                air.failures, air.transports[:], air.opened_at[:] = [refused] * 10, [], []
-                loop = asyncio.get_running_loop()
-                async with running(TCP, rng=random.Random(seed)):
-                    while not air.transports:
-                        await asyncio.sleep(0.1)
-                    await asyncio.sleep(lasted)
-                    air.transports[0].lost("gone")
-                    lost_at, tries = loop.time(), len(air.opened_at)
-                    while len(air.opened_at) == tries:
-                        await asyncio.sleep(0.01)
-                    waits.append(air.opened_at[-1] - lost_at)
-            assert max(waits) <= most
-            assert max(waits) > 0.5 * most
-
-    @virtual_time
-    async def test_a_broken_connection_comes_back_and_hears_again(self, air):
-        async with running(TCP) as link:
-            heard = []
-            link.subscribe(lambda now, message: heard.append(message), ["ATTITUDE"])
-            await beat(air.transports[0], 3)
-            air.transports[0].lost("closed by the other side")
-            await asyncio.sleep(1.0)
-            first, second = air.transports
-            assert first.closed
-            await beat(second, 1, attitude(5000))
-            assert len(heard) == 1
-            assert link.connections[0].connects == 2
-            assert link.connections[0].last_error == "closed by the other side"
-
-    @virtual_time
-    async def test_what_was_refused_or_not_sent_is_counted_beyond_a_reconnection(self, air):
-        async with running(UDP) as link:
-            connection = link.connections[0]
-            air.transports[0].refused, air.transports[0].dropped = 5, 3
-            connection.peers.refused = 2
-            assert (connection.refused, connection.dropped) == (7, 3)
-            air.failures = [ConnectionRefusedError(111, "Connection refused")] * 20
-            air.transports[0].lost("gone")
-            await asyncio.sleep(0.01)
-            assert (connection.refused, connection.dropped) == (7, 3)
-            connection.write(b"to nobody")
-            assert connection.dropped == 4
-            air.failures = []
-            await asyncio.sleep(2.0 * BACKOFF_CAP_S)
-            air.transports[1].refused = air.transports[1].dropped = 1
-            assert connection.refused == 8
-            assert connection.dropped >= 5  # and our own HEARTBEATs meanwhile
-
-    @virtual_time
-    async def test_a_line_gone_dead_is_opened_anew_but_udp_is_left_alone(self, air):
-        async with running(TCP, UDP):
-            await asyncio.sleep(SILENCE_S + 5.0)
-            assert [t.endpoint for t in air.transports] == [TCP, UDP, TCP]
-
-    @virtual_time
-    async def test_what_cannot_be_opened_at_all_ends_the_link(self, air):
-        air.failures = [EndpointError(f"{UDP}: port in use")]
-        link = Link([UDP], clock=asyncio.get_running_loop().time)
-        with pytest.raises(EndpointError, match="port in use"):
-            await link.run()
-
-    @virtual_time
-    async def test_once_up_even_that_is_tried_again(self, air):
-        async with running(TCP) as link:
-            air.failures = [EndpointError("no permission while udev sets the device up")]
-            air.transports[0].lost("unplugged")
-            await asyncio.sleep(20.0)
-            assert link.connections[0].is_up
-
-    @virtual_time
-    async def test_every_state_is_left_only_by_the_table(self, air):
-        states = []
-        async with running(TCP) as link:
-            states.append(link.connections[0].state)
-            link.subscribe_events(
-                lambda now, event: states.append(event.state) if hasattr(event, "state") else None
-            )
-            for _ in range(3):
-                air.transports[-1].lost("again")
-                await asyncio.sleep(30.0)
-        assert states[-1] is ConnectionState.CLOSED
-        for a, b in pairwise(states):
-            assert b in TRANSITIONS[a]
-
-    def test_backoff_is_full_jitter(self):
-        backoff = Backoff(random.Random(2))
-        for attempt in range(50):
-            assert 0.0 <= backoff.next() <= min(15.0, 0.5 * 2.0**attempt)
-        backoff.reset()
-        assert backoff.next() <= 0.5
 
 
 class TestAutopilot:
