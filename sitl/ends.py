@@ -6,6 +6,9 @@ taken off the flight instead: all of it would be flown lower than it was, and in
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from sitl.builtin.smoothing import Array
@@ -18,14 +21,24 @@ SINK_M_S = 1.5
 """Slow enough for its own downwash."""
 STEP_S = 0.1
 
+Way: TypeAlias = Callable[[Array, float], Array]
+"""Of what was flown until the end, (n, 4), and the height there, m: (k, 4) times after it and
+velocities, to where it stands on the ground."""
 
-def grounded(velocity: Array, heights: Array, flying_m_s: float) -> Array:
+
+def sinking(flown: Array, height: float) -> Array:
+    """A multicopter's way."""
+    return way_down(flown[-1, 1:], height)
+
+
+def grounded(velocity: Array, heights: Array, flying_m_s: float, way: Way = sinking) -> Array:
     """(k, 4) times and velocities from the ground to the ground.
 
     Args:
         velocity: (n, 4) s and NED m/s, as recorded.
         heights: (m, 2) s and m above any one level; over home, where it never stands.
         flying_m_s: speed from which on it flies.
+        way: by which it comes down.
     """
     if not len(heights):
         return velocity
@@ -39,11 +52,11 @@ def grounded(velocity: Array, heights: Array, flying_m_s: float) -> Array:
     parts = [velocity]
     if not stood:
         # The way up is a way down, backwards.
-        down = way_down(-velocity[0, 1:], first - ground)
+        down = way(-velocity[::-1], first - ground)
         back = np.column_stack([t[0] - down[:, 0], -down[:, 1:]])
         parts.insert(0, back[::-1])
     if not stands:
-        down = way_down(velocity[-1, 1:], last - ground)
+        down = way(velocity, last - ground)
         parts.append(np.column_stack([t[-1] + down[:, 0], down[:, 1:]]))
     return np.concatenate(parts)
 

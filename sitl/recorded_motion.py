@@ -20,8 +20,9 @@ from sitl.builtin.airframe.motion import Motion, leaning
 from sitl.builtin.smoothing import DT, Array, smooth
 from sitl.builtin.trajectory import Environment, Start, whole_samples
 from sitl.builtin.world import Vehicle
-from sitl.ends import grounded
+from sitl.ends import grounded, sinking
 from sitl.errors import SitlError
+from sitl.plane_ends import landing
 
 SMOOTHING_S = (0.2, 0.14, 0.1, 0.06)
 """Takes the steps out of 5 to 10 samples a second."""
@@ -80,12 +81,12 @@ def recorded_motion(path: str | Path, wind: tuple[float, float] = (0.0, 0.0)) ->
 
 
 def _motion(rows: _Rows, name: str, wind: tuple[float, float]) -> Motion:
-    velocity = np.array(_sorted(rows.velocity))
-    if not rows.plane:
-        heights = np.array(_sorted(rows.height)).reshape(-1, 2)
-        velocity = grounded(velocity, heights, FLYING["copter"])
+    recorded = np.array(_sorted(rows.velocity))
+    heights = np.array(_sorted(rows.height)).reshape(-1, 2)
+    flying = FLYING["plane" if rows.plane else "copter"]
+    velocity = grounded(recorded, heights, flying, landing if rows.plane else sinking)
     speed = np.linalg.norm(velocity[:, 1:], axis=1)
-    fast = velocity[speed > FLYING["plane" if rows.plane else "copter"], 0]
+    fast = velocity[speed > flying, 0]
     if not len(fast):
         raise SitlError(f"{name} never leaves the ground")
     lift_off, touch_down = float(fast[0]), float(fast[-1])
@@ -108,7 +109,9 @@ def _motion(rows: _Rows, name: str, wind: tuple[float, float]) -> Motion:
     if rows.plane:
         R_nb = rotation.from_euler(roll, pitch, heading)
         bank, slip = leaning(R_nb, v_n - np.array([*wind, 0.0]))
-        aloft = _smooth_in(~landed)
+        # Nobody has seen how it leans on a way of its own.
+        seen = (t >= recorded[0, 0]) & (t <= recorded[-1, 0])
+        aloft = _smooth_in(~landed & seen)
         bank, slip = np.unwrap(bank) * aloft, slip * aloft
     armed = (t >= lift_off - 3.0) & (t < touch_down + 3.0)
     start = Start(yaw=float(heading[0]))
