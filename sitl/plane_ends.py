@@ -15,7 +15,7 @@ from sitl.builtin.smoothing import Array
 
 STEP_S = 0.05
 SINK_M_S = 3.0
-"""At 15 m/s an eighth of the lift's way to a stall: any plane can, with its throttle, up or down."""
+"""A path of 11 degrees at 16 m/s, up or down."""
 PULL_M_S2 = 1.5
 """What that begins with: a sixth of the weight more or less to carry."""
 FLARE_M_S2 = 0.5
