@@ -17,10 +17,10 @@ from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.around import Around, around
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.quadrature import Around, Intervals, NodeMaker
+from onboard.core.model.quadrature import Intervals, NodeMaker
 from onboard.core.model.regressors import Model, SegmentRegressors
-from onboard.core.model.smoothing import mean_weights
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,12 +79,12 @@ def prepare(
     maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
     start, end, measured = _subdivide(epoch_t)
     intervals = maker.intervals(start, end)
-    around = maker.around(epoch_t, point.window, np.array(point.antenna))
-    regressors = model.regressors(intervals, around)
+    near = around(maker, epoch_t, point.window, np.array(point.antenna))
+    regressors = model.regressors(intervals, near)
     return Prepared(
         _steps(intervals, regressors),
         measured,
-        _epochs(segment, fixes, trusted, point, around, regressors),
+        _epochs(segment, fixes, trusted, point, near, regressors),
     )
 
 
@@ -120,14 +120,12 @@ def _epochs(
     fixes: Fixes,
     trusted: NDArray[np.bool_],
     point: Linearisation,
-    around: Around,
+    nodes: Around,
     c: SegmentRegressors,
 ) -> Epochs:
-    R_att, near = point.attitude(segment, around.now.t)
-    kappa = mean_weights(around.offset, point.window)
-    known = np.einsum("j,kja->ka", kappa, around.f_epoch)
-    known += around.swing @ segment.lever_arm_b
-    a_down = np.einsum("ka,ka->k", R_att[:, 2], around.now.f_b) + STANDARD_GRAVITY
+    R_att, near = point.attitude(segment, nodes.now.t)
+    known = nodes.averaged(point.window) + nodes.swing @ segment.lever_arm_b
+    a_down = np.einsum("ka,ka->k", R_att[:, 2], nodes.now.f_b) + STANDARD_GRAVITY
     known_height = -a_down * point.window**2 / 24.0 - R_att[:, 2] @ segment.lever_arm_b
     n, _, m = c.velocity_body.shape
     body, ned = np.zeros((n, 9, m + 1)), np.zeros((n, MEASURED, m + 1))
@@ -141,10 +139,10 @@ def _epochs(
     ned[:, H, 1:] = -c.position_ned[:, 2]
     ned[:, PSI, 1:] = c.attitude_ned
     noise = np.zeros((n, MEASURED))
-    rate = np.linalg.norm(around.now.w_b, axis=1)
+    rate = np.linalg.norm(nodes.now.w_b, axis=1)
     noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
     return Epochs(
-        np.ascontiguousarray(around.now.t),
+        np.ascontiguousarray(nodes.now.t),
         fixes.v_n,
         fixes.height,
         np.ascontiguousarray(fixes.latitude),

@@ -101,38 +101,31 @@ def _product(A: Array, B: Array, out: Array) -> None:
             out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
 
 
-@compiled("void(f8[:,:,::1], f8[::1], i8, f8[:,:,:,::1])")
-def turns_in_a_row(w: Array, h: Array, middle: int, P: Array) -> None:
-    """Attitude at nodes against that of the node ``middle``, into (K, M + 1, 3, 3).
+@compiled("void(f8[:,:,::1], f8[::1], f8[:,:,:,::1])")
+def turns_in_a_row(w: Array, h: Array, P: Array) -> None:
+    """Attitude at nodes against that of the first, into (K, M + 1, 3, 3).
 
     Args:
         w: (K, 2 M + 1, 3) rates at the nodes and half-way between them, rad/s.
         h: (K,) from node to node, s.
-        middle: number of the node that has the identity.
         P: written to.
     """
     K, M1 = P.shape[:2]
-    turns, back = np.empty((M1 - 1, 3, 3)), np.empty((3, 3))
+    turn = np.empty((3, 3))
     for k in range(K):
         sixth, twelfth = h[k] / 6.0, h[k] * h[k] / 12.0
+        for r in range(3):
+            for c in range(3):
+                P[k, 0, r, c] = 1.0 if r == c else 0.0
         for i in range(M1 - 1):
             a, m, b = w[k, 2 * i], w[k, 2 * i + 1], w[k, 2 * i + 2]
             _turn(
                 sixth * (a[0] + 4.0 * m[0] + b[0]) + twelfth * (a[1] * b[2] - a[2] * b[1]),
                 sixth * (a[1] + 4.0 * m[1] + b[1]) + twelfth * (a[2] * b[0] - a[0] * b[2]),
                 sixth * (a[2] + 4.0 * m[2] + b[2]) + twelfth * (a[0] * b[1] - a[1] * b[0]),
-                turns[i],
+                turn,
             )
-        for r in range(3):
-            for c in range(3):
-                P[k, middle, r, c] = 1.0 if r == c else 0.0
-        for i in range(middle, M1 - 1):
-            _product(P[k, i], turns[i], P[k, i + 1])
-        for i in range(middle - 1, -1, -1):
-            for r in range(3):
-                for c in range(3):
-                    back[r, c] = turns[i, c, r]
-            _product(P[k, i + 1], back, P[k, i])
+            _product(P[k, i], turn, P[k, i + 1])
 
 
 @compiled("void(f8[:,:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[:,:,::1], f8[:,:,::1])")

@@ -6,9 +6,9 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.model.quadrature import Around, Signals
+from onboard.core.model.around import Around
+from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
-from onboard.core.model.smoothing import mean_slope, second_difference
 
 AXIS = "xyz"
 ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
@@ -107,9 +107,8 @@ class GpsSmoothing(Family):
         A filter that looks back (every real one) is not symmetric about its delay; its third
         central moment would otherwise be taken for delay where the manoeuvre is quick.
         """
-        slope = mean_slope(around.offset, self.taken)
-        third = second_difference(around.offset, self.taken) / 6.0
-        return Direct(body=np.einsum("mj,kja->kam", np.stack([slope, third]), around.f_antenna))
+        third = around.second_derivative(self.taken) / 6.0
+        return Direct(body=np.stack([around.slope(self.taken), third], axis=-1))
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span."""

@@ -1,4 +1,4 @@
-"""Quadrature nodes: signals and relative attitude inside and around GPS epochs.
+"""Quadrature nodes: signals and relative attitude between GPS epochs.
 
 Everything that is integrated between two GPS epochs is needed at a few equidistant nodes, in the
 body axes *of the interval's start*: ``P(tau) = R_nb(start)^T R_nb(tau)`` follows from the
@@ -8,6 +8,7 @@ NED when the filter, going through the epochs, knows ``R_nb(start)``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,19 +17,13 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
-from onboard.core.model.smoothing import mean_now
 
-AROUND_SPAN_S = 0.44
-"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s."""
-AROUND_COUNT = 14
-"""Fewest nodes to either side: 31 ms apart, within which a manoeuvre of 2 Hz bends by 2 %."""
 NODES_PER_SAMPLE = 1.5
 """Of the samples' rate, at least: what vibrates at up to half of it is then resolved and cancels,
 as it does in the sum of the samples.  Nodes as far apart as the samples would take it for slow
 [physics; 2, 3 and 4 give the same answers to a hundredth of a sigma]."""
-
-EPOCHS_AT_ONCE = 16
-"""Of which all nodes are in memory together: a megabyte at 200 Hz [cost]."""
+SHORT_ROW = 32
+"""Turns that are multiplied one after the other, where numpy does it [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,69 +98,6 @@ class Intervals:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Around:
-    """Nodes around K epochs, for what a receiver averages.
-
-    Attributes:
-        offset: (2 J + 1,) s.
-        f_epoch: (K, 2 J + 1, 3) specific force in the body axes of the epoch.
-        f_antenna: (K, 2 J + 1, 3) the same at the antenna, whose velocity it is that a receiver
-            averages and reports late.
-        f_mean: (K, 3) its mean over the span that the receiver averages: what the reported velocity
-            changes by, per s.
-        now: signals at the epochs, S = (K,).
-        swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
-            span that it averages, body axes of the epoch, 1/s.
-    """
-
-    offset: Array
-    f_epoch: Array
-    f_antenna: Array
-    f_mean: Array
-    now: Signals
-    swing: Array
-
-
-def lever_velocity(w_b: Array) -> Array:
-    """(K, 3, 3) columns ``w x e_i``, 1/s: a rigid body's velocity per m of lever arm.
-
-    Args:
-        w_b: (K, 3) rate, rad/s.
-    """
-    out: Array = np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
-    return out
-
-
-def _swing(offset: Array, P: Array, w_b: Array, window: float) -> Array:
-    """Mean of ``d P / dt`` over the span: ``(P(window/2) - P(-window/2)) / window``.
-
-    Args:
-        offset: (n,) of the nodes, s.
-        P: (K, n, 3, 3) attitude there against that of the epoch.
-        w_b: (K, 3) rate at the epoch.
-        window: s; below two nodes the rate at the epoch does.
-    """
-    step = float(offset[1] - offset[0])
-    if window < 2.0 * step:
-        return lever_velocity(w_b)
-    at = (min(window / 2.0, float(offset[-1])) - offset[0]) / step
-    low = min(int(at), len(offset) - 2)
-    share = at - low
-    after = (1.0 - share) * P[:, low] + share * P[:, low + 1]
-    before = (1.0 - share) * P[:, -1 - low] + share * P[:, -2 - low]
-    out: Array = (after - before) / (2.0 * (offset[0] + at * step))
-    return out
-
-
-def _second_derivative(offset: Array, P: Array) -> Array:
-    """(K, n, 3, 3) of the attitude at the nodes, 1/s^2: acceleration per m of lever arm."""
-    out = np.empty_like(P)
-    out[:, 1:-1] = (P[:, 2:] - 2.0 * P[:, 1:-1] + P[:, :-2]) / float(offset[1] - offset[0]) ** 2
-    out[:, 0], out[:, -1] = out[:, 1], out[:, -2]
-    return out
-
-
 def gregory_weights(count: int) -> Array:
     """(count + 1,) weights of Gregory's rule on [0, 1], exact for cubics; ``count`` is 4 or more.
 
@@ -199,33 +131,37 @@ def rotation_increments(w: Array, h: Array) -> Array:
     return out
 
 
-def turns_in_a_row(w_b: Array, h: Array, middle: int = 0) -> Array:
-    """Attitude at nodes against that of one of them.
+def turns_in_a_row(w_b: Array, h: Array) -> Array:
+    """Attitude at nodes against that of the first of them.
 
     Args:
         w_b: (K, 2 M + 1, 3) rates at the nodes and half-way between them, rad/s.
         h: (K,) from node to node, s.
-        middle: number of the node that the others are held against.
 
     Returns:
-        (K, M + 1, 3, 3) body axes at the node to those at node ``middle``.
+        (K, M + 1, 3, 3) body axes at the node to those at the first.
     """
     loops = compiled_loops()
     if loops is not None:
         P = np.empty((len(h), w_b.shape[1] // 2 + 1, 3, 3))
-        loops.turns_in_a_row(plain(w_b), plain(h), middle, P)
+        loops.turns_in_a_row(plain(w_b), plain(h), P)
         return P
-    turns = rotation_from_vector(rotation_increments(w_b, h))
-    after = _chain(turns[:, middle:])
-    if middle == 0:
-        return after
-    back = _chain(np.swapaxes(turns[:, :middle], -1, -2)[:, ::-1])
-    return np.concatenate([back[:, :0:-1], after], axis=1)
+    return _chain(rotation_from_vector(rotation_increments(w_b, h)))
 
 
 def _chain(turns: Array) -> Array:
     """Running products (K, M + 1, 3, 3) of ``turns`` (K, M, 3, 3), the identity first."""
     K, M = turns.shape[:2]
+    if (
+        M > SHORT_ROW and K * K < M
+    ):  # a long row in pieces that are as many as they are long, side by side
+        long = math.isqrt(M - 1) + 1
+        pieces = np.zeros((K, -(-M // long) * long, 3, 3)) + np.eye(3)
+        pieces[:, :M] = turns
+        own = _chain(pieces.reshape(-1, long, 3, 3)).reshape(K, -1, long + 1, 3, 3)
+        begun = _chain(own[:, :, -1])
+        whole = (begun[:, :-1, None] @ own[:, :, :-1]).reshape(K, -1, 3, 3)
+        return np.concatenate([whole, begun[:, -1:]], axis=1)[:, : M + 1]
     P = np.empty((K, M + 1, 3, 3))
     P[:, 0] = np.eye(3)
     for i in range(M):
@@ -247,75 +183,39 @@ class NodeMaker:
             six: (6,) scale and ``beta = -scale * offset`` of the linearisation.
             recorded_attitude: relative attitude from the recorded one instead of the gyroscope.
         """
-        self._segment = segment
+        self.segment = segment
         self._bias = bias_b
         self._six = six
-        self._recorded = recorded_attitude
+        self.recorded = recorded_attitude
         self._at = segment.interpolant()
-        self._rate = (len(segment.t) - 1) / (segment.t[-1] - segment.t[0])
+        self.rate = float((len(segment.t) - 1) / (segment.t[-1] - segment.t[0]))
 
     def signals(self, t: Array) -> Signals:
         """Signals at times ``t`` of any shape."""
         x = self._at(t)
         raw = x[..., 3:]
-        f_b = (raw * self._six[:3] + self._six[3:]) @ self._segment.R_bs.T
-        return Signals(t, x[..., :3] - self._bias, raw, f_b, self._segment)
+        f_b = (raw * self._six[:3] + self._six[3:]) @ self.segment.R_bs.T
+        return Signals(t, x[..., :3] - self._bias, raw, f_b, self.segment)
 
     def intervals(self, start: Array, end: Array) -> Intervals:
         """Nodes in the intervals ``start`` ... ``end`` (K,), as dense as the samples or denser."""
         T = end - start
-        density = NODES_PER_SAMPLE * self._rate
+        density = NODES_PER_SAMPLE * self.rate
         M = max(4, int(np.ceil(density * float(T.max()))))
         share = np.arange(2 * M + 1) / (2.0 * M)
         fine = self.signals(start[:, None] + T[:, None] * share)
         t = fine.t[:, ::2]
-        if self._recorded:
-            R = self._attitude(t)
+        if self.recorded:
+            R = self.recorded_attitude(t)
             P = np.swapaxes(R[:, :1], -1, -2) @ R
         else:
             P = turns_in_a_row(fine.w_b, T / M)
-        coarse = Signals(
-            t, fine.w_b[:, ::2], fine.raw_s[:, ::2], fine.f_b[:, ::2], self._segment, P
-        )
+        coarse = Signals(t, fine.w_b[:, ::2], fine.raw_s[:, ::2], fine.f_b[:, ::2], self.segment, P)
         weight = gregory_weights(M) * T[:, None]
         to_end = weight * (1.0 - share[::2]) * T[:, None]
         return Intervals(coarse, P, T, weight, to_end)
 
-    def around(self, epoch: Array, window: float = 0.0, antenna: Array | None = None) -> Around:
-        """Nodes around epochs.
-
-        Args:
-            epoch: (K,) s.
-            window: over which the receiver averages, s.
-            antenna: (3,) lever arm beyond the segment's own, body axes, m; None: none.
-        """
-        J = max(AROUND_COUNT, int(np.ceil(NODES_PER_SAMPLE * self._rate * AROUND_SPAN_S)))
-        offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * J + 1)
-        lever = self._segment.lever_arm_b + (0.0 if antenna is None else antenna)
-        parts = [
-            self._around(epoch[i : i + EPOCHS_AT_ONCE], offset, window, lever)
-            for i in range(0, len(epoch), EPOCHS_AT_ONCE)
-        ]
-        f_epoch, f_antenna, swing = map(np.concatenate, zip(*parts, strict=True))
-        f_mean = np.einsum("j,kja->ka", mean_now(offset, window), f_antenna)
-        return Around(offset, f_epoch, f_antenna, f_mean, self.signals(epoch), swing)
-
-    def _around(
-        self, epoch: Array, offset: Array, window: float, lever: Array
-    ) -> tuple[Array, Array, Array]:
-        """``f_epoch``, ``f_antenna`` and ``swing`` of some epochs."""
-        J = len(offset) // 2
-        halves = np.linspace(offset[0], offset[-1], 4 * J + 1)
-        fine = self.signals(epoch[:, None] + halves)
-        if self._recorded:
-            R = self._attitude(fine.t[:, ::2])
-            P = np.swapaxes(R[:, J : J + 1], -1, -2) @ R
-        else:
-            P = turns_in_a_row(fine.w_b, np.full(len(epoch), offset[1] - offset[0]), J)
-        f_epoch = (P @ fine.f_b[:, ::2, :, None])[..., 0]
-        f_antenna = f_epoch + _second_derivative(offset, P) @ lever
-        return f_epoch, f_antenna, _swing(offset, P, fine.w_b[:, 2 * J], window)
-
-    def _attitude(self, t: Array) -> Array:
-        flat = interpolate_rotation(t.ravel(), self._segment.t_attitude, self._segment.R_attitude)
+    def recorded_attitude(self, t: Array) -> Array:
+        """(*S, 3, 3) at times ``t`` of shape S, straight arcs between its samples."""
+        flat = interpolate_rotation(t.ravel(), self.segment.t_attitude, self.segment.R_attitude)
         return flat.reshape(*t.shape, 3, 3)

@@ -25,7 +25,8 @@ import numpy as np
 
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
-from onboard.core.model.quadrature import Around, Intervals, Signals
+from onboard.core.model.around import Around
+from onboard.core.model.quadrature import Intervals, Signals
 from onboard.errors import OnboardError
 
 

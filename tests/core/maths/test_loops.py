@@ -9,6 +9,7 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
+from onboard.core.model.around import around
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.physics.effects.accelerometer_hysteresis import PLAYS, _dragged
 from tests.core.compiled import both_ways
@@ -83,9 +84,9 @@ def test_nodes_and_integrals_are_the_same(seed):
     def made():
         maker = NodeMaker(flown, np.array([0.01, -0.02, 0.03]), six)
         inside = maker.intervals(start[:-1], start[1:])
-        around = maker.around(start, 0.2, np.array([0.1, 0.0, -0.2]))
+        near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]))
         force = inside.signals.f_b[..., None] * x
-        return (inside.P, *inside.integrals(force), around.f_antenna, around.swing)
+        return (inside.P, *inside.integrals(force), near.averaged(0.2), near.slope(0.2), near.swing)
 
     for one, other in zip(*both_ways(made), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.segments import Segment
+from onboard.core.model.around import around
 from onboard.core.model.nuisances import (
     GyroScale,
     GyroTiming,
@@ -75,7 +76,7 @@ def made():
     segment = Segment(t, rate(t), raw(t), T[::20], TRUE[::20], np.eye(3))
     maker = NodeMaker(segment, np.zeros(3), SIX)
     intervals = maker.intervals(np.array([START]), np.array([END]))
-    return intervals, maker.around(np.array([EPOCH]))
+    return intervals, around(maker, np.array([EPOCH]))
 
 
 def columns(made, family):

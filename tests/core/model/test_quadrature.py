@@ -11,18 +11,10 @@ from onboard.core.inputs.tracks import untruncated
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
 from onboard.core.model.quadrature import (
-    AROUND_COUNT,
-    AROUND_SPAN_S,
     NodeMaker,
     gregory_weights,
     rotation_increments,
-)
-from onboard.core.model.smoothing import (
-    box_weights,
-    mean_now,
-    mean_slope,
-    mean_weights,
-    second_difference,
+    turns_in_a_row,
 )
 
 NOMINAL = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -122,6 +114,15 @@ def test_attitude_inside_an_interval_is_that_of_the_closed_form(recorded):
     assert np.abs(made.P - true).max() < tolerance
 
 
+def test_a_long_row_of_turns_is_what_its_steps_make():
+    h = 0.01
+    t = 0.5 * h * np.arange(2 * 500 + 1)
+    row = turns_in_a_row(rates(t)[None], np.full(1, h))[0]
+    true = attitude(t[:1])[0].T @ attitude(t[::2])
+    assert row.shape == true.shape
+    assert np.abs(row - true).max() < 1e-6
+
+
 @pytest.mark.parametrize("rate", [50.0, 200.0])
 def test_integrals_are_those_of_a_fine_integration(rate):
     start = np.array([0.0, 0.7, 1.9, 3.1])
@@ -135,16 +136,6 @@ def test_integrals_are_those_of_a_fine_integration(rate):
         x = np.trapezoid((begin + T - t)[:, None] * a, t, axis=0)
         np.testing.assert_allclose(once[k, :, 0], v, atol=2e-5)
         np.testing.assert_allclose(twice[k, :, 0], x, atol=4e-6)
-
-
-def test_around_an_epoch_forces_are_in_its_axes():
-    epoch = np.array([0.4, 1.5, 2.6])
-    made = maker(100.0).around(epoch)
-    t = epoch[:, None] + made.offset
-    true = np.einsum("kji,kmjl,kml->kmi", attitude(epoch), attitude(t), force(t))
-    assert np.abs(made.f_epoch - true).max() < 2e-4
-    np.testing.assert_allclose(made.now.t, epoch)
-    assert np.abs(made.now.f_b - force(epoch)).max() < 2e-4
 
 
 @pytest.mark.parametrize("count", [8, 9, 30, 41])
@@ -170,19 +161,6 @@ def test_vibration_below_half_the_rate_of_the_samples_is_no_slow_force(frequency
     assert np.abs(gained).max() < 2.0 / 3.0 * swing / (1.5 * rate)
 
 
-@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45, 0.8])
-@pytest.mark.parametrize("recorded", [False, True])
-def test_a_lever_arm_is_seen_as_the_receiver_averages_it(window, recorded):
-    """Against the mean of ``R (w x arm)`` over the span, by brute force."""
-    epoch, arm = np.array([0.4, 1.5, 2.6]), np.array([0.5, -0.3, 0.8])
-    made = maker(100.0, recorded=recorded).around(epoch, window)
-    for k, t in enumerate(epoch):
-        fine = t + np.linspace(-window / 2, window / 2, 2001)
-        swing = np.einsum("nij,nj->ni", attitude(fine), np.cross(rates(fine), arm))
-        mean = attitude(epoch[k : k + 1])[0].T @ swing.mean(axis=0)
-        np.testing.assert_allclose(made.swing[k] @ arm, mean, atol=4e-3)
-
-
 def test_bias_is_subtracted_and_the_six_applied():
     t = jittered(100.0)
     six = np.array([1.1, 0.9, 1.2, 0.3, -0.2, 0.1])
@@ -199,78 +177,6 @@ def test_gregory_is_exact_for_cubics(count):
     x = np.linspace(0.0, 1.0, count + 1)
     for power in range(4):
         assert gregory_weights(count) @ x**power == pytest.approx(1.0 / (power + 1))
-
-
-@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.2, 0.346, 0.45, 0.8])
-def test_smoothing_is_the_average_of_the_velocity(window):
-    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
-    for frequency, phase in ((3.0, 0.3), (6.0, 1.1)):
-        fine = np.linspace(-window / 2, window / 2, 20001)
-        mean = np.mean(-np.cos(frequency * fine + phase) / frequency) if window else 0.0
-        now = -np.cos(phase) / frequency if window else 0.0
-        got = mean_weights(offset, window) @ np.sin(frequency * offset + phase)
-        assert got == pytest.approx(mean - now, abs=2e-4)
-
-
-@pytest.mark.parametrize("window", [0.15, 0.3, 0.42])
-def test_smoothing_slope_is_its_derivative(window):
-    offset = np.linspace(-0.25, 0.25, 17)
-    a, step = np.sin(4.0 * offset + 0.5), 0.03
-
-    def at(square):
-        return mean_weights(offset, np.sqrt(square)) @ a
-
-    numeric = (at(window**2 + step**2) - at(window**2 - step**2)) / (2 * step**2)
-    assert mean_slope(offset, window) @ a == pytest.approx(numeric, rel=0.05)
-
-
-def test_smoothing_slope_of_a_short_window_is_the_second_derivative():
-    offset = np.linspace(-0.25, 0.25, 17)
-    # V = t^3 / 6 + t^2 / 2 + ...: V'' = a' is 1 everywhere, at 1/24 per s^2 of window^2.
-    assert mean_slope(offset, 0.0) @ (offset + 3.0) == pytest.approx(1.0 / 24.0, rel=1e-2)
-
-
-def test_second_difference_is_exact_for_parabolas():
-    offset = np.linspace(-0.25, 0.25, 17)
-    assert second_difference(offset) @ (3.0 * offset**2 - offset + 7.0) == pytest.approx(6.0)
-
-
-@pytest.mark.parametrize("window", [0.2, 0.5])
-def test_second_difference_of_an_averaged_signal_is_the_average_of_its_own(window):
-    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
-    quartic = second_difference(offset, window) @ offset**4
-    narrow = second_difference(offset) @ offset**4
-    # Mean of 12 s^2 over the span, and what straight lines between nodes add to a curve.
-    step = offset[1] - offset[0]
-    assert quartic - narrow == pytest.approx(window**2 + 2.0 * step**2, rel=0.02)
-
-
-@pytest.mark.parametrize(("centre", "width"), [(0.0, 0.3), (0.1, 0.05), (-0.2, 0.013), (0.02, 0.0)])
-def test_box_weights_are_the_mean_of_straight_lines(centre, width):
-    offset = np.linspace(-0.44, 0.44, 29)
-    y = np.random.default_rng(1).normal(size=29)
-    fine = np.linspace(centre - width / 2, centre + width / 2, 200_001)
-    mean = float(np.mean(np.interp(fine, offset, y)))
-    assert box_weights(offset, centre, width) @ y == pytest.approx(mean, abs=1e-4)
-
-
-@pytest.mark.parametrize("window", [0.1, 0.35, 0.66])
-def test_an_averaged_velocity_changes_by_its_averaged_acceleration(window):
-    """Also where the acceleration is mostly vibration, of which the average knows nothing."""
-    offset = np.linspace(-AROUND_SPAN_S, AROUND_SPAN_S, 2 * AROUND_COUNT + 1)
-    a = np.sin(3.0 * offset) + 2.0 * np.random.default_rng(2).normal(size=len(offset))
-    fine = np.linspace(offset[0], offset[-1], 40_001)
-    step = fine[1] - fine[0]
-    gained = np.interp(0.5 * (fine[1:] + fine[:-1]), offset, a) * step
-    v = np.concatenate([[0.0], np.cumsum(gained)])
-
-    def mean(at):
-        s = np.linspace(at - window / 2, at + window / 2, 4001)
-        return np.trapezoid(np.interp(s, fine, v), s) / window
-
-    e = 1e-4
-    numeric = (mean(e) - mean(-e)) / (2.0 * e)
-    assert mean_now(offset, window) @ a == pytest.approx(numeric, abs=1e-3)
 
 
 @pytest.mark.parametrize("period", [0.1, 0.2, 0.125])

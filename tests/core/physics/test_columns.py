@@ -12,6 +12,7 @@ import pytest
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.model.around import around
 from onboard.core.model.nuisances import (
     AttitudeOffset,
     GpsLatency,
@@ -71,14 +72,14 @@ def nodes_of(f_read, told=(0.0, 0.0, 0.0), found=(0.0, 0.0, 0.0), averaged=0.0):
         T[step], W[step], f_read[step], T[step], R[step], np.eye(3), slow, np.array(told)
     )
     made = NodeMaker(segment, np.zeros(3), NOMINAL)
-    around = made.around(EPOCHS, averaged, np.array(found))
-    return made.intervals(EPOCHS[:-1], EPOCHS[1:]), around
+    near = around(made, EPOCHS, averaged, np.array(found))
+    return made.intervals(EPOCHS[:-1], EPOCHS[1:]), near
 
 
 def columns_of(family, f_read=F, **arm):
-    intervals, around = nodes_of(f_read, **arm)
-    assert family.available(around.now)
-    return Model([family]).regressors(intervals, around)
+    intervals, near = nodes_of(f_read, **arm)
+    assert family.available(near.now)
+    return Model([family]).regressors(intervals, near)
 
 
 def gained(a_b):

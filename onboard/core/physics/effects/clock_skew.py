@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.model.quadrature import Around
+from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import Bearing, Effect

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from onboard.core.model.quadrature import Around
+from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import AXES, Bearing, Cure, Effect
 from onboard.core.physics.finding import Finding

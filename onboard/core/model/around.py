@@ -1,0 +1,158 @@
+"""What a receiver that averages sees around GPS epochs.
+
+All of it are differences of what a segment's force gains and of how its attitude turns, so both are
+followed once through the segment, in the body axes of its first node, and asked at each epoch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.model.quadrature import (
+    NODES_PER_SAMPLE,
+    NodeMaker,
+    Signals,
+    turns_in_a_row,
+)
+from onboard.core.model.smoothing import Gained
+
+AROUND_SPAN_S = 0.44
+"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s."""
+FEWEST = 14
+"""Pairs of nodes in that time: 31 ms each, within which a manoeuvre of 2 Hz bends by 2 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """K epochs and what is around them.
+
+    Attributes:
+        now: signals at the epochs, S = (K,).
+        R: (K, 3, 3) body axes of the epoch to those of the segment's first node.
+        force: specific force in the axes of the first node, integrated.
+        antenna: the same at the antenna, whose velocity it is that a receiver averages and reports
+            late.
+        window: over which the receiver averages, s.
+        swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
+            span that it averages, body axes of the epoch, 1/s.
+    """
+
+    now: Signals
+    R: Array
+    force: Gained
+    antenna: Gained
+    window: float
+    swing: Array
+
+    @property
+    def f_mean(self) -> Array:
+        """(K, 3) mean of the force at the antenna: what the reported velocity changes by, per s."""
+        return self._own(self.antenna.mean(self.now.t, self.window))
+
+    def averaged(self, window: float) -> Array:
+        """(K, 3) ``mean(V) - V`` of the force over ``window`` (s), axes of the epoch, m/s."""
+        return self._own(self.force.averaged(self.now.t, window))
+
+    def slope(self, window: float) -> Array:
+        """(K, 3) derivative of the same, at the antenna, to ``window^2``, m/s^3."""
+        return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))
+
+    def second_derivative(self, window: float) -> Array:
+        """(K, 3) of the averaged force at the antenna, axes of the epoch, m/s^4."""
+        return self._own(self.antenna.second_derivative(self.now.t, window, 2.0 * AROUND_SPAN_S))
+
+    def _own(self, x: Array) -> Array:
+        """In the body axes of the epochs."""
+        out: Array = (x[:, None] @ self.R)[:, 0]
+        return out
+
+
+def around(
+    maker: NodeMaker, epoch: Array, window: float = 0.0, antenna: Array | None = None
+) -> Around:
+    """What is around epochs.
+
+    Args:
+        maker: of the segment's nodes.
+        epoch: (K,) s, in order.
+        window: over which the receiver averages, s.
+        antenna: (3,) lever arm beyond the segment's own, body axes, m; None: none.
+    """
+    followed = _Followed(maker, float(epoch[0]), float(epoch[-1]))
+    lever = maker.segment.lever_arm_b + (0.0 if antenna is None else antenna)
+    force = followed.gained(followed.force)
+    there = followed.gained(followed.force + followed.swung(lever))
+    now = maker.signals(epoch)
+    R = followed.attitude(epoch)
+    return Around(now, R, force, there, window, followed.swing(now, R, window))
+
+
+def lever_velocity(w_b: Array) -> Array:
+    """(K, 3, 3) columns ``w x e_i``, 1/s: a rigid body's velocity per m of lever arm.
+
+    Args:
+        w_b: (K, 3) rate, rad/s.
+    """
+    out: Array = np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
+    return out
+
+
+class _Followed:
+    """Attitude and force of a segment at even nodes, in the axes of the first."""
+
+    def __init__(self, maker: NodeMaker, first: float, last: float) -> None:
+        """Follow them from before the epoch ``first`` until after ``last``, s."""
+        self._maker = maker
+        # Twice as many as between epochs, for those lie anywhere between these.
+        pairs = max(FEWEST, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_SPAN_S)))
+        self._step = AROUND_SPAN_S / (2 * pairs)
+        self._start = first - AROUND_SPAN_S - self._step
+        count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 1
+        t = np.linspace(self._start, self._start + count * self._step, 2 * count + 1)
+        fine = maker.signals(t)
+        if maker.recorded:
+            self._R = maker.recorded_attitude(t[::2])
+        else:
+            self._R = turns_in_a_row(fine.w_b[None], np.full(1, self._step))[0]
+        self.force = (self._R @ fine.f_b[::2, :, None])[..., 0]
+
+    def gained(self, a: Array) -> Gained:
+        """Integrals of an acceleration (n, 3) at the nodes."""
+        return Gained(self._start, self._step, a)
+
+    def swung(self, lever: Array) -> Array:
+        """(n, 3) acceleration of the end of a lever arm (3,), body axes, m: second differences."""
+        place = self._R @ lever
+        out = np.empty_like(place)
+        out[1:-1] = (place[2:] - 2.0 * place[1:-1] + place[:-2]) / self._step**2
+        out[0], out[-1] = out[1], out[-2]
+        return out
+
+    def attitude(self, t: Array) -> Array:
+        """(k, 3, 3) at times ``t`` (k,): of the node before, turned at the rate half-way."""
+        if self._maker.recorded:
+            return self._maker.recorded_attitude(t)
+        i = ((t - self._start) / self._step).astype(int)
+        node = self._start + i * self._step
+        w = self._maker.signals(0.5 * (t + node)).w_b
+        out: Array = self._R[i] @ rotation_from_vector(w * (t - node)[:, None])
+        return out
+
+    def swing(self, now: Signals, R: Array, window: float) -> Array:
+        """Mean of ``d R / dt`` over the span: ``(R(window/2) - R(-window/2)) / window``.
+
+        Args:
+            now: signals at the epochs.
+            R: (K, 3, 3) attitude at the epochs.
+            window: s; below two nodes the rate at the epoch does.
+        """
+        if window < 2.0 * self._step:
+            return lever_velocity(now.w_b)
+        half = min(window / 2.0, AROUND_SPAN_S)
+        change = self.attitude(now.t + half) - self.attitude(now.t - half)
+        out: Array = np.swapaxes(R, -1, -2) @ change / (2.0 * half)
+        return out

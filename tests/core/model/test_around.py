@@ -1,0 +1,145 @@
+"""What a receiver that averages sees around epochs, against brute force."""
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.segments import Segment
+from onboard.core.model.around import AROUND_SPAN_S, around
+from onboard.core.model.quadrature import NodeMaker
+from onboard.core.model.smoothing import RESOLVED_S, Gained
+from tests.core.model.test_quadrature import NOMINAL, attitude, force, maker, rates
+
+EPOCH = np.array([0.4, 1.5, 2.6])
+LONGEST = 2.0 * AROUND_SPAN_S
+
+
+def gained(a, seconds=2.0, step=0.01):
+    """Of a force along x, a function of time, around one second."""
+    t = step * np.arange(round(seconds / step) + 1)
+    return Gained(0.0, step, np.stack([a(t - 1.0), 0.0 * t, 0.0 * t], axis=-1))
+
+
+def at(x):
+    """Of the moment of one second, x."""
+    return x[0, 0]
+
+
+NOW = np.array([1.0])
+
+
+def in_axes_of(epochs, span):
+    """Force around each of the epochs in its axes: (K, n, 3), and the times (n,) about them."""
+    s = np.linspace(-span / 2, span / 2, 2001)
+    turned = np.swapaxes(attitude(epochs)[:, None], -1, -2) @ attitude(epochs[:, None] + s)
+    return s, (turned @ force(epochs[:, None] + s)[..., None])[..., 0]
+
+
+@pytest.mark.parametrize("window", [0.1, 0.31, 0.8])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_forces_are_averaged_in_the_axes_of_the_epoch(window, recorded):
+    made = around(maker(100.0, recorded=recorded), EPOCH, window)
+    s, f = in_axes_of(EPOCH, window)
+    np.testing.assert_allclose(made.f_mean, np.trapezoid(f, s, axis=1) / window, atol=2e-3)
+    v = np.concatenate([np.zeros((3, 1, 3)), np.cumsum(0.5 * (f[:, 1:] + f[:, :-1]), axis=1)], 1)
+    v *= s[1] - s[0]
+    mean = np.trapezoid(v, s, axis=1) / window - v[:, len(s) // 2]
+    np.testing.assert_allclose(made.averaged(window), mean, atol=1e-4)
+    np.testing.assert_allclose(made.now.f_b, force(EPOCH), atol=2e-4)
+
+
+@pytest.mark.parametrize("frequency", [30.0, 40.0, 45.0])
+@pytest.mark.parametrize("window", [0.0, 0.2, 0.45])
+def test_vibration_is_averaged_away(frequency, window):
+    """Below half the rate of the samples it is resolved, whatever the phase of the epochs."""
+    rate, swing = 100.0, 10.0
+    t = np.arange(0.0, 20.0, 1.0 / rate) - 1.0
+    shaken = np.zeros((len(t), 3))
+    shaken[:, 2] = swing * np.sin(2.0 * np.pi * frequency * t + 0.3)
+    level = np.broadcast_to(np.eye(3), (len(t), 3, 3))
+    nodes = NodeMaker(Segment(t, 0.0 * shaken, shaken, t, level, np.eye(3)), np.zeros(3), NOMINAL)
+    made = around(nodes, np.arange(0.0033, 18.0, 0.2), window)
+    # A sine's mean is at most its swing over half its phase; its integral over the whole of it.
+    most = swing / (np.pi * frequency)
+    assert np.abs(made.averaged(window)).max() < most / 2.0 * (1.0 + most / swing)
+    if window:
+        assert np.abs(made.f_mean).max() < most / window
+    assert np.abs(made.slope(window)).max() < most / max(window, RESOLVED_S) ** 2
+
+
+@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45, 0.8])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_lever_arm_is_seen_as_the_receiver_averages_it(window, recorded):
+    """Against the mean of ``R (w x arm)`` over the span, by brute force."""
+    arm = np.array([0.5, -0.3, 0.8])
+    made = around(maker(100.0, recorded=recorded), EPOCH, window)
+    for k, t in enumerate(EPOCH):
+        fine = t + np.linspace(-window / 2, window / 2, 2001)
+        swing = np.einsum("nij,nj->ni", attitude(fine), np.cross(rates(fine), arm))
+        mean = attitude(EPOCH[k : k + 1])[0].T @ swing.mean(axis=0)
+        np.testing.assert_allclose(made.swing[k] @ arm, mean, atol=4e-3)
+
+
+@pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.2, 0.346, 0.45, 0.8])
+def test_smoothing_is_the_average_of_the_velocity(window):
+    for frequency, phase in ((3.0, 0.3), (6.0, 1.1)):
+        fine = np.linspace(-window / 2, window / 2, 20001)
+        mean = np.mean(-np.cos(frequency * fine + phase) / frequency) if window else 0.0
+        now = -np.cos(phase) / frequency if window else 0.0
+        got = gained(lambda t, f=frequency, p=phase: np.sin(f * t + p)).averaged(NOW, window)
+        assert at(got) == pytest.approx(mean - now, abs=2e-4)
+
+
+@pytest.mark.parametrize("window", [1e-9, 1e-6, 1e-3])
+def test_the_shortest_spans_go_with_their_square(window):
+    got = gained(lambda t: 9.8 + 2.0 * t).averaged(NOW, window)
+    assert at(got) == pytest.approx(window**2 / 24.0 * 2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("window", [0.15, 0.3, 0.42])
+def test_smoothing_slope_is_its_derivative(window):
+    made, step = gained(lambda t: np.sin(4.0 * t + 0.5)), 0.03
+    above, below = (made.averaged(NOW, np.sqrt(window**2 + s * step**2)) for s in (1, -1))
+    numeric = at(above - below) / (2 * step**2)
+    assert at(made.slope(NOW, window, LONGEST)) == pytest.approx(numeric, rel=0.01)
+
+
+def test_smoothing_slope_of_a_short_window_is_the_second_derivative():
+    # V = t^2 / 2 + ...: V'' = a' is 1 everywhere, at 1/24 per s^2 of window^2.
+    got = gained(lambda t: t + 3.0).slope(NOW, 0.0, LONGEST)
+    assert at(got) == pytest.approx(1.0 / 24.0, rel=1e-6)
+
+
+def test_the_second_derivative_of_a_parabola_is_its_own():
+    got = gained(lambda t: 3.0 * t**2 - t + 7.0).second_derivative(NOW, 0.0, LONGEST)
+    assert at(got) == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("window", [0.2, 0.5])
+def test_the_second_derivative_of_an_averaged_force_is_the_average_of_its_own(window):
+    made = gained(lambda t: t**4)
+    wide, narrow = (at(made.second_derivative(NOW, w, LONGEST)) for w in (window, 0.0))
+    assert wide - narrow == pytest.approx(window**2, rel=0.02)
+
+
+@pytest.mark.parametrize(("centre", "width"), [(0.0, 0.3), (0.1, 0.05), (-0.2, 0.013)])
+def test_a_mean_is_that_of_straight_lines(centre, width):
+    y = np.random.default_rng(1).normal(size=201)
+    t = 0.01 * np.arange(201)
+    fine = 1.0 + centre + np.linspace(-width / 2, width / 2, 200_001)
+    made = Gained(0.0, 0.01, np.stack([y, y, y], axis=-1))
+    mean = float(np.mean(np.interp(fine, t, y)))
+    assert at(made.mean(NOW + centre, width)) == pytest.approx(mean, abs=1e-4)
+
+
+@pytest.mark.parametrize("window", [0.1, 0.35, 0.66])
+def test_an_averaged_velocity_changes_by_its_averaged_acceleration(window):
+    """Also where the acceleration is mostly vibration, of which the average knows nothing."""
+    noise = 2.0 * np.random.default_rng(2).normal(size=201)
+    made = gained(lambda t: np.sin(3.0 * t) + noise)
+
+    def mean(t):
+        return at(made.averaged(np.array([t]), window) + made.velocity(np.array([t])))
+
+    e = 1e-4
+    numeric = (mean(1.0 + e) - mean(1.0 - e)) / (2.0 * e)
+    assert at(made.mean(NOW, window)) == pytest.approx(numeric, abs=1e-3)
