@@ -187,9 +187,8 @@ class Model:
 
     def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:
         """Evaluate every family on one segment."""
-        K, M1 = intervals.signals.t.shape
         m, epochs = self.size, len(around.now.t)
-        force = np.zeros((K, M1, 3, m))
+        pushing: list[tuple[slice, Array]] = []
         turning: list[tuple[slice, Array]] = []
         direct = {key: np.zeros((epochs, 3, m)) for key in ("vb", "vn", "pb", "pn", "ab", "an")}
         along = np.zeros((epochs, m))
@@ -199,7 +198,7 @@ class Model:
                 continue
             a = family.acceleration(intervals.signals)
             if a is not None:
-                force[..., s] = a
+                pushing.append((s, a))
             w = family.rate(intervals.signals)
             if w is not None:
                 turning.append((s, w))
@@ -214,12 +213,8 @@ class Model:
                     direct[key + "n"][..., s] = d.ned
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        force1, force2 = intervals.integrals(force)
-        turn = np.zeros((K, 3, m))
-        if turning:  # of a few only
-            turned = intervals.integrals(np.concatenate([w for _, w in turning], axis=-1))[0]
-            places = np.concatenate([np.arange(s.start, s.stop) for s, _ in turning])
-            turn[..., places] = turned
+        force1, force2 = _integrals(intervals, pushing, m)
+        turn, _ = _integrals(intervals, turning, m)
         return SegmentRegressors(
             force1,
             force2,
@@ -232,3 +227,16 @@ class Model:
             direct["ab"],
             direct["an"],
         )
+
+
+def _integrals(
+    intervals: Intervals, some: Sequence[tuple[slice, Array]], m: int
+) -> tuple[Array, Array]:
+    """Both integrals (K, 3, m) of the columns that there are; most unknowns have none."""
+    K = len(intervals.duration)
+    one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
+    if some:
+        places = np.concatenate([np.arange(s.start, s.stop) for s, _ in some])
+        both = intervals.integrals(np.concatenate([x for _, x in some], axis=-1))
+        one[..., places], two[..., places] = both
+    return one, two
