@@ -40,7 +40,7 @@ def stepped(fitter: Fitter, boundary: int) -> Fitter:
     for i, p in enumerate(fitter.blocks):
         sums = NormalSums.zeros(m + 3)
         sums.s, sums.rows, sums.log_det = p.sums.s, p.sums.rows, p.sums.log_det
-        sums.G[:m, :m] = p.sums.G
+        sums.G[:m] = p.sums.G
         if i >= boundary:
             sums.N[:] = p.sums.N[np.ix_(after, after)]
             sums.b[:] = p.sums.b[after]
@@ -73,7 +73,7 @@ def jumps_of_blocks(fitter: Fitter, free: Sequence[int]) -> list[tuple[int, floa
         N = np.block(
             [
                 [
-                    (shifted.N - shifted.G)[np.ix_(index, index)],
+                    shifted.signal[np.ix_(index, index)],
                     after.N[np.ix_(index, offsets)],
                 ],
                 [after.N[np.ix_(offsets, index)], after.N[np.ix_(offsets, offsets)]],
@@ -82,7 +82,7 @@ def jumps_of_blocks(fitter: Fitter, free: Sequence[int]) -> list[tuple[int, floa
         b = np.concatenate([shifted.b[index], after.b[offsets]])
         theta = np.linalg.solve(N + prior, b + prior @ mean)
         off = theta - mean
-        N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
+        N[: len(index), : len(index)] += np.diag(shifted.G[index])
         chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
         out.append((i, float(base.chi2 - chi2)))
     return out

@@ -135,7 +135,8 @@ def _with_jumps(
     to, of = np.ix_(mine, mine), np.ix_(source[mine], source[mine])
     signs = np.outer(sign[mine], sign[mine])
     sums = NormalSums.zeros(model.size)
-    sums.N[to], sums.G[to] = signs * far.N[of], signs * far.G[of]
+    sums.N[to] = signs * far.N[of]
+    sums.G[mine] = far.G[source[mine]]
     sums.b[mine] = sign[mine] * far.b[source[mine]]
     sums.s, sums.rows, sums.log_det = far.s, far.rows, far.log_det
     return sums

@@ -120,7 +120,7 @@ class Fitter:
 
     @staticmethod
     def _information(sums: NormalSums, index: list[int]) -> Array:
-        out: Array = (sums.N - sums.G)[np.ix_(index, index)]
+        out: Array = sums.signal[np.ix_(index, index)]
         return out
 
     def _penalised(self, sums: NormalSums, theta: Array, free: Sequence[int]) -> float:

@@ -134,7 +134,7 @@ def stacked(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
     return (
         np.stack([p.sums.N for p in blocks]),
         np.stack([p.sums.b for p in blocks]),
-        np.stack([np.diag(p.sums.G) for p in blocks]),
+        np.stack([p.sums.G for p in blocks]),
     )
 
 

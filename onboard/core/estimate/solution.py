@@ -58,7 +58,7 @@ def total(blocks: Sequence[Block]) -> NormalSums:
 
 def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
     """The noise Gram, limited so that what is left stays positive definite."""
-    G = sums.G
+    G = np.diag(sums.G)
     if not np.any(G):
         return G
     A = sums.N + prior_information
@@ -82,9 +82,7 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     X, strength = directions_of(D, prior_information)
     V = np.eye(model.size) * max(1.0, nis)
     if len(blocks) >= FEWEST_BLOCKS:
-        share = np.divide(
-            np.diag(G), np.diag(sums.G), out=np.zeros(sums.size), where=np.diag(sums.G) > 0
-        )
+        share = np.divide(np.diag(G), sums.G, out=np.zeros(sums.size), where=sums.G > 0)
         scatter = Scatter.of(blocks, theta, inverse, share)
         V = scatter.noise(X, strength, scatter.pool(prior_information, max(1.0, nis)))
     weighing = Weighing(X, strength, V)
@@ -147,7 +145,7 @@ def held_out(blocks: Sequence[Block], model: Model, fixed: dict[int, float] | No
         out = total([blocks[i] for i in fold])
         rest = everything - out
         theta = held.copy()
-        A = (rest.N - rest.G + prior)[np.ix_(free, free)]
+        A = (rest.signal + prior)[np.ix_(free, free)]
         c = rest.b + prior @ model.prior - (rest.N @ held)
         theta[free] = np.linalg.solve(A, c[free])
         square += out.residual(theta)
@@ -165,7 +163,7 @@ def fitted_rms(
     theta = np.zeros(model.size)
     for i, value in (fixed or {}).items():
         theta[i] = value
-    A = (sums.N - sums.G + prior)[np.ix_(free, free)]
+    A = (sums.signal + prior)[np.ix_(free, free)]
     c = sums.b + prior @ model.prior - sums.N @ theta
     theta[free] = np.linalg.solve(A, c[free])
     return float(np.sqrt(max(sums.residual(theta), 0.0) / max(sums.rows, 1.0)))
