@@ -27,8 +27,9 @@ it is at the very end]."""
 # Refinement (engine).
 
 ROUNDS: Final = 6
-"""Rounds of a refinement: latency is found to a millisecond in two or three, noise levels of a real
-flight to a tenth in six [cost]."""
+"""Rounds of a refinement: latency is found to a millisecond in two or three.  Noise levels of real
+flights are not at their likeliest after six: they have 20 to 150 of the log-likelihood to gain, and
+are a factor of two away at the most [cost]."""
 NOISE_ROUNDS: Final = ROUNDS - 1
 """Rounds that may begin a search for noise levels; each search takes two, and moves a level by a
 factor of four at the most [cost]."""
