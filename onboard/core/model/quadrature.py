@@ -152,9 +152,8 @@ def turns_in_a_row(w_b: Array, h: Array) -> Array:
 def _chain(turns: Array) -> Array:
     """Running products (K, M + 1, 3, 3) of ``turns`` (K, M, 3, 3), the identity first."""
     K, M = turns.shape[:2]
-    if (
-        M > SHORT_ROW and K * K < M
-    ):  # a long row in pieces that are as many as they are long, side by side
+    if M > SHORT_ROW and K * K < M:
+        # A long row in pieces that are as many as they are long, side by side.
         long = math.isqrt(M - 1) + 1
         pieces = np.zeros((K, -(-M // long) * long, 3, 3)) + np.eye(3)
         pieces[:, :M] = turns
