@@ -23,6 +23,7 @@ from onboard.answers.knowledge import determined
 from onboard.core.estimate.result import Calibration, Status
 
 WIDTH = 80
+"""Columns of the terminal that the table fits [use: what a terminal has when nobody widens it]."""
 NAME = 23
 """Characters of a recording's name; with the other columns, the terminal's width."""
 STATE = 15

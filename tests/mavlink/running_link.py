@@ -15,13 +15,8 @@ TCP = Endpoint.parse("tcp:127.0.0.1:5760")
 
 
 @asynccontextmanager
-async def running(*endpoints, **kwargs):
-    """A link under way, with the events it emitted; stopped at the end."""
-    clock = asyncio.get_running_loop().time
-    kwargs = {"rng": random.Random(1), **kwargs}
-    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, **kwargs)
-    link.events = []
-    link.subscribe_events(lambda now, event: link.events.append(event))
+async def under_way(link):
+    """A link that runs; stopped at the end."""
     task = asyncio.create_task(link.run())
     await asyncio.sleep(0.01)
     try:
@@ -29,6 +24,18 @@ async def running(*endpoints, **kwargs):
     finally:
         link.close()
         await task
+
+
+@asynccontextmanager
+async def running(*endpoints, **kwargs):
+    """A link under way, with the events it emitted."""
+    clock = asyncio.get_running_loop().time
+    kwargs = {"rng": random.Random(1), **kwargs}
+    link = Link(endpoints or (UDP,), clock=clock, wall_clock=clock, **kwargs)
+    link.events = []
+    link.subscribe_events(lambda now, event: link.events.append(event))
+    async with under_way(link):
+        yield link
 
 
 def events(link, kind):

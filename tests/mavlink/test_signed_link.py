@@ -15,6 +15,7 @@ from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.link import Link
 from onboard.mavlink.signing import EPOCH_UNIX_S, TICKS_PER_S, Signing
 from tests.mavlink.mavlink_peer import FakeAir, attitude, heartbeat
+from tests.mavlink.running_link import under_way
 from tests.mavlink.virtual_time import virtual_time
 
 KEY = bytes(range(32))
@@ -56,13 +57,8 @@ async def running(*endpoints, ahead=0.0, record=None):
     link.heard = []
     link.signing = signing
     link.subscribe(lambda now, m: link.heard.append(m.time_boot_ms), ["ATTITUDE"])
-    task = asyncio.create_task(link.run())
-    await asyncio.sleep(0.01)
-    try:
+    async with under_way(link):
         yield link
-    finally:
-        link.close()
-        await task
 
 
 def unknown(system=1, component=1):

@@ -21,9 +21,11 @@ from onboard.core.model.quadrature import (
 from onboard.core.model.smoothing import Gained
 
 AROUND_SPAN_S = 0.44
-"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s."""
-FEWEST = 14
-"""Pairs of nodes in that time: 31 ms each, within which a manoeuvre of 2 Hz bends by 2 %."""
+"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s, which is
+the most that is looked for [physics]."""
+FEWEST_PAIRS = 14
+"""Of nodes in that time, however slow the samples: 31 ms each, within which a manoeuvre of 2 Hz
+bends by 2 % [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ class _Followed:
         """Follow them from before the epoch ``first`` until after ``last``, s."""
         self._maker = maker
         # Twice as many as between epochs, for those lie anywhere between these.
-        pairs = max(FEWEST, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_SPAN_S)))
+        pairs = max(FEWEST_PAIRS, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_SPAN_S)))
         self._step = AROUND_SPAN_S / (2 * pairs)
         self._start = first - AROUND_SPAN_S - self._step
         count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 1
