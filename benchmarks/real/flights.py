@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real.beside import NOTHING, Beside, beside
 from benchmarks.real.split import RealFlight
 from benchmarks.real.whiteness import Whiteness, whiteness
 from onboard.answers.recorded import Recorded
@@ -52,6 +53,7 @@ class Fit:
         prior: (6,) centre of the prior, scale and beta.
         prior_sigma: (6,) of it.
         force: (3,) mean of the force in the air with the parameters in force, sensor axes.
+        beside: what the effects that were said add to it.
         levels: noise levels by name.
         inflation: variance inflation.
         window: averaging span of the receiver, s; ``window_asked`` without its limit.
@@ -89,6 +91,7 @@ class Fit:
     batches: tuple[Batch, ...] = ()
     chain: tuple[Interval, ...] = ()
     states: tuple[EpochState, ...] = ()
+    beside: Beside = NOTHING
 
     @property
     def failed(self) -> bool:
@@ -166,6 +169,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         batches=tuple(engine.batches),
         chain=tuple(intervals([(b.segment, b.fixes) for b in engine.batches], engine.point)),
         states=tuple(engine.states),
+        beside=beside(engine, MOVING_M_S, flight.ends_s),
     )
 
 

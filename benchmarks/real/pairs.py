@@ -1,11 +1,12 @@
 """Two accelerometers on one board: they feel the same force, so their difference needs no GPS.
 
 The mean over flight of ``f = scale (raw - offset)`` is compared between the accelerometers
-of each flight: with the parameters in force, and with each one's own estimate.  The predicted
-sigma of the difference takes the two solutions for independent.  They are not: they share GPS and
-attitude, whose errors cancel in the difference.  So chi-square should be *below* its degrees
-of freedom, and a pair that is far above them is contradicted.  Left out is what the places of the
-sensors do (``w x (w x r)``, some mm/s^2 for 10 cm).
+of each flight: with the parameters in force, and with each one's own estimate, what the effects
+that were said add to it included (a shift of the offset by vibration is one accelerometer's own).
+The predicted sigma of the difference takes the two solutions for independent.  They are not: they
+share GPS and attitude, whose errors cancel in the difference.  So chi-square should be *below* its
+degrees of freedom, and a pair that is far above them is contradicted.  Left out is what the places
+of the sensors do (``w x (w x r)``, some mm/s^2 for 10 cm).
 
 The second table is of the pair itself (:mod:`onboard.core.estimate.relative`): how well it knows
 the difference without GPS, all flight in which both were heard and places taken into account, and
@@ -90,11 +91,12 @@ class Mean:
 
 
 def mean_force(fit: Fit) -> Mean:
-    """(3,) mean force by a flight's own estimate, and its (3, 3) covariance."""
+    """(3,) mean force by all that a flight says of an accelerometer, and its (3, 3) covariance."""
     raw = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:])).undo(fit.force)
     scale, offset = fit.estimate[:3], fit.estimate[3:]
     J = np.hstack([np.diag(raw - offset), -np.diag(scale)])
-    return Mean(scale * (raw - offset), J @ fit.covariance @ J.T)
+    more = fit.beside
+    return Mean(scale * (raw - offset) + more.force, J @ fit.covariance @ J.T + more.covariance)
 
 
 def _usable(fit: Fit) -> bool:
