@@ -32,7 +32,7 @@ def told(made: Calibrator, flight: Flight) -> Array:
     engine = Engine(settings, np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), noise=LEVELS)
     for batch in made.engine(1).batches:
         engine.add(batch)
-    engine.refine(rounds=3, noise_rounds=0)
+    engine.refine(levels=False)
     solution = engine.solution()
     assert solution is not None
     scale, beta = solution.theta[:3], solution.theta[3:6]

@@ -15,7 +15,6 @@ import numpy as np
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine, through
-from onboard.core.estimate.limits import NOISE_ROUNDS, ROUNDS
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.refused import Refused
@@ -89,7 +88,7 @@ class Examination(Engine):
 
     def tuned(self) -> Examination:
         """Find noise and timing; no sums."""
-        self.tune(ROUNDS, NOISE_ROUNDS)
+        self.tune()
         return self
 
     def begin(self) -> None:

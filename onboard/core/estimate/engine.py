@@ -21,8 +21,6 @@ from onboard.core.estimate.limits import (
     MOST_ROUNDS,
     MOST_STATES,
     NEW_SHARE,
-    NOISE_ROUNDS,
-    ROUNDS,
     STEADY,
 )
 from onboard.core.estimate.noise_search import NoiseSearch
@@ -222,16 +220,15 @@ class Engine:
             if len(self.aged) > MOST_AGED:
                 self.aged = merged(self.aged, MOST_AGED)
 
-    def refine(self, rounds: int = ROUNDS, noise_rounds: int = NOISE_ROUNDS) -> None:
+    def refine(self, *, levels: bool = True) -> None:
         """Estimate timing and noise from the buffer and make its sums anew.
 
         Args:
-            rounds: passes at the most.
-            noise_rounds: how many of them try other noise levels too.
+            levels: whether noise levels are not told.
         """
         if not self.batches or self._frozen:
             return
-        self.tune(rounds, noise_rounds)
+        self.tune(levels=levels)
         self.once()
         self._pass.release()
         self._refined_s = self.trusted_s
@@ -251,32 +248,27 @@ class Engine:
         self._waiting = len(self.batches)
         self._catch_up()
 
-    def tune(self, rounds: int, noise_rounds: int) -> None:
+    def tune(self, *, levels: bool = True) -> None:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.
 
         Args:
-            rounds: passes at the most, while no level is far from where it belongs.
-            noise_rounds: in how many of them a search for noise levels may begin.
+            levels: whether noise levels are not told.
         """
-        search = NoiseSearch(noise_rounds)
+        search = NoiseSearch(settled=not levels)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
         for turn in range(MOST_ROUNDS):
-            if turn >= rounds and not search.unfinished:
-                break
-            made = self._new_pass(search.members(turn, self.noise), ready)
+            made = self._new_pass(search.members(self.noise), ready)
             results = self._over(sample, made)
             self._seed = solve([result.block for result in results], self.model)
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             before, at = at, moved(self.point, self.model, self._seed.theta)
-            levels = search.better(self.noise, made.log_likelihoods())
-            settled = search.settled(self.noise, levels)
-            self.noise = levels
-            if at.near(before, STEADY) and settled:
+            self.noise = search.better(self.noise, made.log_likelihoods(), made.trades)
+            if at.near(before, STEADY) and search.settled:
                 break
             if not self.point.stands_for(at):
-                self._move(at, levels)
+                self._move(at, self.noise)
                 ready = Preparations()
         self._move(at, self.noise)
 

@@ -26,21 +26,12 @@ it is at the very end]."""
 
 # Refinement (engine).
 
-ROUNDS: Final = 6
-"""Rounds of a refinement: latency is found to a millisecond in two or three.  Noise levels of real
-flights are not at their likeliest after six: they have 20 to 150 of the log-likelihood to gain, and
-are a factor of two away at the most [cost]."""
-NOISE_ROUNDS: Final = ROUNDS - 1
-"""Rounds that may begin a search for noise levels; each search takes two, and moves a level by a
-factor of four at the most [cost]."""
-SETTLED_LOG_RATIO: Final = 0.15
-"""Noise levels closer than this are the same: only their order of magnitude matters [cost]."""
-FAR_LOG_RATIO: Final = 0.6
-"""A search that moves a level by more than this (a factor of 1.8) is followed by another: levels
-trade with each other, and where one begins a factor of six away (a receiver with 0.3 m/s of noise)
-others first stand in for it, which costs most of what the flight tells [cost]."""
-MOST_ROUNDS: Final = 12
-"""Passes of a refinement that goes on for this reason, at the most [cost]."""
+WORTH_A_SEARCH: Final = 2.0
+"""Log-likelihood that another step of the noise levels is expected to gain, below which they stand:
+eleven levels are as uncertain as 5.5 of it [probability]."""
+MOST_ROUNDS: Final = 24
+"""Passes of a refinement, at the most; a search takes two a step, and from where a flight begins
+some four to six steps [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
 """Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
 worth another pass [cost]."""

@@ -12,6 +12,7 @@ outside begins anew at once, tilt and heading each for itself, and is not refuse
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from onboard.core.filter.limits import (
     GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
+    RECEIVER_M_S,
     RECOVERY_DRIFT,
     RECOVERY_FIXES,
     RECOVERY_S,
@@ -42,6 +44,21 @@ GATES = (
 def _nis(r: Array, h: Array, C: Array) -> float:
     """Normalised innovation squared of whitened ``r`` (n,), the estimate's uncertainty included."""
     return float(r @ np.linalg.solve(np.eye(len(r)) + h @ C @ h.T, r))
+
+
+def _nis_of_any_receiver(E: Array, theta: Array, C: Array, whitener: Array) -> float:
+    """The same of velocities (n), for a receiver that errs as much as a good one may.
+
+    Args:
+        E: (n, m + 1) innovations and their regressors, not whitened.
+        theta: (m,) estimate.
+        C: (m, m) covariance of it.
+        whitener: (n, n) of them.
+    """
+    r, D = E[:, 0] - E[:, 1:] @ theta, E[:, 1:]
+    root = np.linalg.inv(whitener)
+    S = root @ root.T + D @ C @ D.T + RECEIVER_M_S**2 * np.eye(len(r))
+    return float(r @ np.linalg.solve(S, r))
 
 
 def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float]:
@@ -92,7 +109,7 @@ class InnovationGates:
 
     def __init__(self, levels: NoiseLevels) -> None:
         """Take the noise levels that the innovations were whitened with."""
-        self._noise = float(np.hypot(levels.velocity, levels.velocity_colour))
+        self._noise = math.hypot(levels.velocity, levels.velocity_colour, RECEIVER_M_S)
         self.forget()
 
     def forget(self) -> None:
@@ -119,6 +136,7 @@ class InnovationGates:
         h: Array,
         theta: Array,
         C: Array,
+        whitener: Array,
         *,
         velocity: str | None = None,
     ) -> GateRefusal | None:
@@ -133,6 +151,7 @@ class InnovationGates:
             h: (r, m) their regressors.
             theta: (m,) estimate.
             C: (m, m) covariance of it.
+            whitener: (r, r) what innovations are multiplied by to be white.
             velocity: which gate refuses it, where that is known, empty for none; None: judge it.
 
         Returns:
@@ -155,6 +174,8 @@ class InnovationGates:
             if nis > limit:
                 # Only now the estimate's own uncertainty matters: it can but lower the figure.
                 nis = _nis(innovations[here], h[here], C)
+            if kind == "v" and nis > limit:
+                nis = _nis_of_any_receiver(E[:n], theta, C, whitener[:n, :n])
             if nis > limit:
                 return self._outside(kind, name, t)
             if kind == "h":

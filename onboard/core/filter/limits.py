@@ -14,6 +14,10 @@ from typing import Final
 GATE_VELOCITY: Final = 30.0
 """Normalised innovation squared of velocity past which a fix is refused [probability: 1.4e-6 with
 three degrees of freedom, 3e-7 with two]."""
+RECEIVER_M_S: Final = 0.1
+"""m/s by which a good receiver may err now and then, whatever its noise is elsewhere: what gates
+refuse is a fault, and has to be 5.5 of these besides [data sheet: 0.05 m/s is the median error of
+velocity, of the best receivers and at a steady speed]."""
 TAIL: Final = {1: 6.63, 2: 9.21, 3: 11.34}
 """Normalised innovation squared, by degrees of freedom, past which a velocity or a height is in the
 tail of its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger

@@ -1,10 +1,9 @@
 """Noise levels of the whitening filter and their estimation from the data.
 
 The levels are found by maximum likelihood.  One pass over the data runs a filter bank on a
-*stencil* of levels: the centre, and every level up and down by a factor.  A parabola through each
-triple of log-likelihoods gives a step.  The next pass is a *line search*: it tries shares of that
-step, because some levels trade with each other, and takes the likeliest.  Only ratios of the order
-of one matter for the estimate, and the honesty of its sigmas is checked again by the residuals
+*stencil* of levels: the centre, and every level up and down by a factor, which tells a step
+(:mod:`onboard.core.filter.noise_step`).  The next pass is a *line search*: it tries shares of that
+step and takes the likeliest.  The honesty of sigmas is checked again by the residuals
 (:mod:`onboard.core.estimate.solution`).
 """
 
@@ -74,7 +73,7 @@ ESTIMATED = (
 )
 
 
-def _triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
+def triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
     """Two more values of a level: one to each side, or both to the inner side of a limit."""
     low, high = limits
     lower, upper = max(level / STENCIL_FACTOR, low), min(level * STENCIL_FACTOR, high)
@@ -93,34 +92,9 @@ def stencil(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[Nois
         *(
             replace(centre, **{name: value})
             for name in names
-            for value in _triple(getattr(centre, name), LIMITS[name])
+            for value in triple(getattr(centre, name), LIMITS[name])
         ),
     )
-
-
-def stepped(
-    centre: NoiseLevels, log_likelihood: Sequence[float], names: Sequence[str] = ESTIMATED
-) -> NoiseLevels:
-    """Next centre from the log-likelihoods of :func:`stencil`: a parabola in each log-level.
-
-    A step is at most :data:`STENCIL_FACTOR` squared; where the likelihood is flat or convex, it
-    goes towards the best of the three values.
-    """
-    longest = 2.0 * float(np.log(STENCIL_FACTOR))
-    levels = centre
-    for i, name in enumerate(names):
-        here = getattr(centre, name)
-        x = np.log(np.array(_triple(here, LIMITS[name])) / here)
-        rise = np.array(log_likelihood[1 + 2 * i : 3 + 2 * i]) - log_likelihood[0]
-        # The parabola through the origin and both points: rise = slope x + curve x^2 / 2.
-        slope, curve = np.linalg.solve(np.column_stack([x, x * x / 2.0]), rise)
-        if curve < -1e-6:
-            step = -slope / curve
-        else:
-            best = int(np.argmax(rise))
-            step = longest * float(np.sign(x[best])) if rise[best] > 0.0 else 0.0
-        levels = levels.scaled(name, float(np.exp(np.clip(step, -longest, longest))))
-    return levels
 
 
 def line_search(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:

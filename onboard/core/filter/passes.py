@@ -67,6 +67,9 @@ class Pass:
         self.covariance = np.diag(model.prior_sigma**2) if covariance is None else covariance
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
+        self.trades = np.zeros((len(bank), len(bank)))
+        """(B, B) products of what each member changes the whitened innovations by, from member 0's:
+        levels that change them alike trade with each other."""
         self.bias_b = np.zeros(3)
         self._preparations = preparations
         self._running = False
@@ -198,6 +201,7 @@ class Pass:
         if made is None:
             return
         sums.add(made.y, made.h, made.log_det)
+        self._compare(made.y, made.h)
         self._note(made, result)
         self._estimate(sums)
         if made.velocities:
@@ -209,6 +213,7 @@ class Pass:
             return
         result.epochs += len(gone.epochs)
         sums.add(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_det)
+        self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:])
         with_velocity = gone.epochs[gone.velocities > 0]
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
@@ -218,6 +223,14 @@ class Pass:
         if not self._held:
             gone.states[-1, 12:] = self.filter.velocity(self.theta)
         result.states += gone.noted(ready.epochs, self.bias_b)
+
+    def _compare(self, y: Array, h: Array) -> None:
+        """Add to :attr:`trades` what innovations ``y`` (B, r), with regressors, show of it."""
+        if len(y) == 1:
+            return
+        e = y - h @ self.theta
+        e -= e[0].copy()
+        self.trades += e @ e.T
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:
         """Count what was refused, keep the trace if traces are kept."""

@@ -231,7 +231,7 @@ class WhiteningFilter:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                 known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
                 refusal = self.gates.judge(
-                    epoch.t, kinds, made.E, y, h, theta, covariance, velocity=known
+                    epoch.t, kinds, made.E, y, h, theta, covariance, made.whitener, velocity=known
                 )
             if refusal is None:
                 if self.gates is not None:
