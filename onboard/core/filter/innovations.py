@@ -106,6 +106,7 @@ class Epoch:
         along_velocity: (m,) regressors of the position as multiples of the velocity, s per unit.
         trusted: whether the receiver is to be believed.
         noise: (7,) variances beside those of the levels.
+        moving: (7,) squares of how fast each number changes, its unit squared per s^2.
         stamp: the receiver's, on the boot clock, s: whatever latency is taken out of ``t``.
     """
 
@@ -119,6 +120,7 @@ class Epoch:
     along_velocity: Array
     trusted: bool
     noise: Array = field(default_factory=lambda: np.zeros(MEASURED))
+    moving: Array = field(default_factory=lambda: np.zeros(MEASURED))
     stamp: float = math.nan
 
 
@@ -140,6 +142,7 @@ class Epochs:
     along_velocity: Array
     trusted: NDArray[np.bool_]
     noise: Array
+    moving: Array
     stamp: Array
 
     def __len__(self) -> int:
@@ -157,6 +160,7 @@ class Epochs:
             self.along_velocity[e],
             bool(self.trusted[e]),
             self.noise[e],
+            self.moving[e],
             float(self.stamp[e]),
         )
 

@@ -38,6 +38,8 @@ class NoiseLevels:
             :data:`~onboard.core.filter.limits.HEADING_TIME_S`), rad.
         attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
+        jitter: white noise of the moment that a GPS velocity is of, s: it errs by as much of the
+            acceleration, along it.
     """
 
     velocity: float = 0.05
@@ -51,6 +53,7 @@ class NoiseLevels:
     attitude: float = 0.02
     heading: float = 0.06
     attitude_white: float = 5e-4
+    jitter: float = 3e-3
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -70,6 +73,7 @@ ESTIMATED = (
     "attitude",
     "heading",
     "attitude_white",
+    "jitter",
 )
 
 

@@ -141,6 +141,10 @@ def _epochs(
     noise = np.zeros((n, MEASURED))
     rate = np.linalg.norm(nodes.now.w_b, axis=1)
     noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
+    moving = np.zeros((n, MEASURED))
+    gained = (R_att @ nodes.f_mean[:, :, None])[..., 0]
+    gained[:, 2] += STANDARD_GRAVITY
+    moving[:, V] = gained**2
     return Epochs(
         np.ascontiguousarray(nodes.now.t),
         fixes.v_n,
@@ -153,5 +157,6 @@ def _epochs(
         c.along_velocity,
         trusted,
         noise,
+        moving,
         fixes.t,
     )

@@ -66,12 +66,12 @@ def _numbers(offered: Index) -> Index:
 
 
 @part
-def _sum(white: Array, more: Array) -> Array:
-    """Variances (B, n) and what an epoch (n,) adds to them."""
+def _sum(white: Array, more: Array, jitter: Array, moving: Array) -> Array:
+    """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
     for b in range(len(white)):
         for i in range(len(more)):
-            out[b, i] = white[b, i] + more[i]
+            out[b, i] = white[b, i] + more[i] + jitter[b] * moving[i]
     return out
 
 
@@ -114,7 +114,8 @@ def _note(
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
     " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
-    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
+    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1],"
+    " f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -136,9 +137,11 @@ def run(
     ned: Array,
     along: Array,
     noise: Array,
+    moving: Array,
     walk: Array,
     settled: Array,
     white: Array,
+    jitter: Array,
     times: Array,
     gates: Array,
     tails: Array,
@@ -170,14 +173,17 @@ def run(
         ends: (K,) the epoch at the end of each step; -1: none.
         offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
             the velocity: 0 nothing, 1 that it is not refused, 2 that it is.
-        R_attitude: (n, 3, 3) and body, ned, along and noise as in :class:`~..innovations.Epochs`.
+        R_attitude: (n, 3, 3) and body, ned, along, noise and moving as in
+            :class:`~..innovations.Epochs`.
         body: see there.
         ned: see there.
         along: see there.
         noise: see there.
-        walk: (B, STATES) and settled and white as in :class:`~..variances.Variances`.
+        moving: see there.
+        walk: (B, STATES) and settled, white and jitter as in :class:`~..variances.Variances`.
         settled: see there.
         white: see there.
+        jitter: see there.
         times: (3,) of the slow errors of velocity, tilt and heading, s.
         gates: (4,) limits of velocity, height, tilt and heading.
         tails: (4,) by degrees of freedom.
@@ -230,7 +236,7 @@ def run(
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
         det = np.empty(members)
-        if whiten(carried, z, number, _sum(white, noise[e]), E, W, whitener, det):
+        if whiten(carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, det):
             return 1
         if not _ordinary(W, theta, offered[e], 1 - offered[e, 3], gates, tails):
             return 1

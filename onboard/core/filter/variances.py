@@ -37,9 +37,10 @@ class Variances:
         settled: (B, MEASURED) of the slow errors, Gauss-Markov, of each measured number; its unit
             squared.
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
+        jitter: (B,) of the moment that a velocity is of, s^2.
     """
 
-    __slots__ = ("_attitude", "reading", "settled", "walk")
+    __slots__ = ("_attitude", "jitter", "reading", "settled", "walk")
 
     def __init__(self, bank: Sequence[NoiseLevels], *, attitude: bool) -> None:
         """Take the noise levels of each member, and whether the attitude may err at all."""
@@ -48,6 +49,7 @@ class Variances:
         self.walk = np.zeros((B, STATES))
         self.settled = np.zeros((B, MEASURED))
         self.reading = np.zeros((B, MEASURED))
+        self.jitter = np.array([q.jitter**2 for q in bank])
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
@@ -61,6 +63,16 @@ class Variances:
                 self.walk[i, BIAS] = q.bias_walk**2
                 self.settled[i, PSI] = (q.attitude**2, q.attitude**2, q.heading**2)
                 self.walk[i, RATE] = RATE_WALK * q.heading**2
+
+    def of_reading(self, noise: Array, moving: Array) -> Array:
+        """(B, MEASURED) of the white noise of what one epoch measures.
+
+        Args:
+            noise: (MEASURED,) and moving as in :class:`~onboard.core.filter.innovations.Epoch`.
+            moving: see there.
+        """
+        out: Array = self.reading + noise + self.jitter[:, None] * moving
+        return out
 
     def at_start(
         self, tilt_sigma: float, heading_sigma: float, *, down: bool, height: bool

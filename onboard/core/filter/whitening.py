@@ -223,7 +223,7 @@ class WhiteningFilter:
         off = np.zeros(0)
         unlikely = np.zeros(len(self.bank))
         z = self._measured(epoch, theta)
-        white = self.variances.reading + epoch.noise
+        white = self.variances.of_reading(epoch.noise, epoch.moving)
         while kinds:
             made = self.kernel.whiten(self.carried, z, reading(kinds), white)
             refusal = None
@@ -299,7 +299,8 @@ class WhiteningFilter:
         read = reading(kinds)
         both = innovations(self.carried[:1], self._measured(epoch, theta), read)[0]
         E, PH = both[:, : self._m1], both[:, self._m1 :]
-        noise = np.diag(self.variances.reading[0, read.first])
+        white = self.variances.of_reading(epoch.noise, epoch.moving)
+        noise = np.diag(white[0, read.first])
         S = noise - PH[:, read.first] - PH[:, read.second]
         D = E[:, 1:]
         return E[:, 0] - D @ theta, S + D @ covariance @ D.T
