@@ -125,7 +125,9 @@ def _updated(
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
     noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude_white**2] * 3)
+    S = np.diag(noise)
+    S[:2, :2] += q.jitter**2 * np.outer(a[:2], a[:2])
     HP = M @ P
-    gain = np.linalg.solve(HP @ M.T + np.diag(noise), HP).T
+    gain = np.linalg.solve(HP @ M.T + S, HP).T
     out: Array = P - gain @ HP
     return out

@@ -42,6 +42,7 @@ LEVELS = NoiseLevels(
     bias_walk=4e-5,
     attitude=0.03,
     heading=0.08,
+    jitter=0.008,
 )
 """A common receiver and common MEMS; none of the values the search for levels begins with."""
 
@@ -212,6 +213,7 @@ def _fixes(path: Path, rng: np.random.Generator, q: NoiseLevels, delay: float) -
     at = path.epochs
     t, n, step = path.t[at], len(at), 1.0 / GPS_HZ
     v = path.v_gps[at] + q.velocity * rng.standard_normal((n, 3))
+    v += q.jitter * rng.standard_normal((n, 1)) * derivative(path.v_gps)[at]
     v += q.velocity_colour * _gauss_markov(rng, n, step, COLOUR_TIME_S)
     later = HEIGHT_DELAY * rng.standard_normal()
     height = np.interp(t - later, path.t, path.h_gps)

@@ -131,9 +131,9 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
 """Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
 No sensor on a small vehicle is better than the lower ends [data sheet]; a noiseless simulation must
-not make the filter believe that timing, interpolation and filters are modelled to the last digit.  The
-jitter of a velocity's moment is at least that of whole milliseconds, and at most the time between
-two fixes [physics].
+not make the filter believe that timing, interpolation and filters are modelled to the last digit.
+The jitter of a velocity's moment is at least that of whole milliseconds, and at most the time
+between two fixes [physics].
 
 The slow error of the recorded attitude is no such formality.  Its lower end is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad

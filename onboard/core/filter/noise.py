@@ -38,8 +38,8 @@ class NoiseLevels:
             :data:`~onboard.core.filter.limits.HEADING_TIME_S`), rad.
         attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
-        jitter: white noise of the moment that a GPS velocity is of, s: it errs by as much of the
-            acceleration, along it.
+        jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
+            much of the acceleration (that they err together is left out).
     """
 
     velocity: float = 0.05

@@ -203,9 +203,9 @@ class Pass:
         sums.add(made.y, made.h, made.log_det)
         self._compare(made.y, made.h)
         self._note(made, result)
-        self._estimate(sums)
         if made.velocities:
             result.states.append(self._state(made))
+        self._estimate(sums)
 
     def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
         """What :meth:`_at_epoch` does, for all epochs that were gone through at once."""
@@ -219,10 +219,8 @@ class Pass:
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
         if self.keep_traces:
             result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
-        self._estimate(sums, len(gone.epochs))
-        if not self._held:
-            gone.states[-1, 12:] = self.filter.velocity(self.theta)
         result.states += gone.noted(ready.epochs, self.bias_b)
+        self._estimate(sums, len(gone.epochs))
 
     def _compare(self, y: Array, h: Array) -> None:
         """Add to :attr:`trades` what innovations ``y`` (B, r), with regressors, show of it."""

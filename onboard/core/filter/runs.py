@@ -236,7 +236,9 @@ def run(
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
         det = np.empty(members)
-        if whiten(carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, det):
+        if whiten(
+            carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, det
+        ):
             return 1
         if not _ordinary(W, theta, offered[e], 1 - offered[e, 3], gates, tails):
             return 1

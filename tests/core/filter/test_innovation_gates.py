@@ -13,6 +13,7 @@ from onboard.core.filter.limits import (
     GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
+    RECEIVER_M_S,
     RECOVERY_FIXES,
     RECOVERY_S,
     TAIL,
@@ -24,11 +25,12 @@ LEVELS = NoiseLevels(velocity=0.1, velocity_colour=0.05)
 NONE = np.zeros(2)
 
 
-def judged(gates, t, kinds, y, h=None, C=None):
-    """Verdict on whitened innovations ``y`` about an estimate that is zero."""
+def judged(gates, t, kinds, y, h=None, C=None, sigma=10.0):
+    """Verdict on whitened innovations ``y``, ``sigma`` (m/s) each, about an estimate of zero."""
     h = np.zeros((len(y), 2)) if h is None else h
-    E = np.column_stack([0.1 * y, 0.1 * h])
-    return gates.judge(t, kinds, E, y, h, NONE, np.zeros((2, 2)) if C is None else C)
+    E = sigma * np.column_stack([y, h])
+    C = np.zeros((2, 2)) if C is None else C
+    return gates.judge(t, kinds, E, y, h, NONE, C, np.eye(len(y)) / sigma)
 
 
 @pytest.mark.parametrize(
@@ -56,6 +58,20 @@ def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name)
         assert verdict in (None, GateRefusal(name, renewed=name in ("tilt", "heading")))
         refused += verdict is not None
     assert refused / draws == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / draws))
+
+
+@pytest.mark.parametrize("sigma", [1e-3, 0.02, 0.1])
+@pytest.mark.parametrize("uncertain", [0.0, 0.05])
+def test_a_velocity_is_a_fault_only_if_no_good_receiver_errs_so(sigma, uncertain):
+    """However quiet the noise is: an error counts against it and a good receiver's together."""
+    spread = math.sqrt(sigma**2 + uncertain**2 + RECEIVER_M_S**2)
+    edge = math.sqrt(GATE_VELOCITY) * spread
+    h, C = np.eye(3), (uncertain / sigma) ** 2 * np.eye(3)
+    for off, refused in ((0.99 * edge, None), (1.01 * edge, GateRefusal("velocity"))):
+        y = np.array([0.6, -0.8, 0.0]) * off / sigma
+        E = sigma * np.column_stack([y, h])
+        gates = InnovationGates(LEVELS)
+        assert gates.judge(0.0, "vvv", E, y, h, np.zeros(3), C, np.eye(3) / sigma) == refused
 
 
 def test_the_limits_have_the_probabilities_that_are_claimed():

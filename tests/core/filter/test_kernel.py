@@ -23,6 +23,7 @@ from onboard.core.filter.noise import NoiseLevels, stencil
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
+from onboard.core.filter.whitening import Uses
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from tests.core.compiled import both_ways
@@ -330,3 +331,24 @@ def test_two_processes_may_fill_the_same_cache(tmp_path):
         ]
         assert [p.wait(timeout=120) for p in made] == [0, 0]
         assert list(tmp_path.rglob("*.nbc"))
+
+
+@pytest.mark.usefixtures("_preference_kept")
+def test_what_members_change_is_that_of_filters_of_their_own(engine):
+    """Products of differences of whitened innovations, each member's from a filter by itself."""
+    bank = (NoiseLevels(), NoiseLevels(velocity=0.08), NoiseLevels(force_walk=0.06, jitter=0.01))
+    batch = engine.batches[1]
+    # Attitude and the earth's turning are member 0's for all: held, and left out.
+    free = Uses(recorded_attitude=True, earth=False)
+
+    def whitened(levels):
+        made = Pass(engine.model, engine.point, levels, uses=free)
+        made.keep_traces = made.keep_rows = True
+        made.hold(engine.model.prior, np.diag(engine.model.prior_sigma**2))
+        traces = through(made, batch, 10.0).traces
+        return made, np.concatenate([x.y - x.h @ engine.model.prior for x in traces])
+
+    together, first = whitened(bank)
+    alone = np.array([whitened((levels,))[1] - first for levels in bank])
+    assert together.trades[1, 1] > 1.0
+    np.testing.assert_allclose(together.trades, alone @ alone.T, rtol=1e-9, atol=1e-9)

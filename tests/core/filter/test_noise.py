@@ -12,8 +12,8 @@ from onboard.core.filter.noise import (
     distance,
     line_search,
     stencil,
-    stepped,
 )
+from onboard.core.filter.noise_step import bounded, newton_step
 
 CENTRE = NoiseLevels()
 
@@ -28,11 +28,25 @@ def parabola(top):
     return of
 
 
-def climbed(start, likelihood, searches=6):
+def changes(levels):
+    """What levels do to innovations that each of them scales by itself."""
+    return np.array([np.log(getattr(levels, n)) for n in ESTIMATED])
+
+
+def products(members, change=changes):
+    moved = np.array([change(m) - change(members[0]) for m in members])
+    return moved @ moved.T
+
+
+def step(levels, likelihood, change=changes):
+    members = stencil(levels)
+    return newton_step(levels, [likelihood(m) for m in members], products(members, change))
+
+
+def climbed(start, likelihood, searches=6, change=changes):
     levels = start
     for _ in range(searches):
-        target = stepped(levels, [likelihood(m) for m in stencil(levels)])
-        members = line_search(levels, target)
+        members = line_search(levels, step(levels, likelihood, change).levels)
         levels = members[int(np.argmax([likelihood(m) for m in members]))]
     return levels
 
@@ -52,8 +66,7 @@ def test_from_a_limit_it_comes_back_to_a_top_just_inside(name, end):
     limit = LIMITS[name][end]
     start = replace(CENTRE, **{name: limit})
     top = replace(CENTRE, **{name: limit * (1.3, 1 / 1.3)[end]})
-    one = stepped(start, [parabola(top)(m) for m in stencil(start)])
-    assert distance(one, top) < 0.01
+    assert distance(step(start, parabola(top)).levels, top) < 0.01
 
 
 @pytest.mark.parametrize("beyond", [0.1, 10.0])
@@ -76,7 +89,9 @@ def test_a_star_has_three_different_values_of_every_level_inside_its_limits():
 
 
 def test_a_flat_likelihood_moves_nothing():
-    assert stepped(CENTRE, [5.0] * (1 + 2 * len(ESTIMATED))) == CENTRE
+    still = step(CENTRE, lambda _: 5.0)
+    assert still.levels == CENTRE
+    assert still.gain == 0.0
 
 
 def test_a_line_leads_from_the_centre_to_the_target():
@@ -89,16 +104,44 @@ def test_a_line_leads_from_the_centre_to_the_target():
     assert {f.name for f in fields(NoiseLevels)} == set(LIMITS)
 
 
-def test_levels_that_trade_with_each_other_do_not_make_the_search_climb_down():
+def ridge(levels):
     """A narrow ridge across two levels: each by itself asks for a step that is too long."""
+    a, b = np.log(levels.force_walk / 0.05), np.log(levels.velocity_colour / 0.1)
+    return -50.0 * (a + b) ** 2 - 0.5 * (a - b) ** 2
 
-    def ridge(levels):
-        a, b = np.log(levels.force_walk / 0.05), np.log(levels.velocity_colour / 0.1)
-        return -50.0 * (a + b) ** 2 - 0.5 * (a - b) ** 2
 
+def changes_on_the_ridge(levels):
+    a, b = np.log(levels.force_walk), np.log(levels.velocity_colour)
+    return np.array([10.0 * (a + b), a - b])
+
+
+def test_levels_that_trade_with_each_other_are_found_in_one_step():
+    """Curvatures alone overshoot; with what two levels change alike it is Newton's own step."""
+    found = step(CENTRE, ridge, changes_on_the_ridge)
+    assert ridge(found.levels) > -1e-3 * abs(ridge(CENTRE))
+    assert found.gain == pytest.approx(ridge(found.levels) - ridge(CENTRE), rel=1e-3)
+
+
+def test_levels_whose_trade_is_not_known_climb_all_the_same():
     levels, heights = CENTRE, [ridge(CENTRE)]
     for _ in range(8):
         levels = climbed(levels, ridge, searches=1)
         heights.append(ridge(levels))
     assert heights == sorted(heights)
     assert heights[-1] > -1.0
+
+
+def test_a_bounded_step_leaves_nothing_to_gain():
+    """Karush, Kuhn and Tucker: flat inside, uphill only out of the bounds."""
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        root = rng.normal(size=(6, 6))
+        H, slope = root @ root.T + 1e-2 * np.eye(6), 3.0 * rng.normal(size=6)
+        low, high = -rng.uniform(0.0, 1.0, 6), rng.uniform(0.0, 1.0, 6)
+        x = bounded(H, slope, low, high)
+        left = slope - H @ x
+        inside = (x > low) & (x < high)
+        assert np.all((low <= x) & (x <= high))
+        assert np.abs(left[inside]).max(initial=0.0) < 0.02
+        assert np.all(left[x == low] < 0.02)
+        assert np.all(left[x == high] > -0.02)

@@ -22,9 +22,9 @@ def test_stamps_are_known_through_another_latency():
 
 def judged(y, velocity):
     made = InnovationGates(NoiseLevels())
-    E, h = np.zeros((3, 2)), np.zeros((3, 1))
+    E, h = np.column_stack([y, np.zeros(3)]), np.zeros((3, 1))
     none = np.zeros(1)
-    return made.judge(0.0, "vvv", E, y, h, none, np.zeros((1, 1)), velocity=velocity)
+    return made.judge(0.0, "vvv", E, y, h, none, np.zeros((1, 1)), np.eye(3), velocity=velocity)
 
 
 def test_what_is_known_is_not_judged():

@@ -18,7 +18,7 @@ USES = Uses(height=False, attitude=False, recorded_attitude=True, earth=False)
 
 
 def levels(velocity):
-    return NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), 0.02, *(1e-12,) * 5)
+    return NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), 0.02, *(1e-12,) * 6)
 
 
 def flown(noise, bank=None, beta_sigma=0.5):

@@ -38,7 +38,7 @@ GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 def quiet(velocity):
     """Noise of GPS velocity alone."""
     none = 1e-12
-    return NoiseLevels(velocity, none, 1.0, 1.0, *(none,) * 7)
+    return NoiseLevels(velocity, none, 1.0, 1.0, *(none,) * 8)
 
 
 def manoeuvres(t):
@@ -129,7 +129,11 @@ def test_what_a_fit_leaves_is_chi_square():
     made = Pass(
         Model([Six(scale_sigma=1e5, beta_sigma=1e5)]),
         Linearisation(delay=0.0),
-        (NoiseLevels(velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9),),
+        (
+            NoiseLevels(
+                velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9, jitter=1e-9
+            ),
+        ),
         uses=PAPER,
     )
     fixes = Fixes(t[at], v[at] + noise * rng.normal(size=(n, 3)), np.zeros(n), np.zeros(n))
@@ -153,7 +157,10 @@ LEVELS = NoiseLevels(
     attitude=0.01,
     heading=0.03,
     attitude_white=4e-3,
+    jitter=0.02,
 )
+ACCELERATION = np.array([0.0, 4.0, 0.0])
+"""That the moment's jitter is multiplied by; one axis, for the filter takes axes one by one."""
 DT, SUB = 0.01, 10
 START_SIGMA = 0.02
 
@@ -176,7 +183,8 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     def epoch(t):
         read = rotation_from_vector(error + levels.attitude_white * normal(size=3)) @ R
         ned = np.zeros((7, 2))
-        ned[:3, 0] = v + colour + levels.velocity * normal(size=3)
+        late = levels.jitter * normal()
+        ned[:3, 0] = v + colour + levels.velocity * normal(size=3) + late * ACCELERATION
         ned[3, 0] = h + wander + levels.height * normal()
         return Epoch(
             t,
@@ -188,6 +196,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             ned=ned,
             along_velocity=np.zeros(1),
             trusted=True,
+            moving=np.append(ACCELERATION**2, np.zeros(4)),
         )
 
     filter_.start(
@@ -267,7 +276,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 5)
+        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 6)
         for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
     )
     made = Pass(
