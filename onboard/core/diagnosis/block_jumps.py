@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.diagnosis.limits import FORGOTTEN_S
+from onboard.core.diagnosis.limits import SETTLED_S
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -93,4 +93,4 @@ def settled_from(blocks: Sequence[Block]) -> float:
 
     Not while an EKF that has begun with the autopilot converges: its attitude jumps then.
     """
-    return max(blocks[0].end, FORGOTTEN_S)
+    return max(blocks[0].end, SETTLED_S)

@@ -150,7 +150,8 @@ def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examinati
             other.common = jump if common and any(c.columns is jump for c in other.chosen) else None
             return wide, other
         steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
-        if not explains(full, steady, shock):
+        known = any(shock.name == f.name for f in full.carried)
+        if known or not explains(full, steady, shock):
             break
         full = full.carrying(shock)
         choice = _chosen(full, asked.testable)
