@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.estimate.limits import WORTH_A_SEARCH
 from onboard.core.filter.noise import NoiseLevels, line_search, stencil
-from onboard.core.filter.noise_step import newton_step
+from onboard.core.filter.noise_step import NoiseStep, newton_step
 from onboard.core.maths.arrays import Array
 
 
@@ -17,7 +17,7 @@ class NoiseSearch:
 
     def __init__(self, *, settled: bool = False) -> None:
         """Take whether the levels stand, without a search."""
-        self._target: NoiseLevels | None = None
+        self._step: NoiseStep | None = None
         self._members: tuple[NoiseLevels, ...] = ()
         self.settled = settled
         """Whether another step is expected to gain too little to be worth its passes."""
@@ -26,10 +26,10 @@ class NoiseSearch:
         """Levels of the next pass's bank, the first of them ``levels``."""
         if self.settled:
             self._members = (levels,)
-        elif self._target is None:
+        elif self._step is None:
             self._members = stencil(levels)
         else:
-            self._members = line_search(levels, self._target)
+            self._members = line_search(levels, self._step.levels)
         return self._members
 
     def better(
@@ -44,11 +44,14 @@ class NoiseSearch:
         """
         if self.settled:
             return levels
-        if self._target is not None:
-            self._target = None
-            return self._members[int(np.argmax(log_likelihoods))]
-        step = newton_step(levels, log_likelihoods, trades)
-        self.settled = step.gain < WORTH_A_SEARCH
-        if not self.settled:
-            self._target = step.levels
-        return levels
+        if self._step is None:
+            self._step = newton_step(levels, log_likelihoods, trades)
+            self.settled = self._step.gain < WORTH_A_SEARCH
+            return levels
+        rise = np.array(log_likelihoods) - log_likelihoods[0]
+        best, step, self._step = int(np.argmax(rise)), self._step, None
+        # Where it rises by next to nothing along the step, another one is not worth it; nor where
+        # it is the parabola that it was taken for, for then its top has been reached.
+        reached = abs(float(rise[-1]) - step.gain) < WORTH_A_SEARCH and not step.cut
+        self.settled = reached or float(rise[best]) < WORTH_A_SEARCH
+        return self._members[best]

@@ -35,10 +35,12 @@ class NoiseStep:
     Attributes:
         levels: where it ends.
         gain: how much more log-likelihood is expected there.
+        cut: whether it would go further, were it not longer than a stencil can tell.
     """
 
     levels: NoiseLevels
     gain: float
+    cut: bool
 
 
 def newton_step(
@@ -76,7 +78,8 @@ def newton_step(
     found = centre
     for name, by in zip(names, np.exp(step).tolist(), strict=True):
         found = found.scaled(name, by)
-    return NoiseStep(found, float(slope @ step - 0.5 * step @ H @ step))
+    gain = float(slope @ step - 0.5 * step @ H @ step)
+    return NoiseStep(found, gain, bool(np.abs(step).max() >= longest))
 
 
 def _products(slopes: Array, trades: Array) -> Array:

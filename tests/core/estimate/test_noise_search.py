@@ -44,6 +44,18 @@ def test_what_begins_far_away_takes_longer():
     assert searched(1.9)[1] > searched(0.08)[1]
 
 
+def test_it_ends_where_nothing_rises_along_the_step():
+    """A likelihood with a kink: its slopes promise what it does not keep."""
+    levels, search = NoiseLevels(), NoiseSearch()
+    trades = np.eye(len(search.members(levels)))
+    said = [0.0] + [-50.0, 40.0] + [-1.0, -1.0] * ((len(trades) - 3) // 2)
+    assert search.better(levels, said, trades) == levels
+    assert not search.settled
+    members = search.members(levels)
+    assert search.better(levels, [0.0, -1.0, -2.0, -3.0], np.eye(len(members))) == levels
+    assert search.settled
+
+
 def test_levels_that_are_told_are_not_searched_for():
     told, search = NoiseLevels(velocity=0.3), NoiseSearch(settled=True)
     assert search.members(told) == (told,)
