@@ -87,9 +87,9 @@ TICK_S: Final = 0.1
 """s between two polls of the participants while an answer is waited for, a push is under way or one
 of them has just said something: below every wait that one of them has [cost]."""
 REST_TICK_S: Final = 0.2
-"""s between two at all other times.  HEARTBEATs are read with the tick, and what they are delayed by
-must leave two that contradict each other apart from two that follow each other: the fifth of their
-interval that CONTRADICTION_S allows for [data]; half as many wake-ups [cost]."""
+"""s between two at all other times.  HEARTBEATs are read with the tick; what they are delayed by
+may be a fifth of their interval, or two that contradict each other could not be told from two that
+follow each other (CONTRADICTION_S) [data].  Half as many wake-ups [cost]."""
 HEARTBEAT_INTERVAL_S: Final = 1.0
 """s between two of our own [protocol]."""
 HEARTBEAT_TIMEOUT_S: Final = 5.0

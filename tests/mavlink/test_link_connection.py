@@ -20,9 +20,9 @@ from onboard.mavlink.limits import (
     BACKOFF_BASE_S,
     BACKOFF_CAP_S,
     LINGER_S,
+    REST_TICK_S,
     SILENCE_S,
     STABLE_S,
-    REST_TICK_S,
 )
 from onboard.mavlink.link import Link
 from tests.mavlink.mavlink_peer import attitude, heartbeat
