@@ -1,21 +1,27 @@
 """What a fleet costs: processor time, bytes, memory; and what that comes to for a million flights.
 
 ``python -m benchmarks.fleet FOLDER`` replays the recordings in a folder, without one simulated
-flights of two vehicles; once for each number of processes, from an empty store, and once more from
-the full one.  What is said of a vehicle over time is timed on copies of one flight, a day apart.
+flights, a folder for each of ``--vehicles``; once for each number of processes, from an empty
+store, and once more from the full one.  With ``--cluster`` the same is done by a Dask cluster of
+two workers here, of which one is killed in the middle.  What is said of a vehicle over time is
+timed on copies of one flight, a day apart.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
+import logging
+import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +33,7 @@ from onboard.answers.fleet.record import Flown, Record
 from onboard.answers.fleet.vehicles import vehicles_of
 from onboard.batches.store import DIGEST, MAGIC
 from onboard.recordings.provenance import Provenance
-from sitl.builtin.truth import ImuTruth
+from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, write_tlog
 
 MILLION = 1_000_000
@@ -56,42 +62,78 @@ class Cost:
     memory: float
 
 
-def flights(folder: Path, count: int) -> None:
-    """Simulated flights of a copter and a plane."""
+def flights(folder: Path, count: int, vehicles: int, seconds: float) -> None:
+    """Simulated flights, a day apart, by turns of so many copters and planes."""
     for k in range(count):
-        truth = ImuTruth(scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.3))
+        vehicle, day = k % vehicles, k // vehicles
+        own = folder / f"vehicle-{vehicle:02}"
+        own.mkdir(exist_ok=True)
         spec = FlightSpec(
-            vehicle="plane" if k % 2 else "copter",
-            duration=FLIGHT_S,
-            imus=(truth,),
+            vehicle="plane" if vehicle % 2 else "copter",
+            duration=seconds,
+            imus=random_imus(vehicle),
             seed=k,
-            start_unix_us=1_760_000_000_000_000 + k * 86_400_000_000,
+            start_unix_us=1_760_000_000_000_000 + day * 86_400_000_000 + vehicle * 3_600_000_000,
         )
-        write_tlog(spec, folder / f"{k:02}.tlog")
+        write_tlog(spec, own / f"{day:02}.tlog")
 
 
-def run(folder: Path, jobs: int, store: Path, document: Path) -> Run:
-    """The command itself, in a process of its own."""
+def run(
+    folder: Path, where: Sequence[str], document: Path, during: Callable[[], None] | None = None
+) -> Run:
+    """The command itself, in a process of its own; ``where`` are options that say who does it."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began = time.monotonic()
-    command = [sys.executable, "-m", "onboard", "fleet", str(folder), "--jobs", str(jobs),
-               "--store", str(store), "--json", str(document)]  # fmt: skip
+    command = [sys.executable, "-m", "onboard", "fleet", str(folder), "--by-folder",
+               "--json", str(document), *where]  # fmt: skip
     quiet = subprocess.DEVNULL
-    subprocess.run(command, check=False, stdout=quiet, stderr=quiet)  # noqa: S603 - ours
+    with subprocess.Popen(command, stdout=quiet, stderr=quiet):  # noqa: S603 - ours
+        if during is not None:
+            during()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Run(time.monotonic() - began, cpu, after.ru_maxrss * 1024)
 
 
-def measured(folder: Path, processes: Sequence[int]) -> Cost:
-    """Print what a folder costs."""
+def on_cluster(folder: Path, document: Path, batch: int, lost_after_s: float) -> None:
+    """Print what two workers of a Dask cluster need, of which one is killed after some seconds."""
+    distributed = importlib.import_module("distributed")
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    quiet = logging.CRITICAL
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=quiet
+    ) as cluster:
+        held: list[int] = []
+
+        def kill() -> None:
+            """A worker that is in the middle of something."""
+            time.sleep(lost_after_s)
+            while not held:
+                states = cluster.scheduler.workers
+                for worker in cluster.workers.values():
+                    state = states.get(worker.worker_address)
+                    if not held and state is not None and state.processing:
+                        held.append(len(state.processing))
+                        os.kill(worker.pid, signal.SIGKILL)
+                time.sleep(0.01)
+
+        where = ["--scheduler", cluster.scheduler_address, "--batch", str(batch)]
+        once = run(folder, where, document, during=kill)
+    print(
+        f"cluster of two: {once.wall_s:.1f} s; one was killed after {lost_after_s:.0f} s, "
+        f"with {held[0]} batches"
+    )
+
+
+def measured(folder: Path, processes: Sequence[int], batch: int | None) -> Cost:
+    """Print what a folder costs; ``batch``: recordings a task of a cluster, None: no cluster."""
     hours, accelerometers, records, per_hour = 0.0, 0, [0], 0.0
     documents: set[bytes] = set()
     with tempfile.TemporaryDirectory() as scratch:
         for jobs in processes:
             store, out = Path(scratch) / f"store-{jobs}", Path(scratch) / "fleet.json"
-            once = run(folder, jobs, store, out)
-            again = run(folder, jobs, store, out)
+            where = ["--jobs", str(jobs), "--store", str(store)]
+            once, again = run(folder, where, out), run(folder, where, out)
             documents.add(out.read_bytes())
             replays = [r["replay"] for r in json.loads(out.read_bytes())["recordings"]]
             seconds = [r["recording"]["duration_s"] for r in replays if r]
@@ -103,6 +145,9 @@ def measured(folder: Path, processes: Sequence[int]) -> Cost:
                 f"{once.cpu_s:.1f} s of processor, largest process {once.largest / 1e6:.0f} MB; "
                 f"from the store {again.wall_s:.1f} s"
             )
+        if batch is not None:
+            on_cluster(folder, Path(scratch) / "cluster.json", batch, 0.4 * once.wall_s)
+            documents.add((Path(scratch) / "cluster.json").read_bytes())
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
         print(f"documents: {'the same' if len(documents) == 1 else 'DIFFERENT'}")
         print(f"{len(seconds)} flights, {hours:.3f} h, {accelerometers} accelerometers, {size} B")
@@ -166,14 +211,17 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", type=Path)
     parser.add_argument("--jobs", nargs="+", type=int, default=[1, 2])
     parser.add_argument("--simulated", type=int, default=8, help="flights, without a folder")
+    parser.add_argument("--vehicles", type=int, default=2, help="that fly them")
+    parser.add_argument("--seconds", type=float, default=FLIGHT_S, help="of each of them")
+    parser.add_argument("--cluster", type=int, metavar="N", help="with N recordings a task")
     parser.add_argument("--flight-s", type=float, default=900.0, help="of the million")
     parser.add_argument("--core-hour", type=float, default=CORE_HOUR)
     told = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = told.folder or Path(scratch)
         if told.folder is None:
-            flights(folder, told.simulated)
-        million(measured(folder, told.jobs), told)
+            flights(folder, told.simulated, told.vehicles, told.seconds)
+        million(measured(folder, told.jobs, told.cluster), told)
 
 
 if __name__ == "__main__":

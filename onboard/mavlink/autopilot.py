@@ -138,7 +138,7 @@ class Participant(Protocol):
     """A sans-IO protocol that the link drives: streams, parameters, the board's identity.
 
     The link calls ``start`` when the autopilot is found and again after it rebooted or came
-    back, ``feed`` with each message of ``names`` and ``poll`` ten times a second; messages
+    back, ``feed`` with each message of ``names`` and ``poll`` some times a second; messages
     returned are sent.  ``now`` is the link's monotonic clock, s.
     """
 

@@ -15,7 +15,7 @@ from typing import Final
 LINGER_S: Final = 0.02
 """s that a descriptor is left alone after a read while an answer is waited for or a push is under
 way: 50 wake-ups per second, and inertial samples come every 20 ms [data]."""
-REST_S: Final = 0.15
+REST_S: Final = 0.3
 """s that it is left alone at all other times.  The link reads with each tick, which comes sooner,
 so that one wake-up does for both [cost]."""
 SERIAL_LINGER_S: Final = 0.04
@@ -28,9 +28,9 @@ CONNECT_TIMEOUT_S: Final = 5.0
 """s; a TCP peer on the same companion or network answers at once, or not at all [tuned]."""
 READ_SIZE: Final = 65536
 """bytes; no datagram is longer [protocol: UDP]."""
-BYTES_PER_TURN: Final = 2048
-"""bytes that are read before the loop has its turn: what a line of 921600 baud brings within a
-linger; bytes made to be slow to parse take some milliseconds [cost]."""
+BYTES_PER_TURN: Final = 4096
+"""bytes that are read before the loop has its turn: what the heaviest stream of one accelerometer
+brings from tick to tick is 2.4 kB; bytes made to be slow to parse take some milliseconds [cost]."""
 DATAGRAMS_PER_TURN: Final = 1024
 """So many are read in a turn, also of those that are empty or bring an error: 2 to 3 ms, and a
 socket is emptied faster than a core can fill it [cost]."""
@@ -84,7 +84,12 @@ HEARTBEATs [data]."""
 # The autopilot
 
 TICK_S: Final = 0.1
-"""s between two polls of the participants: below every wait that one of them has [cost]."""
+"""s between two polls of the participants while an answer is waited for, a push is under way or one
+of them has just said something: below every wait that one of them has [cost]."""
+REST_TICK_S: Final = 0.2
+"""s between two at all other times.  HEARTBEATs are read with the tick; what they are delayed by
+may be a fifth of their interval, or two that contradict each other could not be told from two that
+follow each other (CONTRADICTION_S) [data].  Half as many wake-ups [cost]."""
 HEARTBEAT_INTERVAL_S: Final = 1.0
 """s between two of our own [protocol]."""
 HEARTBEAT_TIMEOUT_S: Final = 5.0

@@ -335,10 +335,10 @@ class Link:
             # Before anything is asked or written: what has come may forbid it.
             for connection in self.connections:
                 connection.read()
-            self._tick(self._clock())
-            await asyncio.sleep(limits.TICK_S)
+            await asyncio.sleep(self._tick(self._clock()))
 
-    def _tick(self, now: float) -> None:
+    def _tick(self, now: float) -> float:
+        """Say what is due; how long until the next one, s."""
         brief = self.presence.held() or now - self._asked_at < limits.ASKING_S
         for connection in self.connections:
             connection.pace(self._linger if brief else self._rest)
@@ -356,6 +356,8 @@ class Link:
             for participant in self._participants:
                 for message in participant.poll(now):
                     self.send(message)
+                    brief = True  # a list is sent at a pace of its own, in parts
+        return limits.TICK_S if brief else limits.REST_TICK_S
 
     def _restart_participants(self, now: float) -> None:
         if self.presence.source is not None:

@@ -20,9 +20,9 @@ from onboard.mavlink.limits import (
     BACKOFF_BASE_S,
     BACKOFF_CAP_S,
     LINGER_S,
+    REST_TICK_S,
     SILENCE_S,
     STABLE_S,
-    TICK_S,
 )
 from onboard.mavlink.link import Link
 from tests.mavlink.mavlink_peer import attitude, heartbeat
@@ -50,7 +50,7 @@ class TestPace:
         async with running(UDP) as link:
             (transport,) = air.transports
             await beat(transport, 5.0)
-            assert transport.lingers[-1] > TICK_S  # the tick reads sooner
+            assert transport.lingers[-1] > REST_TICK_S  # the tick reads sooner
             for message, brief in (
                 (mavlink.MAVLink_statustext_message(6, b"to whom it may concern"), False),
                 (mavlink.MAVLink_param_request_read_message(1, 1, b"INS_ACCSCAL_X", -1), True),
@@ -58,7 +58,7 @@ class TestPace:
                 link.send(message)
                 assert (transport.lingers[-1] == LINGER_S) == brief
             await beat(transport, ASKING_S + 1.0)
-            assert transport.lingers[-1] > TICK_S
+            assert transport.lingers[-1] > REST_TICK_S
 
     @virtual_time
     async def test_nor_is_anything_while_a_push_is_under_way(self, air):

@@ -69,11 +69,37 @@ def calibration_of(
     Raises:
         KeyError: no flight was processed.
     """
+    in_force = parameters.six(imu).as_linear()
+    residuals = _residuals(engine, _solved(engine, imu), in_force)
+    return _record(
+        imu, engine, parameters, residuals, finished=finished, rejected=rejected, kind=kind
+    )
+
+
+def calibrated(imu: int, engine: Engine, parameters: ParametersInForce) -> bool:
+    """Whether :func:`calibration_of` says so, without what takes time and does not decide it.
+
+    Raises:
+        KeyError: no flight was processed.
+    """
+    made = _record(imu, engine, parameters, _NOT_ASKED, finished=False, rejected={}, kind="")
+    return made.status is Status.CALIBRATED
+
+
+def _record(
+    imu: int,
+    engine: Engine,
+    parameters: ParametersInForce,
+    residuals: _Residuals,
+    *,
+    finished: bool,
+    rejected: dict[str, int],
+    kind: str,
+) -> Calibration:
     solution, in_force = _solved(engine, imu), parameters.six(imu)
     value, gyro = parameters_of(solution.theta), gyro_sigma(parameters.R_bs)
     covariance, load = claimed_covariance(solution, gyro), flown_loads(engine.batches)
     seen = assess(six_information(solution), engine.settings.needs, kind)
-    residuals = _residuals(engine, solution, in_force.as_linear())
     made = Calibration(
         imu=imu,
         status=Status.INSUFFICIENT if finished else Status.COLLECTING,
@@ -118,6 +144,10 @@ class _Residuals:
     velocity: tuple[float, float]
     predictive_gain: float
     dead_reckoning: DeadReckoning | None
+
+
+_NONE = (math.nan, math.nan)
+_NOT_ASKED = _Residuals(_NONE, _NONE, _NONE, math.nan, None)
 
 
 def _residuals(engine: Engine, solution: Solution, in_force: Array) -> _Residuals:

@@ -2,8 +2,9 @@
 
 Sums are only as good as the point about which latency, averaging span and noise were taken.  So
 the last minutes of flight are kept; after :attr:`CalibratorSettings.refine_at_s` of trusted
-flight, and when the recording ends, timing and noise are estimated from the buffer and the sums
-made anew from it.  Flight that has left the buffer stays in the sums as it was taken.
+flight, if what is known then is not enough, and when the recording ends, timing and noise are
+estimated from the buffer and the sums made anew from it.  Flight that has left the buffer stays in
+the sums as it was taken.
 """
 
 from __future__ import annotations
@@ -108,6 +109,7 @@ class Engine:
         """Batches that were added and that no pass has gone through yet, at the end."""
         self._buffered_s = 0.0
         self._refined_s = 0.0
+        self._due = False
         self._frozen = False
         self.model = self._model()
         self._seed: Solution | None = None
@@ -172,8 +174,13 @@ class Engine:
         """Trusted seconds since the last refinement."""
         return self.trusted_s - self._refined_s
 
+    @property
+    def due(self) -> bool:
+        """Whether it is time for a refinement, and one may still be made."""
+        return self._due and not self._frozen
+
     def add(self, batch: Batch) -> None:
-        """Process a batch; refine when it is time."""
+        """Process a batch."""
         self.batches.append(batch)
         self._waiting += 1
         self._solution = None
@@ -181,9 +188,8 @@ class Engine:
         before, self.trusted_s = self.trusted_s, self.trusted_s + batch.trusted_s
         if self.settings.at_once:
             self._catch_up()
-        due = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
-        if due and self.settings.refine:
-            self.refine()
+        passed = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
+        self._due |= passed and self.settings.refine
         self._age()
 
     def _catch_up(self) -> None:
@@ -231,7 +237,7 @@ class Engine:
         self.tune(levels=levels)
         self.once()
         self._pass.release()
-        self._refined_s = self.trusted_s
+        self._refined_s, self._due = self.trusted_s, False
 
     def once(self, held: tuple[Array, Array] | None = None) -> None:
         """Make the sums of the buffer anew, with timing and noise as they are.

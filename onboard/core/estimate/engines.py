@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
+from onboard.core.estimate.calibration_record import calibrated
 from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.settings import CalibratorSettings
@@ -44,7 +45,11 @@ class Engines:
         return {*self._engines, *self.earlier}
 
     def add(self, batches: Mapping[int, list[Batch]]) -> float | None:
-        """Process batches of flight by accelerometer; time of the last fix in them, s."""
+        """Process batches of flight by accelerometer; time of the last fix in them, s.
+
+        A refinement that is due waits while the accelerometer is calibrated without it: it would
+        say the same with smaller sigmas, and goes several times over all that was flown.
+        """
         newest: float | None = None
         for imu, made in batches.items():
             if self._only and imu not in self._only:
@@ -54,7 +59,10 @@ class Engines:
                 if imu not in self._engines:
                     prior = self._parameters.six(imu).as_linear()
                     self._engines[imu] = Engine(self._settings, prior)
-                self._engines[imu].add(batch)
+                engine = self._engines[imu]
+                engine.add(batch)
+                if engine.due and not calibrated(imu, engine, self._parameters):
+                    engine.refine()
                 end = float(batch.fixes.t[-1])
                 newest = end if newest is None else max(newest, end)
         return newest

@@ -17,7 +17,8 @@ class CalibratorSettings:
         buffer_s: flight that is kept for re-linearisation, s; older flight stays in the sums.
         memory_s: time constant with which older flight is forgotten once the buffer is full, s
             (an accelerometer's offset wanders with temperature and age).
-        refine_at_s: trusted seconds after which timing and noise are estimated anew.
+        refine_at_s: trusted seconds after which timing and noise are estimated anew, as soon as the
+            flight is not calibrated without that.
         refine: estimate timing and noise at all; False where a diagnosis will do it itself.
         at_once: go through flight as it comes; False where nobody asks before a diagnosis, which
             goes through it by itself.

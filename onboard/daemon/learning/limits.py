@@ -10,8 +10,9 @@ from typing import Final
 
 # Between the loop and the learner's thread
 
-BATCH_S: Final = 0.25
-"""s between two batches: a thread is woken four times a second, not for each message [cost]."""
+BATCH_S: Final = 1.0
+"""s between two batches, as often as people are told: every hand-over wakes up a thread and, with
+its answer, the loop [cost]."""
 WAITING_LIMIT: Final = 200_000
 """Samples that wait while a flight is refined: ten minutes of the heaviest stream [data]."""
 PARAMETERS_S: Final = 30.0

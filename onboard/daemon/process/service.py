@@ -1,6 +1,6 @@
 """The service's life: startup, main loop, tick, shutdown, read from top to bottom.
 
-The link hands each message to :meth:`Service.on_message`, on the loop; four times a second what
+The link hands each message to :meth:`Service.on_message`, on the loop; once a second what
 came is handed to the learner, on the worker's thread; once a second :meth:`Service.on_tick`
 judges, saves and tells.  The watchdog is fed in that tick, as long as the learner keeps up.
 """

@@ -22,8 +22,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from onboard.core.estimate.result import Status
-from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
 from onboard.daemon.pushing import limits
@@ -106,6 +106,7 @@ class Proposals:
         """Accelerometer of the transaction under way: its values change by our own doing."""
         self._imus = imus
         self._standing: dict[int, Standing] = {}
+        self._plans: dict[int, tuple[tuple[object, ...], PushPlan]] = {}
         self._refusals = refusals
         for imu, why in (refusals.refusals() if refusals is not None else {}).items():
             self.standing(imu).refused = why
@@ -127,14 +128,7 @@ class Proposals:
         plans: dict[int, PushPlan] = {}
         for imu, calibration in calibrations.items():
             try:
-                plans[imu] = propose(
-                    calibration,
-                    parameters,
-                    system_id=system_id,
-                    board=board,
-                    scale_bounds=(self.settings.scale_min, self.settings.scale_max),
-                    offset_bound=self.settings.offset_max,
-                )
+                plans[imu] = self._plan(calibration, parameters, system_id, board)
             except PushError:
                 self.counters["not_proposed"] += 1
         alone = {
@@ -161,6 +155,27 @@ class Proposals:
             for refusal in refusals:  # several of one name (six sigmas): the first says enough
                 held_back.setdefault(refusal.objection.value, refusal.sentence)
             self.current[imu] = Proposal(self.standing(imu).approved or plan, held_back)
+
+    def _plan(
+        self, calibration: Calibration, parameters: Mapping[str, float], system_id: int, board: str
+    ) -> PushPlan:
+        """The plan, as it was a second ago if nothing that it is made of has changed."""
+        names = parameter_names(calibration.imu)
+        told = tuple(parameters.get(name) for name in (*names.six, names.device_id))
+        asked = (calibration, told, system_id, board, self.settings)
+        before = self._plans.get(calibration.imu)
+        if before is not None and before[0] == asked:
+            return before[1]
+        plan = propose(
+            calibration,
+            parameters,
+            system_id=system_id,
+            board=board,
+            scale_bounds=(self.settings.scale_min, self.settings.scale_max),
+            offset_bound=self.settings.offset_max,
+        )
+        self._plans[calibration.imu] = asked, plan
+        return plan
 
     def ready(self) -> PushPlan | None:
         """The first plan that nothing holds back."""
