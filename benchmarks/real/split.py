@@ -105,6 +105,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-23-3",
     "2026-11-23-4",
     "2026-11-23-5",
+    "2026-11-24",
 )
 """Releases that have been judged."""
 

@@ -20,3 +20,7 @@ AT_ONCE: Final = 12
 """Jumps in one pass of the search: more columns against more flight around them."""
 SHORTEST_S: Final = 4.0
 """s of flight between two clipped parts that are worth keeping."""
+FORGOTTEN_S: Final = 45.0
+"""s of flight to either side of a jump that are gone through: a filter that GPS corrects has then
+forgotten nine tenths of what tells it (two simulated copters and planes: 0.95 to 1.00; 0.80 to 0.96
+after 35 s, for the likeliest gyroscope is quiet)."""

@@ -36,10 +36,6 @@ MOST_EFFECTS: Final = 5
 
 # Jumps (jumps, selection).
 
-FORGOTTEN_S: Final = 45.0
-"""s after which a filter that GPS corrects has forgotten nine tenths of what tells a jump of the
-accelerometer [two simulated copters and planes: 0.95 to 1.00; 0.80 to 0.96 after 35 s, for the
-likeliest gyroscope is quiet]."""
 SETTLED_S: Final = 35.0
 """s on the boot clock after which an EKF has settled: before that its attitude jumps [tuned]."""
 SPACINGS_S: Final = (2.0, 0.5)

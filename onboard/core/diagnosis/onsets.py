@@ -10,8 +10,8 @@ from operator import add
 import numpy as np
 
 from onboard.core.diagnosis.block_jumps import OFFSETS
+from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import FORGOTTEN_S
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.diagnosis.stepped import ReadyFlight, WithJumps, places_of

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.explaining import heard
-from onboard.core.diagnosis import effort, examination, jumps, procedure
+from onboard.core.diagnosis import effort, examination, jumps, onsets, procedure
 from onboard.core.diagnosis.procedure import diagnose
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
@@ -31,6 +31,7 @@ def test_twice_the_work_says_the_same(monkeypatch):
         (examination, "WORTH_A_PASS"): tuple(0.5 * x for x in effort.WORTH_A_PASS),
         (jumps, "FURTHEST"): 2 * effort.FURTHEST,
         (jumps, "AT_ONCE"): effort.AT_ONCE // 2,
+        (onsets, "FORGOTTEN_S"): 2.0 * effort.FORGOTTEN_S,
         (procedure, "FURTHEST"): 2 * effort.FURTHEST,
     }
     for (module, name), value in more.items():
