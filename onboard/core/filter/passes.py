@@ -60,6 +60,8 @@ class Pass:
         self.keep_traces = traces
         self.keep_rows = False
         """Whether traces have all that was whitened."""
+        self.keep_states = True
+        """Whether the filter's state is kept after each epoch."""
         self._held = theta is not None
         self._information = np.diag(1.0 / model.prior_sigma**2)
         self._prior_b = self._information @ model.prior
@@ -200,7 +202,7 @@ class Pass:
         sums.add(made.y, made.h, made.log_det)
         self._note(made, result)
         self._estimate(sums)
-        if made.velocities:
+        if made.velocities and self.keep_states:
             result.states.append(self._state(made))
 
     def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
@@ -208,13 +210,15 @@ class Pass:
         if not len(gone.epochs):
             return
         result.epochs += len(gone.epochs)
-        sums.add(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_det)
+        sums.add_rows(gone.rows, gone.log_det)
         with_velocity = gone.epochs[gone.velocities > 0]
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
         if self.keep_traces:
             result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
         self._estimate(sums, len(gone.epochs))
+        if not self.keep_states:
+            return
         if not self._held:
             gone.states[-1, 12:] = self.filter.velocity(self.theta)
         result.states += gone.noted(ready.epochs, self.bias_b)
