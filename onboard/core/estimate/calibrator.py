@@ -107,7 +107,8 @@ class Calibrator:
 
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
-        sample = measured(sample)
+        if isinstance(sample, GpsFix):
+            sample = measured(sample)
         refusal = impossible(sample)
         if refusal is not None:
             if not isinstance(sample, ParameterValue):  # unset ones are NaN: nothing is lost
