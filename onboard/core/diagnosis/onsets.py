@@ -105,4 +105,11 @@ def _with_jumps(
     sums.G[mine] = far.G[source[mine]]
     sums.b[mine] = sign[mine] * far.b[source[mine]]
     sums.s, sums.rows, sums.log_det = far.s, far.rows, far.log_det
+    if after:
+        # Offsets are along the sensor's axes, jumps along the body's.
+        R_bs = full.batches[0].segment.R_bs
+        for at in (model.slices[s.name] for s in steps if not isinstance(s, Shock)):
+            sums.N[at] = R_bs @ sums.N[at]
+            sums.N[:, at] = sums.N[:, at] @ R_bs.T
+            sums.b[at] = R_bs @ sums.b[at]
     return sums

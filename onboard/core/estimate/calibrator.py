@@ -107,8 +107,7 @@ class Calibrator:
 
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
-        if isinstance(sample, GpsFix):
-            sample = measured(sample)
+        sample = measured(sample)
         refusal = impossible(sample)
         if refusal is not None:
             if not isinstance(sample, ParameterValue):  # unset ones are NaN: nothing is lost

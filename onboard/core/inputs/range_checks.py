@@ -27,9 +27,11 @@ PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
 ACCELEROMETERS = range(1, 6)
 
 
-def measured(fix: GpsFix) -> GpsFix:
-    """The fix without what it says is no number: a receiver may have no vertical velocity."""
-    return replace(fix, v_d=None) if fix.v_d is not None and math.isnan(fix.v_d) else fix
+def measured(sample: Sample) -> Sample:
+    """The sample without what it says is no number: a receiver may have no vertical velocity."""
+    if isinstance(sample, GpsFix) and sample.v_d is not None and math.isnan(sample.v_d):
+        return replace(sample, v_d=None)
+    return sample
 
 
 def impossible(sample: Sample) -> str | None:
