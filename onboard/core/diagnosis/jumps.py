@@ -15,7 +15,7 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import AT_ONCE, FURTHEST
+from onboard.core.diagnosis.effort import ONCE_MORE, FURTHEST
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
@@ -49,7 +49,7 @@ def jumps_anywhere(full: Examination) -> list[Looked]:
     found = Stepped(full, moments)
     out = [Looked(*x) for x in zip(moments, found.gain.tolist(), found.known, strict=True)]
     best = int(np.argmax(found.gain))
-    about = slice(max(best - AT_ONCE // 2, 0), best + AT_ONCE // 2 + 1)
+    about = slice(max(best - ONCE_MORE // 2, 0), best + ONCE_MORE // 2 + 1)
     jump = BiasStep(Origin(full.point.skew_from))
     fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments[about]])
     out[about] = [

@@ -30,7 +30,7 @@ def test_twice_the_work_says_the_same(monkeypatch):
         (examination, "NEIGHBOURS"): 2 * effort.NEIGHBOURS,
         (examination, "WORTH_A_PASS"): tuple(0.5 * x for x in effort.WORTH_A_PASS),
         (jumps, "FURTHEST"): 2 * effort.FURTHEST,
-        (jumps, "AT_ONCE"): effort.AT_ONCE // 2,
+        (jumps, "ONCE_MORE"): 2 * effort.ONCE_MORE,
         (procedure, "FURTHEST"): 2 * effort.FURTHEST,
     }
     for (module, name), value in more.items():
