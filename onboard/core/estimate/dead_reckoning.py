@@ -199,11 +199,12 @@ class Interval:
         by_scale = nodes.integrals(segment.R_bs * nodes.signals.raw_s[..., None, :])[0]
         eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
         whole = nodes.integrals(eye)[0]
+        turn = nodes.P[:, -1].copy()  # a view would keep every node's attitude alive
         return [
             Interval(
                 float(t[k]),
                 float(t[k + 1]),
-                nodes.P[k, -1],
+                turn[k],
                 by_scale[k],
                 whole[k] @ segment.R_bs,
                 fixes.v_n[k + 1],
