@@ -98,7 +98,7 @@ class Figures:
     seen: Observability | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class _Piece:
     """One run of the boot clock: its first and last inertial sample, and where it is drawn."""
 
@@ -128,7 +128,7 @@ class Chronicle:
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Pass a sample on, and note what came of it."""
         events = self.calibrator.feed(sample)
-        if any(isinstance(event, Restarted) for event in events):
+        if events and any(isinstance(event, Restarted) for event in events):
             self._begin_anew()
         if isinstance(sample, ImuSample):
             self._tick(sample.t)
@@ -194,7 +194,7 @@ class Chronicle:
             drawn = self.duration_s + PAUSE_S if self._pieces else 0.0
             self._piece = _Piece(t, t, drawn)
         elif t > self._piece.last:
-            self._piece = _Piece(self._piece.first, t, self._piece.drawn)
+            self._piece.last = t
 
     def _begin_anew(self) -> None:
         if self._piece is not None:

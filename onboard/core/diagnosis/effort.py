@@ -16,8 +16,8 @@ WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
 another pass."""
 FURTHEST: Final = 3
 """Times that a search goes on beyond its edge."""
-AT_ONCE: Final = 12
-"""Jumps in one pass of the search: more columns against more flight around them."""
+ONCE_MORE: Final = 12
+"""Moments about the best one of a search that are looked at once more, with the jump in place."""
 SHORTEST_S: Final = 4.0
 """s of flight between two clipped parts that are worth keeping."""
 FORGOTTEN_S: Final = 45.0

@@ -15,13 +15,13 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import AT_ONCE, FURTHEST
+from onboard.core.diagnosis.effort import FURTHEST, ONCE_MORE
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.diagnosis.shocks import Shock
-from onboard.core.diagnosis.stepped import ReadyFlight
+from onboard.core.diagnosis.stepped import Stepped
 from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect, Origin
@@ -40,31 +40,23 @@ class Looked:
 def jumps_anywhere(full: Examination) -> list[Looked]:
     """Jumps at moments all over the flight.
 
-    What shows a jump forwards or sideways is the half minute after it: then the tilt has taken it
-    over.  So each is gone through, some neighbours at once.  Those about the best one once more, as
-    the flight is with a jump there: what is far from nothing bends a flight that is taken for one
-    without jumps, and another moment may be better.
+    Those about the best one once more, as the flight is with a jump there: what is far from nothing
+    bends a flight that is taken for one without jumps, and another moment may be better.
     """
     moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
-    ready = ReadyFlight(full)
-    out: list[Looked] = []
-    for i in range(0, len(moments), AT_ONCE):
-        out += _looked(full, moments[i : i + AT_ONCE], ready)
-    if out:
-        best = max(range(len(out)), key=lambda i: out[i].gain)
-        about = slice(max(best - AT_ONCE // 2, 0), best + AT_ONCE // 2 + 1)
-        out[about] = _looked(full, moments[about], None)
-    return out
-
-
-def _looked(full: Examination, moments: Sequence[float], ready: ReadyFlight | None) -> list[Looked]:
-    """Jumps at some neighbouring moments, each beside nothing else."""
+    if not moments:
+        return []
+    found = Stepped(full, moments)
+    out = [Looked(*x) for x in zip(moments, found.gain.tolist(), found.known, strict=True)]
+    best = int(np.argmax(found.gain))
+    about = slice(max(best - ONCE_MORE // 2, 0), best + ONCE_MORE // 2 + 1)
     jump = BiasStep(Origin(full.point.skew_from))
-    fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments], ready=ready)
-    return [
+    fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments[about]])
+    out[about] = [
         Looked(t, fitter.gain(before, after), np.diag(fitter.informed(after, index)))
-        for t, (index, after) in zip(moments, fits, strict=True)
+        for t, (index, after) in zip(moments[about], fits, strict=True)
     ]
+    return out
 
 
 def shown_from(

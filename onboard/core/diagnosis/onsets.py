@@ -14,10 +14,9 @@ from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
-from onboard.core.diagnosis.stepped import ReadyFlight, WithJumps, places_of
-from onboard.core.estimate.engine import Engine, through
+from onboard.core.diagnosis.stepped import places_of
+from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.solution import total
-from onboard.core.filter.passes import Pass
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
@@ -37,8 +36,6 @@ def fitted(
     full: Examination,
     chosen: Sequence[Effect],
     steps: Sequence[BiasStep | Shock],
-    *,
-    ready: ReadyFlight | None = None,
 ) -> tuple[Fitter, Fit, list[tuple[list[int], Fit]]]:
     """Fits without jumps, and with each of them alone; from one pass with all of them.
 
@@ -49,9 +46,6 @@ def fitted(
         full: the flight.
         chosen: effects beside the jumps.
         steps: the jumps.
-        ready: the flight made ready for jumps alone, beside nothing that was chosen: gates and
-            attitude then follow what ``full`` has found without them, which takes an eighth of the
-            time; None: it is gone through as a flight with them is.
 
     Returns:
         Sums with a column for each; the fit without; columns of each jump, and the fit with it.
@@ -62,7 +56,7 @@ def fitted(
     )
     moments = [s.moment for s in steps]
     first, last = min(moments) - FORGOTTEN_S, max(moments) + FORGOTTEN_S
-    early, near, late = [], [], []
+    early, late = [], []
     for batch, block in zip(full.batches, full.blocks, strict=True):
         if batch.fixes.t[-1] < first:
             early.append(block)
@@ -70,17 +64,11 @@ def fitted(
             late.append(block)
         else:
             made.batches.append(batch)
-            near.append(block)
-    if ready is None:
-        made.once()
-        sums = [block.sums for block in made.blocks]
-        far = (total(early) if early else None, total(late) if late else None)
-    else:
-        sums = _gone_through(made, ready, steps)
-        far = ready.far(early, near, late)
-    for other, after in zip(far, (False, True), strict=True):
-        if other is not None:
-            sums.append(_with_jumps(other, full, made.model, steps, after=after))
+    made.once()
+    sums = [block.sums for block in made.blocks]
+    for blocks, after in ((early, False), (late, True)):
+        if blocks:
+            sums.append(_with_jumps(total(blocks), full, made.model, steps, after=after))
     absent = np.zeros(made.model.size)
     if "clock_rate" in made.model.index:
         absent[made.model.index["clock_rate"]] = -made.point.skew
@@ -93,28 +81,6 @@ def fitted(
     before = fitter.fit(free, held_out=False)
     fits = [(index, fitter.fit([*free, *index], held_out=False)) for index in columns]
     return fitter, before, fits
-
-
-def _gone_through(
-    made: Engine, ready: ReadyFlight, steps: Sequence[BiasStep | Shock]
-) -> list[NormalSums]:
-    """Sums of the batches of ``made``, with what is known of the flight without jumps held."""
-    theta, covariance = ready.known(made.model)
-    first = made.batches[0]
-    ready.forget_before(first)
-    jumping = WithJumps(ready, made.model, [s for s in steps if isinstance(s, BiasStep)])
-    jumping.going = going = Pass(
-        made.model,
-        made.point,
-        (made.noise,),
-        uses=made.uses,
-        theta=theta,
-        covariance=covariance,
-        preparations=jumping,
-    )
-    going.bias_b = ready.bias_b(first)
-    coast_s = made.settings.coast_s
-    return [through(going, batch, coast_s).block.sums for batch in made.batches]
 
 
 def _with_jumps(
@@ -139,4 +105,11 @@ def _with_jumps(
     sums.G[mine] = far.G[source[mine]]
     sums.b[mine] = sign[mine] * far.b[source[mine]]
     sums.s, sums.rows, sums.log_det = far.s, far.rows, far.log_det
+    if after:
+        # Offsets are along the sensor's axes, jumps along the body's.
+        R_bs = full.batches[0].segment.R_bs
+        for at in (model.slices[s.name] for s in steps if not isinstance(s, Shock)):
+            sums.N[at] = R_bs @ sums.N[at]
+            sums.N[:, at] = sums.N[:, at] @ R_bs.T
+            sums.b[at] = R_bs @ sums.b[at]
     return sums

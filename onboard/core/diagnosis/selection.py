@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
 from onboard.core.estimate.pool import Pool
-from onboard.core.estimate.scatter import Scatter, scores_of, stacked
+from onboard.core.estimate.scatter import Scatter, Stacked
 from onboard.core.estimate.solution import total
 from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
@@ -182,17 +182,16 @@ class Fitter:
         return self._scatter(everything).pool(self.prior_information, least)
 
     @cached_property
-    def _stacked(self) -> tuple[Array, Array, Array]:
-        return stacked(self.blocks)
+    def _stacked(self) -> Stacked:
+        return Stacked(self.blocks)
 
     def _scatter(self, fit: Fit) -> Scatter:
         """Scores of the blocks about a fit, in its own columns."""
         index = list(fit.free)
-        N, b, gram = self._stacked
         A = self._information(self.sums, index) + np.diag(self.prior_information[index])
-        scores = scores_of(N, b, gram, fit.theta)[:, index]
+        scores = self._stacked.scores(fit.theta)[:, index]
         inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
-        return Scatter(N, scores, inverse, index)
+        return Scatter(self._stacked, scores, inverse, index)
 
     def rms(self, fit: Fit) -> float:
         """Whitened root mean square of a fit."""

@@ -1,113 +1,193 @@
-"""A flight made ready once, for jumps at any moment: their columns are those of the offsets.
+"""A flight gone through once with a jump at each of many moments, for what each explains.
 
 From its moment on a jump is an offset with the sign changed; before it, it is nothing.  So nothing
 has to be evaluated for it: what the offsets add in each step of prediction is taken, and of the
-step in which it jumps the share that is left of it.
+step in which it jumps the share that is left of it.  What tells it is forgotten after a while; from
+then on its columns in the sums are the offsets' own, and its place in the model is another jump's.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import reduce
-from operator import add, sub
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.block_jumps import OFFSETS
+from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.engine import through
 from onboard.core.estimate.solution import total
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.preparations import Kept, Preparations, Source
+from onboard.core.filter.preparations import Kept, Source
 from onboard.core.filter.prepared import Prepared
-from onboard.core.inputs.segments import Batch
+from onboard.core.filter.whitening import Uses
+from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
-from onboard.core.model.regressors import Model
-from onboard.core.physics.effects.bias_step import BiasStep
+from onboard.core.model.nuisances import AXIS
+from onboard.core.model.regressors import Family, Model, Unknown
+from onboard.core.physics.effects.bias_step import LARGEST
 
 
-class ReadyFlight:
-    """The flight of an examination with the calibration's own columns, as far as it is needed."""
+class Places(Family):
+    """Unknowns of jumps that are under way; what they add is written by :func:`jumping`."""
 
-    def __init__(self, full: Examination) -> None:
-        """Take the flight and its linearisation."""
-        model = calibration_model(full.point, full.prior, full.settings.needs, full.carried)
-        self._pass = Pass(model, full.point, (full.noise,))
-        self._last_bias_b = full.bias_b
-        self._place = {_key(b): i for i, b in enumerate(full.batches)}
-        self._kept: dict[int, Kept] = {}
-        self._known = _known(full, model)
-        self._whole = total(full.blocks)
-        self._early: list[Block] = []
-        self._sums = NormalSums.zeros(full.model.size)
+    name = "jumps"
 
-    def known(self, model: Model) -> tuple[Array, Array]:
-        """What is known without jumps, (m,) and (m, m), for a model that has them at its end."""
-        theta, covariance = model.prior.copy(), np.diag(model.prior_sigma**2)
-        n = len(self._known[0])
-        theta[:n], covariance[:n, :n] = self._known
-        return theta, covariance
-
-    def far(
-        self, early: Sequence[Block], near: Sequence[Block], late: Sequence[Block]
-    ) -> tuple[NormalSums | None, NormalSums | None]:
-        """Sums of the early blocks and of the late ones, which with the near ones are all.
-
-        Moments come in order: what is early is added up once, not for each of them again.
-        """
-        if [*map(id, early[: len(self._early)])] != [*map(id, self._early)]:
-            self._early, self._sums = [], NormalSums.zeros(self._whole.size)
-        self._sums = reduce(add, (b.sums for b in early[len(self._early) :]), self._sums)
-        self._early = list(early)
-        rest = reduce(sub, (b.sums for b in near), self._whole - self._sums)
-        return self._sums if early else None, rest if late else None
-
-    def bias_b(self, first: Batch) -> Array:
-        """(3,) of the gyroscope, rad/s, about that of a batch."""
-        kept = self._kept.get(self._place[_key(first)])
-        return self._last_bias_b if kept is None else kept.bias_b
-
-    def forget_before(self, first: Batch) -> None:
-        """What was before a batch is not asked for any more."""
-        since = self._place[_key(first)]
-        self._kept = {i: kept for i, kept in self._kept.items() if i >= since}
-
-    def of(self, source: Source, bias_b: Array) -> Kept | None:
-        """A batch made ready with a bias like this; None for one that is not of the flight."""
-        i = self._place.get((id(source.segment), id(source.fixes)))
-        if i is None or source.skipped:
-            return None
-        if i not in self._kept or not self._kept[i].serves(bias_b):
-            self._pass.bias_b = bias_b
-            self._kept[i] = self._pass.made_anew(source, source.segment)
-        return self._kept[i]
+    def __init__(self, count: int) -> None:
+        """Take how many there are at once."""
+        self.unknowns = tuple(
+            Unknown(f"jump_{i}_{a}", "m/s^2", 0.0, LARGEST) for i in range(count) for a in AXIS
+        )
 
 
-class WithJumps(Preparations):
-    """The same for a pass whose model has jumps after its other unknowns.
+class Stepped:
+    """What one pass over a flight says of jumps at J moments, each beside nothing else.
 
     Attributes:
-        going: the pass.
+        gain: (J,) fall of chi-square by each.
+        known: (J, 3) what the sums know of its size along each axis, the rest unknown.
     """
 
-    going: Pass
+    def __init__(self, full: Examination, moments: Sequence[float]) -> None:
+        """Go through the flight of ``full``, whose moments (s, in order) are asked for."""
+        self._moments = np.asarray(moments)
+        self._offsets = list(OFFSETS)
+        places = self._places(full.batches)
+        count = max((len(now) for now in places), default=0)
+        model = calibration_model(
+            full.point, full.prior, full.settings.needs, (*full.carried, Places(max(count, 1)))
+        )
+        self._m = m = model.slices[Places.name].start
+        self._sums = NormalSums.zeros(m)
+        J = len(self._moments)
+        self._cross, self._own, self._b = np.zeros((J, 3, m)), np.zeros((J, 3, 3)), np.zeros((J, 3))
+        self._since = np.zeros((J, 3, m + 1))
+        self._go_through(full, model, places)
+        self._go_on(full.batches[0].segment.R_bs)
+        self.gain, self.known = self._fitted(model)
 
-    def __init__(self, flight: ReadyFlight, model: Model, jumps: Sequence[BiasStep]) -> None:
-        super().__init__(0)
-        self._flight, self._model, self._jumps = flight, model, jumps
+    def _places(self, batches: Sequence[Batch]) -> list[dict[int, int]]:
+        """For each batch the jumps that are under way, by number, and which place each has."""
+        out: list[dict[int, int]] = []
+        now: dict[int, int] = {}
+        begun = 0
+        for batch in batches:
+            first, last = float(batch.fixes.t[0]), float(batch.fixes.t[-1])
+            now = {j: p for j, p in now.items() if first <= self._moments[j] + FORGOTTEN_S}
+            while begun < len(self._moments) and self._moments[begun] <= last:
+                now[begun] = next(p for p in range(len(now) + 1) if p not in now.values())
+                begun += 1
+            out.append(dict(now))
+        return out
 
-    def of(self, source: Source) -> Kept | None:
-        """With columns of the jumps."""
-        made = self._flight.of(source, self.going.bias_b)
-        if made is None:
-            return None
-        ready = jumping(made.ready, self._model, self._jumps, source.segment.R_bs)
-        return replace(made, of=source, ready=ready)
+    def _go_through(self, full: Examination, model: Model, places: list[dict[int, int]]) -> None:
+        """Add up each batch: the calibration's columns, and those of the jumps under way."""
+        going = JumpingPass(full, model)
+        before: dict[int, int] = {}
+        for batch, now in zip(full.batches, places, strict=True):
+            for j in before.keys() - now.keys():
+                self._ended(j)
+            columns = {j: self._m + 3 * place for j, place in now.items()}
+            for j in now.keys() - before.keys():
+                going.begin(columns[j])
+            going.jumps = [(columns[j], float(self._moments[j])) for j in now]
+            sums = through(going, batch, full.settings.coast_s).block.sums
+            self._sums += sums.subset(range(self._m))
+            for j, at in columns.items():
+                mine = slice(at, at + 3)
+                self._cross[j] += sums.N[mine, : self._m]
+                self._own[j] += sums.N[mine, mine]
+                self._b[j] += sums.b[mine]
+            before = now
+        for j in before:
+            self._ended(j)
+
+    def _ended(self, j: int) -> None:
+        """Where the sums of the offsets are when those of a jump end."""
+        self._since[j, :, :-1] = self._sums.N[self._offsets]
+        self._since[j, :, -1] = self._sums.b[self._offsets]
+
+    def _go_on(self, R_bs: Array) -> None:
+        """From where its own sums end, a jump is what its sensor reads too much: an offset less."""
+        all_ = np.column_stack([self._sums.N[self._offsets], self._sums.b[self._offsets]])
+        rest = -R_bs @ (all_ - self._since)
+        self._cross += rest[:, :, :-1]
+        self._own -= rest[:, :, self._offsets] @ R_bs.T
+        self._b += rest[:, :, -1]
+
+    def _fitted(self, model: Model) -> tuple[Array, Array]:
+        """Gain (J,) and information (J, 3) of each jump, from normal equations with it."""
+        m, sums = self._m, self._sums
+        prior, mean = model.prior_sigma[:m] ** -2.0, model.prior[:m]
+        inverse = np.linalg.inv(sums.signal + np.diag(prior))
+        alone = inverse @ (sums.b + prior * mean)
+        cross = self._cross @ inverse
+        S = self._own + np.eye(3) / LARGEST**2 - cross @ self._cross.swapaxes(1, 2)
+        size = np.linalg.solve(S, (self._b - self._cross @ alone)[..., None])[..., 0]
+        theta = alone - (size[:, None] @ cross)[:, 0]
+
+        def chi2(theta: Array) -> Array:
+            """(J,) of the other unknowns (J, m) without the jump, up to what does not change."""
+            off = theta - mean
+            out: Array = np.sum(theta * (theta @ sums.N - 2.0 * sums.b) + prior * off**2, axis=-1)
+            return out
+
+        beside = self._b - (self._cross @ theta[..., None])[..., 0]
+        own = (self._own @ size[..., None])[..., 0] + size / LARGEST**2
+        gain = chi2(alone) - chi2(theta) + np.sum(size * (2.0 * beside - own), axis=-1)
+        return gain, np.einsum("jii->ji", S)
+
+
+class JumpingPass(Pass):
+    """A pass with jumps under way; gates and attitude follow what is known without them.
+
+    Attributes:
+        jumps: the first unknown and the moment (s) of each.
+    """
+
+    def __init__(self, full: Examination, model: Model) -> None:
+        theta, covariance = _known(full, model)
+        uses = Uses(height=full.uses.height)
+        super().__init__(
+            model, full.point, (full.noise,), uses=uses, theta=theta, covariance=covariance
+        )
+        self.keep_states = False
+        self.bias_b = full.bias_b
+        self.jumps: list[tuple[int, float]] = []
+
+    def begin(self, column: int) -> None:
+        """A jump begins in a place that another one may have had."""
+        self.filter.carried[:, :, 1 + column : 4 + column] = 0.0
+
+    def made_anew(self, source: Source, segment: Segment) -> Kept:
+        """With the columns of the jumps under way."""
+        made = super().made_anew(source, segment)
+        jumping(made.ready, self.jumps, segment.R_bs)
+        return made
+
+
+def jumping(ready: Prepared, jumps: Sequence[tuple[int, float]], R_bs: Array) -> None:
+    """Write the columns of jumps into a segment that is ready.
+
+    Args:
+        ready: with the calibration's own columns first.
+        jumps: place of the first unknown, and moment, s on the boot clock.
+        R_bs: (3, 3) board orientation.
+    """
+    steps = ready.steps
+    # The offsets' columns are along the sensor's axes, and what is added to a reading.
+    stays = -steps.columns[:, :, 1 + OFFSETS[0] : 2 + OFFSETS[-1]] @ R_bs.T
+    ends = ready.start + np.cumsum(steps.duration)
+    for column, moment in jumps:
+        left = np.clip((ends - moment) / steps.duration, 0.0, 1.0)[:, None, None]
+        at = slice(1 + column, 4 + column)
+        steps.columns[:, 0:3, at] = left * stays[:, 0:3]
+        steps.columns[:, 3:6, at] = left**2 * stays[:, 3:6]
 
 
 def _known(full: Examination, model: Model) -> tuple[Array, Array]:
@@ -134,47 +214,3 @@ def places_of(full: Examination, model: Model) -> NDArray[np.intp]:
             theirs = full.model.slices[family.name]
             source[model.slices[family.instead_of]] = range(theirs.start, theirs.stop)
     return source
-
-
-def _key(batch: Batch) -> tuple[int, int]:
-    return id(batch.segment), id(batch.fixes)
-
-
-def jumping(ready: Prepared, model: Model, jumps: Sequence[BiasStep], R_bs: Array) -> Prepared:
-    """What is ready, with the columns of jumps after those that are there.
-
-    Args:
-        ready: with the calibration's own columns first.
-        model: with the jumps after what those columns are of.
-        jumps: some moments, s on the boot clock.
-        R_bs: (3, 3) board orientation.
-    """
-    steps, epochs, m1 = ready.steps, ready.epochs, model.size + 1
-    known = steps.columns.shape[2]
-    columns = np.zeros((len(steps), 9, m1))
-    columns[:, :, :known] = steps.columns
-    first, last = 1 + OFFSETS[0], 1 + OFFSETS[-1]
-    # The offsets' columns are along the sensor's axes, and what is added to a reading.
-    stays = -steps.columns[:, :, first : last + 1] @ R_bs.T
-    ends = ready.start + np.cumsum(steps.duration)
-    for jump in jumps:
-        at = model.slices[jump.name]
-        left = np.clip((ends - jump.moment) / steps.duration, 0.0, 1.0)[:, None, None]
-        columns[:, 0:3, at.start + 1 : at.stop + 1] = left * stays[:, 0:3]
-        columns[:, 3:6, at.start + 1 : at.stop + 1] = left**2 * stays[:, 3:6]
-
-    def wider(x: Array, width: int) -> Array:
-        out = np.zeros((*x.shape[:-1], width))
-        out[..., : x.shape[-1]] = x
-        return out
-
-    return Prepared(
-        replace(steps, columns=columns),
-        ready.measured,
-        replace(
-            epochs,
-            body=wider(epochs.body, m1),
-            ned=wider(epochs.ned, m1),
-            along_velocity=wider(epochs.along_velocity, m1 - 1),
-        ),
-    )

@@ -199,11 +199,12 @@ class Interval:
         by_scale = nodes.integrals(segment.R_bs * nodes.signals.raw_s[..., None, :])[0]
         eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
         whole = nodes.integrals(eye)[0]
+        turn = nodes.P[:, -1].copy()  # a view would keep every node's attitude alive
         return [
             Interval(
                 float(t[k]),
                 float(t[k + 1]),
-                nodes.P[k, -1],
+                turn[k],
                 by_scale[k],
                 whole[k] @ segment.R_bs,
                 fixes.v_n[k + 1],
@@ -240,21 +241,30 @@ def _errors(
     A whole row is NaN where there is no GPS; down is 0 where the receiver has no vertical speed.
     """
     R = state.R_nb
-    v = np.tile(state.v_n, (len(sixes), 1))
-    error = np.full((len(sixes), len(chain), 3), np.nan)
+    sets = np.array(sixes)
+    by_scale, by_offset = (
+        np.array([getattr(x, n) for x in chain]) for n in ("by_scale", "by_offset")
+    )
+    gained = by_scale @ sets[:, :3].T + by_offset @ sets[:, 3:].T
+    v = np.tile(state.v_n, (len(sets), 1))
+    every = np.empty((len(sets), len(chain), 3))
     for k, x in enumerate(chain):
         T = x.end - x.start
-        # The bias turns the interval's increments by R(-b T) to first order.
-        turn_n = np.zeros(3)
-        for i, six in enumerate(sixes):
-            coriolis, turn_n = carried_and_turning(x.latitude, v[i])
-            v[i] += R @ (x.by_scale @ six[:3] + x.by_offset @ six[3:]) + coriolis * T
-            v[i, 2] += STANDARD_GRAVITY * T
+        turning = np.zeros(3)
+        push = (R @ gained[k]).T
+        for i in range(len(sets)):
+            coriolis, turning = carried_and_turning(x.latitude, v[i])
+            push[i] += coriolis * T
+        push[:, 2] += STANDARD_GRAVITY * T
+        v += push
+        every[:, k] = v
         at_end = attitude.get(round(x.end, 3))
         if at_end is None:
-            at_end = turn_by(-turn_n * T) @ R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+            # The bias turns the interval's increments by R(-b T) to first order.
+            at_end = turn_by(-turning * T) @ R @ x.turn @ rotation_from_vector(-state.bias_b * T)
         R = at_end
-        seen = np.isfinite(x.velocity)
-        if seen[0]:
-            error[:, k] = np.where(seen, v - x.velocity, 0.0)
+    heard = np.array([x.velocity for x in chain])
+    seen = np.isfinite(heard)
+    error: Array = np.where(seen, every - heard, 0.0)
+    error[:, ~seen[:, 0]] = np.nan
     return error

@@ -286,6 +286,7 @@ class Engine:
 
     def _over(self, runs: Sequence[Sequence[Batch]], made: Pass) -> list[PassResult]:
         """Some runs of batches through a pass, each from a new beginning."""
+        made.keep_states = False
         out = []
         for run in runs:
             made.restart()

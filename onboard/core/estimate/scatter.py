@@ -11,7 +11,7 @@ number, and their mean would believe the bad one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -25,17 +25,17 @@ class Scatter:
     """Scores of the blocks of a flight beyond one fit, and what the sums expect of them."""
 
     def __init__(
-        self, N: Array, scores: Array, inverse: Array, index: list[int] | None = None
+        self, blocks: Stacked, scores: Array, inverse: Array, index: list[int] | None = None
     ) -> None:
         """Take what the blocks say, and the fit.
 
         Args:
-            N: (b, n, n) information of the blocks.
-            scores: (b, m) of the fit's unknowns.
+            blocks: with sums of n unknowns.
+            scores: (blocks, m) of the fit's unknowns.
             inverse: (m, m) the fit's covariance, that of the sums with the prior.
             index: the m of the n unknowns that the fit has; None: all.
         """
-        self._N, self._scores, self.inverse, self._index = N, scores, inverse, index
+        self._blocks, self._scores, self.inverse, self._index = blocks, scores, inverse, index
 
     @classmethod
     def of(
@@ -49,8 +49,8 @@ class Scatter:
             inverse: (m, m) its covariance by the sums.
             gram_share: (m,) share of the noise's Gram that was taken out of the regressors.
         """
-        N, b, gram = stacked(blocks)
-        return cls(N, scores_of(N, b, gram_share * gram, theta), inverse)
+        stacked = Stacked(blocks)
+        return cls(stacked, stacked.scores(theta, gram_share), inverse)
 
     def pool(self, prior_information: Array, least: float) -> Pool:
         """What variance the unknowns' own estimates have.
@@ -109,17 +109,13 @@ class Scatter:
         """
         found = (self._scores @ X) ** 2
         expected = np.empty_like(found)
-        for first in range(0, len(found), BLOCKS_TOGETHER):
-            part = slice(first, first + BLOCKS_TOGETHER)
-            NX = self._of(part) @ X
+        for part, N in self._blocks.information():
+            if self._index is not None:
+                N = N[:, self._index][:, :, self._index]  # noqa: PLW2901 - of the fit's unknowns
+            NX = N @ X
             followed = np.einsum("bmk,bmk->bk", NX, self.inverse @ NX)
             expected[part] = np.einsum("mk,bmk->bk", X, NX) - followed
         return found, np.maximum(expected, 0.0)
-
-    def _of(self, part: slice) -> Array:
-        """(b, m, m) information of some blocks: copies of all of them are much of an hour."""
-        N = self._N[part]
-        return N if self._index is None else N[:, self._index][:, :, self._index]
 
 
 def _counted(expected: Array) -> Array:
@@ -129,16 +125,31 @@ def _counted(expected: Array) -> Array:
     return out
 
 
-def stacked(blocks: Sequence[Block]) -> tuple[Array, Array, Array]:
-    """Sums of K blocks: N (K, m, m), b (K, m), diagonals of the noise's Gram (K, m)."""
-    return (
-        np.stack([p.sums.N for p in blocks]),
-        np.stack([p.sums.b for p in blocks]),
-        np.stack([p.sums.G for p in blocks]),
-    )
+class Stacked:
+    """Sums of blocks side by side; their information some at a time: of hours it is much."""
 
+    def __init__(self, blocks: Sequence[Block]) -> None:
+        """Take blocks with sums of n unknowns."""
+        self._blocks = list(blocks)
+        self._b = np.stack([p.sums.b for p in blocks])
+        self._gram = np.stack([p.sums.G for p in blocks])
+        self._all = self._stack(slice(None)) if len(blocks) <= BLOCKS_TOGETHER else None
 
-def scores_of(N: Array, b: Array, gram: Array, theta: Array) -> Array:
-    """What each block asks for beyond ``theta`` (m,): (K, m)."""
-    out: Array = b - N @ theta + gram * theta
-    return out
+    def information(self) -> Iterator[tuple[slice, Array]]:
+        """Which blocks, and what they know: (b, n, n)."""
+        for first in range(0, len(self._blocks), BLOCKS_TOGETHER):
+            part = slice(first, first + BLOCKS_TOGETHER)
+            yield part, self._stack(part) if self._all is None else self._all
+
+    def scores(self, theta: Array, gram_share: Array | float = 1.0) -> Array:
+        """What each block asks for beyond ``theta`` (n,): (blocks, n).
+
+        ``gram_share`` is the share of the noise's Gram that is taken out of the regressors.
+        """
+        out = self._b + gram_share * self._gram * theta
+        for part, N in self.information():
+            out[part] -= N @ theta
+        return out
+
+    def _stack(self, part: slice) -> Array:
+        return np.stack([p.sums.N for p in self._blocks[part]])

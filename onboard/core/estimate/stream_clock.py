@@ -19,9 +19,10 @@ class StreamClock:
 
     def hear(self, t: float) -> None:
         """An inertial sample has come."""
-        self.newest = max(self.newest, t)
-        if not math.isfinite(self.first):
-            self.first = t
+        if t > self.newest:
+            self.newest = t
+            if self.first == math.inf:
+                self.first = t
 
     def restart(self) -> float:
         """The clock begins anew; its last time before that."""

@@ -64,16 +64,25 @@ def measured(
 
 
 @part
+def _add(row: Array, a: float, x: Array, b: float, y: Array, c: float, z: Array) -> None:
+    """``row += a x + b y + c z``, in this order: one way through memory in the place of three."""
+    for i in range(len(row)):
+        row[i] = row[i] + a * x[i] + b * y[i] + c * z[i]
+
+
+@part
 def _from_the_left(F: Array, C: Array) -> None:
-    """``F C`` in place: rows of the states that are driven by others."""
-    for i in (3, 0, 1, 2, 4, 5, 6):  # height needs the velocity of before, both attitude's
-        row = C[i]
-        for k in range(ERRORS):
-            f = F[i, k]
-            if f != 0.0 and k != i:
-                from_ = C[k]
-                for c in range(len(row)):
-                    row[c] += f * from_[c]
+    """``F C`` in place: rows of the states that are driven by others, by what is not zero in F."""
+    _add(C[3], F[3, 2], C[2], F[3, 4], C[4], F[3, 5], C[5])  # the velocity of before
+    for i in range(3):
+        j, k = (5, 6) if i == 0 else (4, 6) if i == 1 else (4, 5)
+        row, one, two = C[i], C[j], C[k]
+        a, b = F[i, j], F[i, k]
+        for c in range(len(row)):
+            row[c] = row[c] + a * one[c] + b * two[c]
+        _add(row, F[i, 7], C[7], F[i, 8], C[8], F[i, 9], C[9])
+    for i in range(4, 7):
+        _add(C[i], F[i, 7], C[7], F[i, 8], C[8], F[i, 9], C[9])
 
 
 @part
@@ -91,12 +100,15 @@ def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
             row[ERRORS + j] *= decay[j]
         row[HEADING] += swing[0] * rate
         row[RATE] = swing[1] * error + swing[2] * rate
-        for j in (3, 0, 1, 2, 4, 5, 6):
-            x = row[j]
-            for k in range(ERRORS):
-                if k != j:
-                    x += F[j, k] * row[k]
-            row[j] = x
+        row[3] = row[3] + F[3, 2] * row[2] + F[3, 4] * row[4] + F[3, 5] * row[5]
+        u, v, w = row[4], row[5], row[6]
+        x, y, z = row[7], row[8], row[9]
+        row[0] = row[0] + F[0, 5] * v + F[0, 6] * w + F[0, 7] * x + F[0, 8] * y + F[0, 9] * z
+        row[1] = row[1] + F[1, 4] * u + F[1, 6] * w + F[1, 7] * x + F[1, 8] * y + F[1, 9] * z
+        row[2] = row[2] + F[2, 4] * u + F[2, 5] * v + F[2, 7] * x + F[2, 8] * y + F[2, 9] * z
+        row[4] = u + F[4, 7] * x + F[4, 8] * y + F[4, 9] * z
+        row[5] = v + F[5, 7] * x + F[5, 8] * y + F[5, 9] * z
+        row[6] = w + F[6, 7] * x + F[6, 8] * y + F[6, 9] * z
 
 
 @compiled(

@@ -60,6 +60,8 @@ class Pass:
         self.keep_traces = traces
         self.keep_rows = False
         """Whether traces have all that was whitened."""
+        self.keep_states = True
+        """Whether the filter's state is kept after each epoch."""
         self._held = theta is not None
         self._information = np.diag(1.0 / model.prior_sigma**2)
         self._prior_b = self._information @ model.prior
@@ -203,7 +205,7 @@ class Pass:
         sums.add(made.y, made.h, made.log_det)
         self._compare(made.y, made.h)
         self._note(made, result)
-        if made.velocities:
+        if made.velocities and self.keep_states:
             result.states.append(self._state(made))
         self._estimate(sums)
 
@@ -212,14 +214,15 @@ class Pass:
         if not len(gone.epochs):
             return
         result.epochs += len(gone.epochs)
-        sums.add(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_det)
+        sums.add_rows(gone.rows, gone.log_det)
         self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:])
         with_velocity = gone.epochs[gone.velocities > 0]
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
         if self.keep_traces:
             result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
-        result.states += gone.noted(ready.epochs, self.bias_b)
+        if self.keep_states:
+            result.states += gone.noted(ready.epochs, self.bias_b)
         self._estimate(sums, len(gone.epochs))
 
     def _compare(self, y: Array, h: Array) -> None:

@@ -18,24 +18,31 @@ from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array, Vector3
 
 
-def untruncated(value: float, step: float) -> float:
-    """Middle of the interval that integer truncation toward zero maps to ``value``.
+def untruncated(vector: Vector3, step: float) -> Vector3:
+    """Middles of the intervals that integer truncation toward zero maps to these values.
 
     ``|x|`` in [k, k + 1) steps is sent as k; zero stands for -1 ... 1 and stays zero.
     """
-    if step == 0.0 or value == 0.0:
-        return value
-    return value + (0.5 * step if value > 0 else -0.5 * step)
+    if step == 0.0:
+        return vector
+    half = 0.5 * step
+    x, y, z = vector
+    return (
+        x + half if x > 0.0 else x - half if x < 0.0 else x,
+        y + half if y > 0.0 else y - half if y < 0.0 else y,
+        z + half if z > 0.0 else z - half if z < 0.0 else z,
+    )
 
 
 class ImuTrack:
     """Raw inertial samples of one IMU."""
 
-    __slots__ = ("_rows", "_t", "highres_t", "mismatched", "refused")
+    __slots__ = ("_arrays", "_rows", "_t", "highres_t", "mismatched", "refused")
 
     def __init__(self) -> None:
         self._t: list[float] = []
         self._rows: list[tuple[float, ...]] = []
+        self._arrays: tuple[Array, Array] | None = None
         self.highres_t = -np.inf
         self.mismatched = 0
         self.refused: Counter[str] = Counter()
@@ -64,48 +71,38 @@ class ImuTrack:
         if not t > self.last:
             self.refused["imu_late" if t < self.last else "imu_repeated"] += 1
             return False
-        f: Vector3 = sample.f_b
-        w: Vector3 | None = sample.w_b
-        if sample.f_step:
-            f = (
-                untruncated(f[0], sample.f_step),
-                untruncated(f[1], sample.f_step),
-                untruncated(f[2], sample.f_step),
-            )
-        if w is None:
+        if sample.w_b is None:
             self.refused["imu_without_gyro"] += 1
             return False
-        if sample.w_step:
-            w = (
-                untruncated(w[0], sample.w_step),
-                untruncated(w[1], sample.w_step),
-                untruncated(w[2], sample.w_step),
-            )
+        p, q, r = untruncated(sample.w_b, sample.w_step)
+        x, y, z = untruncated(sample.f_b, sample.f_step)
         if R_bs is not None:
-            f = tuple(R_bs.T @ np.array(f))
+            x, y, z = (R_bs.T @ np.array((x, y, z))).tolist()
         s, o = six.scale, six.offset
-        row = (
-            *w,
-            f[0] / s[0] + o[0],
-            f[1] / s[1] + o[1],
-            f[2] / s[2] + o[2],
-            np.nan if sample.temperature is None else sample.temperature,
-        )
-        if not math.isfinite(sum(row[:6])):
+        x, y, z = x / s[0] + o[0], y / s[1] + o[1], z / s[2] + o[2]
+        if not math.isfinite(p + q + r + x + y + z):
             self.refused["imu_not_finite"] += 1
             return False
+        celsius = np.nan if sample.temperature is None else sample.temperature
+        self._arrays = None
         self._t.append(t)
-        self._rows.append(row)
+        self._rows.append((p, q, r, x, y, z, celsius))
         return True
 
     def arrays(self) -> tuple[Array, Array]:
-        """``t`` (n,) and rows (n, 7): rate, raw, temperature."""
-        return np.array(self._t), np.array(self._rows).reshape(len(self._t), 7)
+        """``t`` (n,) and rows (n, 7): rate, raw, temperature; of all who ask the same ones."""
+        if self._arrays is None:
+            n = len(self._t)
+            self._arrays = np.array(self._t), np.array(self._rows).reshape(n, 7)
+            for array in self._arrays:
+                array.flags.writeable = False
+        return self._arrays
 
     def drop_before(self, t: float) -> None:
         """Forget what is older than ``t``."""
         i = int(np.searchsorted(self._t, t))
         del self._t[:i], self._rows[:i]
+        self._arrays = None
 
 
 class SlowTrack:

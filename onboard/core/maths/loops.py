@@ -79,6 +79,88 @@ def values(t: Array, powers: Array, at: Array, out: Array) -> None:
             ) * u + powers[i, 0, c]
 
 
+@compiled(
+    "void(f8[::1], f8[:,:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1],"
+    " f8[:,::1])"
+)
+def signals(
+    t: Array,
+    powers: Array,
+    at: Array,
+    bias: Array,
+    six: Array,
+    R_bs: Array,
+    w_b: Array,
+    raw_s: Array,
+    f_b: Array,
+) -> None:
+    """What :func:`cubics` of rate and raw force are at times ``at`` (m,), and what that is felt as.
+
+    Args:
+        t: (n,) of the samples, s.
+        powers: (n - 1, 4, 6).
+        at: (m,) s.
+        bias: (3,) taken off the rates, rad/s.
+        six: (6,) scale and beta.
+        R_bs: (3, 3) board orientation.
+        w_b: (m, 3) written to.
+        raw_s: (m, 3) written to.
+        f_b: (m, 3) written to.
+    """
+    i, x, f = 0, np.empty(6), np.empty(3)
+    for k in range(len(at)):
+        i = _place(t, at[k], i)
+        u = (at[k] - t[i]) / (t[i + 1] - t[i])
+        for c in range(6):
+            x[c] = ((powers[i, 3, c] * u + powers[i, 2, c]) * u + powers[i, 1, c]) * u + powers[
+                i, 0, c
+            ]
+        for c in range(3):
+            w_b[k, c] = x[c] - bias[c]
+            raw_s[k, c] = x[3 + c]
+            f[c] = x[3 + c] * six[c] + six[3 + c]
+        for c in range(3):
+            f_b[k, c] = R_bs[c, 0] * f[0] + R_bs[c, 1] * f[1] + R_bs[c, 2] * f[2]
+
+
+@compiled("void(f8, f8[:,::1], f8[:,::1], f8[:,::1])")
+def twice(step: float, a: Array, v: Array, x: Array) -> None:
+    """Integrals of an acceleration (n, 3) between even nodes: into (n, 3), and theirs into another.
+
+    First rows are zero, and stay so.
+    """
+    for i in range(len(a) - 1):
+        for c in range(3):
+            v[i + 1, c] = v[i, c] + 0.5 * step * (a[i, c] + a[i + 1, c])
+            x[i + 1, c] = (
+                x[i, c] + step * v[i, c] + step * step / 6.0 * (2.0 * a[i, c] + a[i + 1, c])
+            )
+
+
+@compiled("void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,::1])")
+def gained(
+    start: float,
+    step: float,
+    a: Array,
+    v: Array,
+    x: Array,
+    t: Array,
+    shift: float,
+    velocity: Array,
+    place: Array,
+) -> None:
+    """Integrals of :func:`twice` at times ``t + shift`` (k,), into two (k, 3)."""
+    last = len(a) - 2
+    for k in range(len(t)):
+        at = t[k] + shift - start
+        i = min(max(int(at / step), 0), last)
+        s = at - i * step
+        for c in range(3):
+            slope = (a[i + 1, c] - a[i, c]) / step
+            velocity[k, c] = v[i, c] + s * (a[i, c] + 0.5 * s * slope)
+            place[k, c] = x[i, c] + s * (v[i, c] + s * (0.5 * a[i, c] + s / 6.0 * slope))
+
+
 @part
 def _turn(x: float, y: float, z: float, R: Array) -> None:
     """Rotation by a vector, rad, into (3, 3), by way of the unit quaternion."""
@@ -260,6 +342,17 @@ def attitudes(
         _turn(share * missed[0], share * missed[1], share * missed[2], A)
         _product(turn, A, B)
         _product(R_k[k], B, out[m])
+
+
+@compiled("void(f8[::1], f8[:,::1], f8[::1], f8[:,::1])")
+def straight(t: Array, x: Array, at: Array, out: Array) -> None:
+    """Straight lines between samples ``x`` (n, d), n >= 2, at times ``at`` (m,), ends held."""
+    i = 0
+    for k in range(len(at)):
+        i = _place(t, at[k], i)
+        share = min(max((at[k] - t[i]) / (t[i + 1] - t[i]), 0.0), 1.0)
+        for c in range(x.shape[1]):
+            out[k, c] = x[i, c] + share * (x[i + 1, c] - x[i, c])
 
 
 @compiled("void(f8[::1], f8[::1], f8[::1], f8[:,::1])")

@@ -68,6 +68,15 @@ class NormalSums:
             self.log_det + other.log_det,
         )
 
+    def __iadd__(self, other: NormalSums) -> Self:
+        self.N += other.N
+        self.b += other.b
+        self.G += other.G
+        self.s += other.s
+        self.rows += other.rows
+        self.log_det += other.log_det
+        return self
+
     def __sub__(self, other: NormalSums) -> NormalSums:
         return self + other.scaled(-1.0)
 
@@ -216,6 +225,15 @@ class BankSums:
             self._collect(y[:, part], h[:, part])
         self.log_det += log_det
         self.rows += r
+
+    def add_rows(self, rows: Array, log_det: Array) -> None:
+        """The same of ``y`` and ``h`` side by side, (B, r, m + 1): many are not collected first."""
+        if rows.shape[1] < _TOGETHER:
+            self.add(rows[:, :, 0], rows[:, :, 1:], log_det)
+            return
+        self._gram += rows.transpose(0, 2, 1) @ rows
+        self.log_det += log_det
+        self.rows += rows.shape[1]
 
     def _collect(self, y: Array, h: Array) -> None:
         """At most :data:`_TOGETHER` rows."""

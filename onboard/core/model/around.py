@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.maths.frames import rotation_from_vector, skew
 from onboard.core.model.quadrature import (
     NODES_PER_SAMPLE,
     NodeMaker,
@@ -89,8 +89,8 @@ def around(
     force = followed.gained(followed.force)
     there = followed.gained(followed.force + followed.swung(lever))
     now = maker.signals(epoch)
-    R = followed.attitude(epoch)
-    return Around(now, R, force, there, window, followed.swing(now, R, window))
+    R, swing = followed.swing(now, window)
+    return Around(now, R, force, there, window, swing)
 
 
 def lever_velocity(w_b: Array) -> Array:
@@ -99,8 +99,7 @@ def lever_velocity(w_b: Array) -> Array:
     Args:
         w_b: (K, 3) rate, rad/s.
     """
-    out: Array = np.cross(w_b[:, None, :], np.eye(3)).swapaxes(-1, -2)
-    return out
+    return skew(w_b)
 
 
 class _Followed:
@@ -144,17 +143,22 @@ class _Followed:
         out: Array = self._R[i] @ rotation_from_vector(w * (t - node)[:, None])
         return out
 
-    def swing(self, now: Signals, R: Array, window: float) -> Array:
-        """Mean of ``d R / dt`` over the span: ``(R(window/2) - R(-window/2)) / window``.
+    def swing(self, now: Signals, window: float) -> tuple[Array, Array]:
+        """Attitude at the epochs, and the mean of ``d R / dt`` over the span, in their axes.
+
+        The mean is ``(R(window/2) - R(-window/2)) / window``.
 
         Args:
             now: signals at the epochs.
-            R: (K, 3, 3) attitude at the epochs.
             window: s; below two nodes the rate at the epoch does.
+
+        Returns:
+            Two arrays (K, 3, 3).
         """
         if window < 2.0 * self._step:
-            return lever_velocity(now.w_b)
+            return self.attitude(now.t), lever_velocity(now.w_b)
         half = min(window / 2.0, AROUND_SPAN_S)
-        change = self.attitude(now.t + half) - self.attitude(now.t - half)
-        out: Array = np.swapaxes(R, -1, -2) @ change / (2.0 * half)
-        return out
+        all_ = self.attitude(np.concatenate([now.t, now.t + half, now.t - half]))
+        R, after, before = np.split(all_, 3)
+        out: Array = np.swapaxes(R, -1, -2) @ (after - before) / (2.0 * half)
+        return R, out

@@ -6,6 +6,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import cross
 from onboard.core.model.around import Around
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
@@ -169,7 +170,7 @@ class GyroTiming(Family):
 
     def acceleration(self, nodes: Signals) -> Array:
         """``R(t + d) f = R f + R (w x f) d``: a late gyroscope gives an attitude of the past."""
-        return np.cross(nodes.w_b, nodes.f_b)[..., None]
+        return cross(nodes.w_b, nodes.f_b)[..., None]
 
 
 class GyroScale(Family):

@@ -16,7 +16,7 @@ import numpy as np
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
-from onboard.core.maths.frames import interpolate_rotation, rotation_from_vector
+from onboard.core.maths.frames import cross, interpolate_rotation, rotation_from_vector
 
 NODES_PER_SAMPLE = 1.5
 """Of the samples' rate, at least: what vibrates at up to half of it is then resolved and cancels,
@@ -127,7 +127,7 @@ def rotation_increments(w: Array, h: Array) -> Array:
     """
     w0, wm, w1 = w[..., 0:-2:2, :], w[..., 1:-1:2, :], w[..., 2::2, :]
     step = h[..., None, None]
-    out: Array = step / 6.0 * (w0 + 4.0 * wm + w1) + step**2 / 12.0 * np.cross(w0, w1)
+    out: Array = step / 6.0 * (w0 + 4.0 * wm + w1) + step**2 / 12.0 * cross(w0, w1)
     return out
 
 
@@ -191,6 +191,15 @@ class NodeMaker:
 
     def signals(self, t: Array) -> Signals:
         """Signals at times ``t`` of any shape."""
+        loops = compiled_loops()
+        if loops is not None:
+            w, raw, f_b = (np.empty((t.size, 3)) for _ in range(3))
+            made = plain(self._bias), plain(self._six), plain(self.segment.R_bs)
+            loops.signals(self._at.t, self._at.cubics, plain(t).ravel(), *made, w, raw, f_b)
+            shape = (*t.shape, 3)
+            return Signals(
+                t, w.reshape(shape), raw.reshape(shape), f_b.reshape(shape), self.segment
+            )
         x = self._at(t)
         raw = x[..., 3:]
         f_b = (raw * self._six[:3] + self._six[3:]) @ self.segment.R_bs.T

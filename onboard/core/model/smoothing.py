@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 
 RESOLVED_S = 0.125
 """s; over a shorter span the slope of a force is mostly vibration."""
@@ -26,33 +27,42 @@ class Gained:
     Vibration that the nodes resolve is cancelled, whatever the span.
     """
 
-    __slots__ = ("_a", "_end", "_start", "_step", "_v", "_x")
+    __slots__ = ("_a", "_start", "_step", "_v", "_x")
 
     def __init__(self, start: float, step: float, a: Array) -> None:
         """Take ``a`` (n, 3), m/s^2, axes that do not turn, at ``start + i step``, s; n >= 2."""
-        v, x = np.zeros_like(a), np.zeros_like(a)
+        self._a = plain(a)
+        self._v, self._x = v, x = np.zeros_like(self._a), np.zeros_like(self._a)
+        self._start, self._step = start, step
+        loops = compiled_loops()
+        if loops is not None:
+            loops.twice(step, self._a, v, x)
+            return
         np.cumsum(0.5 * step * (a[:-1] + a[1:]), axis=0, out=v[1:])
         x[1:] = np.cumsum(step * v[:-1] + step**2 / 6.0 * (2.0 * a[:-1] + a[1:]), axis=0)
-        self._start, self._step, self._a, self._v, self._x = start, step, a, v, x
-        self._end = start + step * (len(a) - 1)
 
-    def _at(self, t: Array) -> tuple[Array, Array, Array, Array]:
-        """Nodes before times (k,), s since them (k, 1), the force there and its slope (k, 3)."""
-        i = np.clip(((t - self._start) / self._step).astype(int), 0, len(self._a) - 2)
-        a = self._a[i]
-        return i, (t - self._start - i * self._step)[:, None], a, (self._a[i + 1] - a) / self._step
+    def _gained(self, t: Array, shift: float) -> tuple[Array, Array]:
+        """Velocity gained since the first node, m/s, and place, m, at ``t + shift``: (k, 3)."""
+        loops = compiled_loops()
+        if loops is not None:
+            velocity, place = np.empty((len(t), 3)), np.empty((len(t), 3))
+            nodes = self._start, self._step, self._a, self._v, self._x
+            loops.gained(*nodes, plain(t), shift, velocity, place)
+            return velocity, place
+        since = t + shift - self._start
+        i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
+        s = (since - i * self._step)[:, None]
+        a, slope = self._a[i], (self._a[i + 1] - self._a[i]) / self._step
+        velocity = self._v[i] + s * (a + 0.5 * s * slope)
+        return velocity, self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
 
-    def velocity(self, t: Array) -> Array:
-        """(k, 3) gained since the first node until times ``t`` (k,), m/s."""
-        i, s, a, slope = self._at(t)
-        out: Array = self._v[i] + s * (a + 0.5 * s * slope)
-        return out
+    def velocity(self, t: Array, shift: float = 0.0) -> Array:
+        """(k, 3) gained since the first node until times ``t + shift`` (k,), m/s."""
+        return self._gained(t, shift)[0]
 
-    def place(self, t: Array) -> Array:
+    def place(self, t: Array, shift: float = 0.0) -> Array:
         """(k, 3) its integral, m."""
-        i, s, a, slope = self._at(t)
-        out: Array = self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
-        return out
+        return self._gained(t, shift)[1]
 
     def mean(self, t: Array, width: float) -> Array:
         """Mean of the force over ``width`` (s) about times ``t`` (k,): (k, 3), m/s^2.
@@ -62,7 +72,7 @@ class Gained:
         as a regressor of the latency it would be noise.  No span is shorter than two nodes.
         """
         half = 0.5 * max(width, self._step)
-        out: Array = (self.velocity(t + half) - self.velocity(t - half)) / (2.0 * half)
+        out: Array = (self.velocity(t, half) - self.velocity(t, -half)) / (2.0 * half)
         return out
 
     def averaged(self, t: Array, window: float) -> Array:
@@ -71,7 +81,7 @@ class Gained:
             return np.zeros((len(t), 3))
         # Between two nodes it goes with the square of the span, and rounding does not.
         half = 0.5 * max(window, self._step)
-        mean = (self.place(t + half) - self.place(t - half)) / (2.0 * half)
+        mean = (self.place(t, half) - self.place(t, -half)) / (2.0 * half)
         out: Array = (mean - self.velocity(t)) * (window / (2.0 * half)) ** 2
         return out
 

@@ -269,5 +269,6 @@ def on_axes(amount: Array) -> Array:
     Returns:
         (..., 3, 3) with regressor i along axis i.
     """
-    out: Array = -amount[..., None, :] * np.eye(3)
+    out = np.zeros((*amount.shape[:-1], 3, 3))
+    np.einsum("...ii->...i", out)[...] = -amount
     return out

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.explaining import heard
-from onboard.core.diagnosis import effort, examination, jumps, onsets, procedure
+from onboard.core.diagnosis import effort, examination, jumps, onsets, procedure, stepped
 from onboard.core.diagnosis.procedure import diagnose
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
@@ -30,8 +30,9 @@ def test_twice_the_work_says_the_same(monkeypatch):
         (examination, "NEIGHBOURS"): 2 * effort.NEIGHBOURS,
         (examination, "WORTH_A_PASS"): tuple(0.5 * x for x in effort.WORTH_A_PASS),
         (jumps, "FURTHEST"): 2 * effort.FURTHEST,
-        (jumps, "AT_ONCE"): effort.AT_ONCE // 2,
+        (stepped, "FORGOTTEN_S"): 2.0 * effort.FORGOTTEN_S,
         (onsets, "FORGOTTEN_S"): 2.0 * effort.FORGOTTEN_S,
+        (jumps, "ONCE_MORE"): 2 * effort.ONCE_MORE,
         (procedure, "FURTHEST"): 2 * effort.FURTHEST,
     }
     for (module, name), value in more.items():

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
-from onboard.core.diagnosis import jumps, onsets, testability
+from onboard.core.diagnosis import jumps, onsets, stepped, testability
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.score import time_sigma
+from onboard.core.diagnosis.selection import Fitter
+from onboard.core.diagnosis.stepped import JumpingPass, Places, Stepped
+from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.engine import through
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -52,12 +56,16 @@ def test_one_moment_is_known_to_the_spacing_of_those_looked_at():
 
 @pytest.fixture(scope="module", params=["copter", "plane"])
 def full(request):
-    """A flight of 160 s whose offsets jump at :data:`AT`, with the columns of the catalogue."""
+    """A flight of 160 s whose offsets jump at :data:`AT`, with the columns of the catalogue.
+
+    The plane's board is turned by 90 degrees: its sensor's axes are not the body's.
+    """
     spec = FlightSpec(
         vehicle=request.param,
         seed=5,
         duration=160.0,
         imus=random_imus(5),
+        orientation=2 if request.param == "plane" else 0,
         effects=(concealed.BiasStep(time=AT, x=0.15, y=-0.1, z=0.08),),
     )
     calibrator = heard(spec)
@@ -79,6 +87,34 @@ def test_the_rest_of_the_flight_counts_as_if_it_were_flown_through(full, monkeyp
     whole = gains(full, times)
     assert whole.max() > 200.0
     assert near == pytest.approx(whole, rel=0.15)
+
+
+@pytest.mark.slow
+def test_jumps_at_all_moments_gain_what_each_gains_by_itself(full, monkeypatch):
+    """Up to what a jump bends a flight that is gone through as one without."""
+    times = np.arange(full.point.skew_from + 42.0, full.blocks[-1].end - 8.0, 4.0)
+    looked, alone = Stepped(full, times), gains(full, times)
+    assert times[np.argmax(looked.gain)] == pytest.approx(AT, abs=3.0)
+    assert looked.gain == pytest.approx(alone, rel=0.15, abs=0.05 * alone.max())
+    monkeypatch.setattr(stepped, "FORGOTTEN_S", 1e6)
+    whole = Stepped(full, times)
+    assert looked.gain == pytest.approx(whole.gain, rel=0.15, abs=0.02 * alone.max())
+
+
+@pytest.mark.slow
+def test_what_a_jump_explains_is_that_of_normal_equations_with_it(full):
+    moment = full.blocks[-1].end - 20.0
+    looked = Stepped(full, [moment])
+    model = calibration_model(full.point, full.prior, full.settings.needs, (Places(1),))
+    m = model.slices[Places.name].start
+    going = JumpingPass(full, model)
+    going.jumps = [(m, moment)]
+    blocks = [through(going, batch, full.settings.coast_s).block for batch in full.batches]
+    fitter = Fitter(blocks, model)
+    before, after = (fitter.fit(range(n), held_out=False) for n in (m, m + 3))
+    assert looked.gain == pytest.approx([fitter.gain(before, after)], rel=1e-6, abs=1e-6)
+    known = np.diag(fitter.informed(after, range(m, m + 3)))
+    assert looked.known[0] == pytest.approx(known, rel=1e-6)
 
 
 @pytest.mark.slow

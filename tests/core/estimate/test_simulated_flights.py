@@ -247,7 +247,7 @@ def exact(sample):
     """Truncation undone, so that other parameters may be applied without another truncation."""
     if not isinstance(sample, ImuSample):
         return sample
-    f = tuple(untruncated(x, sample.f_step) for x in sample.f_b)
+    f = untruncated(sample.f_b, sample.f_step)
     return dataclasses.replace(sample, f_b=f, f_step=0.0)
 
 

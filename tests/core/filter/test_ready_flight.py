@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.stepped import jumping
+from onboard.core.diagnosis.stepped import Places, jumping
 from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
@@ -55,9 +55,10 @@ def test_columns_of_a_jump_are_those_of_the_offset_from_its_moment_on(batches):
     model = calibration_model(POINT, more=(jump,))
     for batch in (before, during):
         source = Source(batch.segment, batch.fixes, batch.trusted, None, 0)
-        plain = a_pass(calibration_model(POINT)).made_anew(source, batch.segment)
+        places = calibration_model(POINT, more=(Places(1),))
+        derived = a_pass(places).made_anew(source, batch.segment).ready
         evaluated = a_pass(model).made_anew(source, batch.segment)
-        derived = jumping(plain.ready, model, [jump], batch.segment.R_bs)
+        jumping(derived, [(model.slices[jump.name].start, moment)], batch.segment.R_bs)
         assert np.array_equal(derived.epochs.body, evaluated.ready.epochs.body)
         ends = derived.start + np.cumsum(derived.steps.duration)
         whole = np.abs(ends - derived.steps.duration / 2.0 - moment) > derived.steps.duration

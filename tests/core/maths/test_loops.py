@@ -42,7 +42,8 @@ def segment(rng, *, samples=120, rate=2.0, turn=0.3):
         10.0 * rng.normal(size=(samples, 3)),
         t_attitude,
         R,
-        np.eye(3),
+        rotation_from_vector(rng.normal(size=3)),
+        {"signal": (t[::7], rng.normal(size=(len(t[::7]), 4)))},
     )
 
 
@@ -86,7 +87,9 @@ def test_nodes_and_integrals_are_the_same(seed):
         inside = maker.intervals(start[:-1], start[1:])
         near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]))
         force = inside.signals.f_b[..., None] * x
-        return (inside.P, *inside.integrals(force), near.averaged(0.2), near.slope(0.2), near.swing)
+        signals = (inside.signals.w_b, inside.signals.raw_s, inside.signals.slow("signal"))
+        seen = (near.f_mean, near.averaged(0.2), near.slope(0.2), near.second_derivative(0.2))
+        return (inside.P, *inside.integrals(force), *signals, *seen, near.R, near.swing)
 
     for one, other in zip(*both_ways(made), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))

@@ -13,7 +13,7 @@ from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.model.quadrature import Signals
-from onboard.core.physics.effect import AXES, Bearing, Effect, Origin, on_axes
+from onboard.core.physics.effect import AXES, Bearing, Effect, Origin
 
 PLAYS = (0.5, 1.0, 2.0)
 """Half-widths of the plays, m/s^2, an octave apart: what lies between two is much like both.  A
@@ -102,8 +102,11 @@ class AccelerometerHysteresis(Effect):
         branches = nodes.slow(self.name)
         if branches is None:
             return np.zeros((*nodes.t.shape, 3, len(self.unknowns)))
-        by_play = branches.reshape(*nodes.t.shape, 3, len(PLAYS))
-        return np.concatenate([on_axes(by_play @ w) for w in WEIGHTS], axis=-1)
+        mixed = (branches.reshape(-1, len(PLAYS)) @ WEIGHTS.T).reshape(*nodes.t.shape, 3, -1)
+        out = np.zeros((*nodes.t.shape, 3, len(WEIGHTS), 3))
+        for axis in range(3):
+            out[..., axis, :, axis] = -mixed[..., axis, :]
+        return out.reshape(*nodes.t.shape, 3, len(self.unknowns))
 
 
 def _invertible(weights: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Unknown
@@ -31,8 +33,8 @@ class Gravity(Effect):
         """Down, in body axes by the recorded attitude, and by the gyroscope from there on."""
         if nodes.P is not None:
             R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0])
-            turned: Array = (R_nb[:, None, 2:] @ nodes.P)[:, :, 0, :, None]
-            return turned
+            turned: Array = np.einsum("ka,kmab->kmb", R_nb[:, 2], nodes.P)
+            return turned[..., None]
         flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
         down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
         return down[..., None]

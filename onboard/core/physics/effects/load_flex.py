@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import skew
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import Bearing
@@ -39,9 +38,8 @@ class LoadFlex(Proportional):
     def amount(self, f_b: Array) -> Array:
         """As a tilt, times ``n - 1``."""
         extra = -f_b[..., 2] / STANDARD_GRAVITY - 1.0
-        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        tilt = np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
-        return tilt * extra[..., None, None]
+        out: Array = skew(f_b)[..., :2] * extra[..., None, None]
+        return out
 
     @classmethod
     def size(cls, found: Finding) -> str:

@@ -41,6 +41,7 @@ import numpy as np
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.frames import skew
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import SURE, Bearing, Cure, NuisanceFit, Origin
 from onboard.core.physics.finding import Finding, Quantity
@@ -102,8 +103,7 @@ class MountTilt(Proportional):
 
     def amount(self, f_b: Array) -> Array:
         """``f x e``: what one unit of each unknown takes off the force."""
-        ex, ey = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-        return np.stack([np.cross(f_b, ex), np.cross(f_b, ey)], axis=-1)
+        return skew(f_b)[..., :2]
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
