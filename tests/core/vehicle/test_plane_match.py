@@ -173,6 +173,22 @@ def test_what_could_not_be_tested_is_a_rival_all_the_same(monkeypatch):
     assert "drag" in thrust.rivals
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_servos_without_a_lag_leave_the_fit_at_a_minimum(seed):
+    """Nominally they are slow; a fit that cannot go below a shortest lag would stop on its way."""
+    flight = plane_flight(seed=seed, wind=(-3.4, 7.0), c_drag_p=0.18, reading=1.0, servo_lag=1e-4)
+    model = plane_model(flight, PlaneAirframe(), SIGMA)
+    fit = likelier(model)
+    score = sum(b.b for b in fit.blocks) + fit.prior * (model.nominal - fit.theta)
+    # What a Newton step would still gain, of a chi-square.
+    assert score @ np.linalg.solve(fit.information, score) < 0.1
+    match = matched(flight)
+    assert names(match) == {"wind", "drag"}
+    lag, drag = match.numbers["servo_lag"], match.numbers["drag.c_drag_p"]
+    assert abs(lag.real) < 3.0 * lag.sigma + 0.003
+    assert abs(drag.real - 0.18) < 3.0 * drag.sigma
+
+
 def test_of_two_valleys_the_likelier_is_taken(monkeypatch):
     """Whichever start leads there."""
     model = plane_model(plane_flight(seed=4, wind=(2.4, 6.6), reading=1.0), PlaneAirframe(), SIGMA)
