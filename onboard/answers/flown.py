@@ -126,6 +126,7 @@ class Flown:
         outputs = [s for s in kept if isinstance(s, Outputs)]
         normalised = bool(outputs) and outputs[-1].normalised
         air = [s for s in kept if isinstance(s, AirData)]
+        blown = [s for s in air if s.wind_n is not None and s.wind_e is not None]
         return Signals(
             outputs=_stream(outputs, lambda s: s.values),
             battery=_stream(
@@ -136,8 +137,12 @@ class Flown:
                 [s for s in air if s.airspeed is not None], lambda s: (s.airspeed or 0.0,)
             ),
             ekf_wind=_stream(
-                [s for s in air if s.wind_n is not None and s.wind_e is not None],
+                [s for s in blown if s.wind_sigma is None],
                 lambda s: (s.wind_n or 0.0, s.wind_e or 0.0),
+            ),
+            measured_wind=_stream(
+                [s for s in blown if s.wind_sigma is not None],
+                lambda s: (s.wind_n or 0.0, s.wind_e or 0.0, s.wind_sigma or 0.0),
             ),
             parameters=dict(self.parameters),
             kind=self.kind,

@@ -28,8 +28,10 @@ from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
+from onboard.core.vehicle.several import joined
 from onboard.core.vehicle.signals import Stream
 from onboard.core.vehicle.trajectory import motions
+from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording
 
 PLANES = ("plane",)
@@ -72,7 +74,8 @@ class Match:
     """The answer of ``onboard match``, with everything that a report draws.
 
     ``vehicle`` is the real flight's vehicle level (its effects are those of the real recording
-    against the airframe, or against the simulation's recording where there is one).
+    against the airframe, or against the simulation's recording where there is one).  ``others`` are
+    further flights of the vehicle, from which its airframe was found as well.
     """
 
     real: FlownRecording
@@ -84,12 +87,13 @@ class Match:
     settings: tuple[Setting, ...]
     not_testable: tuple[NotTestable, ...]
     frame: Mapping[str, float | list[float]] = field(default_factory=dict)
+    others: tuple[FlownRecording, ...] = ()
 
     @property
     def damage(self) -> list[str]:
         """What was skipped of damaged files, in sentences."""
-        both = (self.simulation, self.real)
-        return [note for flown in both if flown is not None for note in flown.source.damage]
+        every = (self.simulation, self.real, *self.others)
+        return [note for flown in every if flown is not None for note in flown.source.damage]
 
     @property
     def silent(self) -> bool:
@@ -101,6 +105,7 @@ def match(
     real: str | Path | Recording,
     simulation: str | Path | Recording | None = None,
     *,
+    others: Sequence[str | Path | Recording] = (),
     frame: Mapping[str, object] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Match:
@@ -109,6 +114,8 @@ def match(
     Args:
         real: the recording of the real flight, a file or opened already.
         simulation: a recording of the simulation's like flight; None: the nominal airframe.
+        others: recordings of further flights of the real vehicle: its airframe is found from all,
+            wind and sensors of each are its own.
         frame: keys of a frame or coefficient file to compare with; ArduPilot's default without.
         progress: told the share of the reading that is done.
 
@@ -117,7 +124,8 @@ def match(
         ValueError: a frame that makes no sense.
     """
     recording = flown(real, progress=progress)
-    vehicle = vehicle_level(recording, frame or {})
+    further = tuple(flown(path, progress=progress) for path in others)
+    vehicle = vehicle_level(recording, frame or {}, further)
     other, simulated = None, None
     if simulation is not None:
         other = flown(simulation, progress=progress)
@@ -142,24 +150,24 @@ def match(
         settings_of(vehicle, sensors, effects, recording),
         vehicle.not_testable,
         vehicle.frame,
+        further,
     )
 
 
-def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> VehicleMatch:
-    """The vehicle level of one recording against an airframe.
+def vehicle_level(
+    recording: FlownRecording,
+    frame: Mapping[str, object],
+    others: Sequence[FlownRecording] = (),
+) -> VehicleMatch:
+    """The vehicle level of one recording, or of several of one vehicle, against an airframe.
 
     Raises:
+        RecordingError: another flight that is of another kind of vehicle, or none.
         ValueError: a frame that makes no sense.
     """
     kind = recording.signals.kind or guessed_kind(recording.batches)
     airframe, plane = CopterAirframe.of(frame), PlaneAirframe.of(frame)
-    commands = Stream()
-    if kind in COPTERS:
-        outputs = Outputs.of(recording.signals, airframe)
-        commands = outputs.commands(recording.signals, airframe.propExpo)
-    elif kind in PLANES:
-        commands = plane_commands(recording.signals)
-    flight = _flight(recording, commands)
+    flight = _flight(recording, kind, airframe)
     names = NAMES.get(kind, NAMES["copter"])
     why = ""
     if kind and kind not in (*COPTERS, *PLANES):
@@ -171,7 +179,8 @@ def vehicle_level(recording: FlownRecording, frame: Mapping[str, object]) -> Veh
     if why or flight is None:
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
-    sigma = recording.sensors.force_sigma
+    sigma = np.stack([r.sensors.force_sigma for r in (recording, *others)])
+    flight = joined([flight, *(_further(other, kind, airframe) for other in others)])
     try:
         if kind in COPTERS:
             return match_copter(flight, recording.signals, airframe, sigma)
@@ -196,7 +205,27 @@ def guessed_kind(batches: Sequence[Batch]) -> str:
     return "plane" if slow > FAST_M_S else ""
 
 
-def _flight(recording: FlownRecording, commands: Stream) -> Flight | None:
+def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> Flight:
+    """Another flight of the vehicle.
+
+    Raises:
+        RecordingError: it is of another kind of vehicle, or none.
+    """
+    its = recording.signals.kind or kind
+    flight = None if its != kind else _flight(recording, kind, airframe)
+    if flight is None or len(flight) < FEWEST_STEPS:
+        why = NOTHING if its == kind else f"is of a {its}, not of a {kind}"
+        raise RecordingError(f"{recording.name}: {why}")
+    return flight
+
+
+def _flight(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> Flight | None:
+    commands = Stream()
+    if kind in COPTERS:
+        outputs = Outputs.of(recording.signals, airframe)
+        commands = outputs.commands(recording.signals, airframe.propExpo)
+    elif kind in PLANES:
+        commands = plane_commands(recording.signals)
     pieces = motions(recording.batches, recording.sensors)
     if not pieces:
         return None

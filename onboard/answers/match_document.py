@@ -21,7 +21,7 @@ from onboard.answers.explain_document import (
 from onboard.answers.flown_again import FlownAgain
 from onboard.answers.json_file import indented
 from onboard.answers.match import Match
-from onboard.core.vehicle.records import AxisMismatch, Difference
+from onboard.core.vehicle.records import AxisMismatch, Difference, WindEstimate
 
 MATCH_SCHEMA = "onboard.match/1"
 
@@ -74,6 +74,13 @@ class MatchedRecordings(msgspec.Struct, frozen=True, kw_only=True):
     damage: list[str] = []
 
 
+class OtherFlightDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """A further flight of the vehicle, and its wind."""
+
+    recording: str
+    wind: WindDocument
+
+
 class TwiceDocument(msgspec.Struct, frozen=True, kw_only=True):
     """One unknown from the recording and from the simulator's flight."""
 
@@ -113,6 +120,7 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     frame: dict[str, float | list[float]]
     ambiguous: list[AmbiguityDocument]
     not_testable: list[NotTestableDocument]
+    others: list[OtherFlightDocument] = []
     verified: VerifiedDocument | None = None
     schema: str = MATCH_SCHEMA
 
@@ -136,7 +144,11 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
         note=vehicle.note,
         flight_s=finite(vehicle.seconds),
         effects=[_effect(d) for d in match.effects],
-        wind=_wind(match),
+        wind=None if vehicle.wind is None else _wind(vehicle.wind),
+        others=[
+            OtherFlightDocument(recording=its.name, wind=_wind(wind))
+            for its, wind in zip(match.others, vehicle.other_winds, strict=False)
+        ],
         mismatch=_mismatch({**vehicle.mismatch, "velocity_after_10s": alone}),
         settings={s.name: s.value for s in match.settings},
         frame=dict(match.frame),
@@ -193,10 +205,7 @@ def _held_out(before: float, after: float) -> HeldOutDocument:
     return HeldOutDocument(before=finite(before), after=finite(after))
 
 
-def _wind(match: Match) -> WindDocument | None:
-    wind = match.vehicle.wind
-    if wind is None:
-        return None
+def _wind(wind: WindEstimate) -> WindDocument:
     return WindDocument(
         north=finite(wind.north),
         east=finite(wind.east),

@@ -6,7 +6,7 @@ import math
 
 from onboard.answers.match import Match
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.vehicle.records import Compared, Difference
+from onboard.core.vehicle.records import Compared, Difference, WindEstimate
 
 TITLES = {
     "wind": "wind",
@@ -84,9 +84,11 @@ def proof(d: Difference) -> str:
 
 def wind_sentence(match: Match) -> str:
     """The wind of the flight; empty where nothing is known."""
-    wind = match.vehicle.wind
-    if wind is None:
-        return ""
+    return "" if match.vehicle.wind is None else blown(match.vehicle.wind)
+
+
+def blown(wind: WindEstimate) -> str:
+    """A wind, where it comes from, and how sure that is."""
     speed = math.hypot(wind.north, wind.east)
     sigma = math.hypot(wind.sigma_north, wind.sigma_east)
     if speed < 3.0 * sigma or speed < 0.3:

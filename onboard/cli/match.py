@@ -16,7 +16,15 @@ from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import match_document
 from onboard.answers.match_files import frame_text, read_frame, settings_text
-from onboard.answers.match_words import COLOURS, compared, headline, number, proof, wind_sentence
+from onboard.answers.match_words import (
+    COLOURS,
+    blown,
+    compared,
+    headline,
+    number,
+    proof,
+    wind_sentence,
+)
 from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading, waiting
 from onboard.cli.replay import write_json, write_text
@@ -29,6 +37,7 @@ EXAMPLES = """\
 \b
 onboard match flight.BIN
 onboard match simulation.BIN flight.BIN --json result.json
+onboard match flight.BIN --with yesterday.BIN --with monday.BIN
 onboard match flight.BIN --report flight.html
 onboard match flight.BIN --verify
 onboard match flight.BIN --verify --ardupilot build/sitl/bin
@@ -42,6 +51,14 @@ TABLE = ".csv"
 @click.command(epilog=EXAMPLES)
 @click.argument(
     "logs", nargs=-1, required=True, metavar="[SIM] REAL", type=click.Path(path_type=Path)
+)
+@click.option(
+    "--with",
+    "others",
+    metavar="FILE",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Another flight of the vehicle: one airframe for all. Repeat.",
 )
 @click.option("--json", "json_file", metavar="FILE", help="Write the result as JSON, '-': stdout.")
 @click.option("--report", "report_file", metavar="FILE", help="Write one self-contained HTML page.")
@@ -70,6 +87,7 @@ TABLE = ".csv"
 )
 def match(
     logs: tuple[Path, ...],
+    others: tuple[Path, ...],
     json_file: str | None,
     report_file: str | None,
     param_file: str | None,
@@ -90,13 +108,16 @@ def match(
         raise UsageError("match takes one recording, or a simulation's and a real one")
     if ardupilot is not None and not verifies:
         raise UsageError("--ardupilot is for --verify")
-    read = (*logs, given_frame, columns_file)
+    read = (*logs, *others, given_frame, columns_file)
     refuse_overwriting(read, json_file, report_file, param_file, frame_file)
     frame = None if given_frame is None else read_frame(given_frame)
     opened = [_opened(log, columns_file) for log in logs]
+    further = [_opened(log, columns_file) for log in others]
     simulation = opened[0] if len(logs) == TWO else None
-    with reading(logs, then="comparing vehicles") as progress:
-        result = match_recordings(opened[-1], simulation, frame=frame, progress=progress)
+    with reading((*logs, *others), then="comparing vehicles") as progress:
+        result = match_recordings(
+            opened[-1], simulation, others=further, frame=frame, progress=progress
+        )
     if result.silent:
         raise RecordingError(f"{logs[-1]}: {result.vehicle.note}{because_of(result.damage)}")
     verified = None
@@ -194,6 +215,8 @@ def _facts(result: Match) -> Table:
     wind = wind_sentence(result)
     if wind:
         table.add_row("Wind", wind)
+    for other, its in zip(result.others, vehicle.other_winds, strict=False):
+        table.add_row("", f"{blown(its)}: {other.name}")
     for k, (axis, m) in enumerate(vehicle.mismatch.items()):
         said = f"{axis}: {m.before:.3f} -> {m.after:.3f} m/s^2 RMS on flight not used in the fit"
         table.add_row("" if k else "Force", said)

@@ -187,6 +187,15 @@ def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterato
         streams.append(
             [AirData(float(a), float(v)) for a, v in zip(its.t, its.x[:, 0], strict=True)]
         )
+    if "wind" in tracks:
+        its = tracks["wind"]
+        level = np.column_stack([its.x, np.zeros(len(its.x))]) @ chosen.world.T
+        streams.append(
+            [
+                AirData(float(a), None, float(w[0]), float(w[1]), chosen.wind_sigma)
+                for a, w in zip(its.t, level, strict=True)
+            ]
+        )
     return lambda: merge(*streams, key=lambda s: s.t or 0.0)
 
 

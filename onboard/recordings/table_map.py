@@ -30,10 +30,11 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
     "airspeed": {"m/s": 1.0, "cm/s": 0.01},
+    "wind": {"m/s": 1.0, "cm/s": 0.01},
 }
 """Units of each quantity; the first is meant where none is given."""
 WIDTHS = {"time": 1, "position": 3, "velocity": 3, "force": 3, "rates": 3}
-WIDTHS |= {"voltage": 1, "current": 1, "airspeed": 1, "throttle": 1, "rudder": 1}
+WIDTHS |= {"voltage": 1, "current": 1, "airspeed": 1, "throttle": 1, "rudder": 1, "wind": 2}
 WORLDS = {
     "ned": np.eye(3),
     "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
@@ -52,7 +53,10 @@ OWN_KEYS = {
     "force": OF_QUANTITY | {"kind", "frame", "low_pass", "derived"},
     "rates": OF_QUANTITY | {"low_pass"},
     "motors": OF_QUANTITY | {"range"},
+    "wind": OF_QUANTITY | {"sigma"},
 }
+WIND_SIGMA_M_S = 0.1
+"""Of a wind that was measured, where the map does not say [data sheet]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +84,7 @@ class TableMap:
         low_pass: cut-off (Hz) of the second-order filters that force and rates went through; 0 is
             none.
         motor_range: what the motors are at idle and at full; None: as the unit says.
+        wind_sigma: of a wind that was measured, m/s.
         vehicle: ``copter``, ``plane`` or empty.
         airborne: whether all of the table is flight: then no ground is looked for.
         fix_rate: positions and velocities that are used a second, at most.
@@ -96,6 +101,7 @@ class TableMap:
     derived: bool = False
     low_pass: tuple[float, float] = (0.0, 0.0)
     motor_range: tuple[float, float] | None = None
+    wind_sigma: float = WIND_SIGMA_M_S
     vehicle: str = ""
     airborne: bool = False
     fix_rate: float = 10.0
@@ -151,6 +157,7 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
             _number(_table(found, "rates"), "low_pass", 0.0, "rates.") if "rates" in found else 0.0,
         ),
         motor_range=_range(_table(found, "motors")) if "motors" in found else None,
+        wind_sigma=_wind_sigma(_table(found, "wind")) if "wind" in found else WIND_SIGMA_M_S,
         vehicle=_word(found, "vehicle", VEHICLES, ""),
         airborne=_flag(found, "airborne", ""),
         fix_rate=_positive(found, "fix_rate", 10.0),
@@ -223,11 +230,17 @@ def _number(found: Mapping[str, Any], key: str, default: float, where: str) -> f
     return float(value)
 
 
-def _positive(found: Mapping[str, Any], key: str, default: float) -> float:
-    value = _number(found, key, default, "")
+def _positive(found: Mapping[str, Any], key: str, default: float, where: str = "") -> float:
+    value = _number(found, key, default, where)
     if value <= 0.0:
-        raise ValueError(f"{key} must be positive")
+        raise ValueError(f"{where}{key} must be positive")
     return value
+
+
+def _wind_sigma(wind: Mapping[str, Any]) -> float:
+    """In m/s, in whatever unit it is given."""
+    given = UNITS["wind"][_word(wind, "unit", tuple(UNITS["wind"]), "wind.")]
+    return given * _positive(wind, "sigma", WIND_SIGMA_M_S / given, "wind.")
 
 
 def _range(motors: Mapping[str, Any]) -> tuple[float, float] | None:

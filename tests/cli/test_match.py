@@ -36,6 +36,14 @@ def test_three_recordings_are_one_too_many(log, capsys):
     assert "match takes one recording" in failed(capsys)
 
 
+def test_another_flight_is_not_written_over(log, tmp_path, capsys):
+    other = tmp_path / "other.BIN"
+    other.write_bytes(log.read_bytes())
+    assert run(["match", str(log), "--with", str(other), "--json", str(other)]) == 2
+    assert "other.BIN" in failed(capsys)
+    assert other.read_bytes() == log.read_bytes()
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.samples import (
+    AirData,
     AttitudeSample,
     Battery,
     GpsFix,
@@ -84,6 +85,29 @@ def test_samples_come_in_order_of_time_and_can_be_read_twice(table, columns):
     assert times == sorted(times)
     assert times == [s.t for s in recording.samples()]
     assert recording.counts["force"] == N
+
+
+def test_a_wind_that_was_measured_is_turned_to_north_and_east(table, columns):
+    """East-north-up in centimetres, and empty cells are none."""
+    wind = '\n[wind]\ncolumns = ["ve", "vn"]\nunit = "cm/s"\nsigma = 25\n'
+    found = [s for s in open_table(table, columns(MAP + wind)).samples() if isinstance(s, AirData)]
+    assert len(found) == N
+    for air in found:
+        assert air.wind_n == pytest.approx(0.01 * VELOCITY[0])
+        assert air.wind_e == pytest.approx(0.01 * VELOCITY[1])
+        assert air.wind_sigma == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("wind", "said"),
+    [
+        ('columns = ["ve"]', "must name 2 columns"),
+        ('columns = ["ve", "vn"]\nsigma = 0', "positive"),
+    ],
+)
+def test_a_wind_that_makes_no_sense_is_named(table, columns, wind, said):
+    with pytest.raises(ConfigurationError, match=f"wind.*{said}"):
+        open_table(table, columns(f"{MAP}\n[wind]\n{wind}\n"))
 
 
 def test_fixes_are_no_more_than_asked_for(table, columns):

@@ -134,12 +134,16 @@ class Throttle:
 
 @dataclass(frozen=True, slots=True)
 class AirData:
-    """Airspeed (m/s) and wind estimate (NED, m/s), each None where it is not known."""
+    """Airspeed (m/s) and wind (NED, m/s), each None where it is not known.
+
+    ``wind_sigma`` is that of a wind that was measured, m/s; None: it is the autopilot's estimate.
+    """
 
     t: float
     airspeed: float | None = None
     wind_n: float | None = None
     wind_e: float | None = None
+    wind_sigma: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

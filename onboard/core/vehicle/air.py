@@ -17,7 +17,7 @@ class Air:
         flight: what was recorded.
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
-        gust_variance: of the air along each axis, m^2/s^2.
+        gust_variance: of the air along each axis, m^2/s^2; one, or (n,).
         tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
         commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
@@ -33,12 +33,14 @@ class Air:
     """
 
     def __init__(self, flight: Flight, volts: Array | None = None, columns: int = 3) -> None:
-        """Begin with still, standard air and no force."""
+        """Begin with standard air, still or in the wind that was measured, and no force."""
         n = len(flight)
         self.flight = flight
         self.wind_n = np.zeros((n, 3))
+        if flight.measured_wind.shape[1]:
+            self.wind_n[:, :2] += np.nan_to_num(flight.measured_wind[:, :2])
         self.gust_n = np.zeros(3)
-        self.gust_variance = 0.0
+        self.gust_variance: Array | float = 0.0
         self.tilt = (0.0, 0.0)
         self.rho = flight.rho
         self.commands: Array | None = flight.commands if flight.commands.shape[1] else None

@@ -51,6 +51,14 @@ class Choices:
         """Effects in the model."""
         return tuple(dict.fromkeys(e.name for e in self.fit.model.effects if e.name))
 
+    @property
+    def told(self) -> Solved:
+        """With everything free: the numbers that are told."""
+        f = self.fit
+        every = list(range(len(f.theta)))
+        inside = f.covariance + f.untold(f.information, every)
+        return Solved(np.zeros(len(f.theta)), f.sigma, self._s / f.scale, inside)
+
     def solved(self, effects: Sequence[str]) -> Solved:
         """With these effects free."""
         x, free = self._at(effects, self._N, self._b)

@@ -1,8 +1,14 @@
 """Which effects a flight needs, and which it could not have shown.
 
-An effect is taken in if the fall of chi-square is more than chance gives to its number of unknowns
-and to the number of effects that were tried, if it falls on flight that was not fitted, and if the
-difference from the nominal airframe matters beyond its uncertainty.
+An effect is needed if chi-square falls by more than chance gives to its number of unknowns and to
+the number of effects that were tried, if it falls on flight that was not fitted, and if the
+difference from the nominal airframe matters beyond its uncertainty.  Beside it are free the others
+that were chosen, and those that the flight could not have shown: nobody knows that they are
+nominal.  As told, with everything free, it must differ by more than matters, too.  What passes
+while all others are nominal is one of several that may be it: no name, and not *explained*.
+
+All effects are the choice to begin with, and the needless are dropped.  Effects that undo each
+other (more thrust by a curve of less) are only seen together; for both a third would be taken in.
 """
 
 from __future__ import annotations
@@ -43,21 +49,22 @@ class Chosen:
 
 
 def choose(choices: Choices) -> Chosen:
-    """Take in one effect after the other while one passes; drop what the others made needless."""
+    """Drop what the others make needless, take in what passes now, until neither is any."""
     fit = choices.fit
     untestable = tuple(n for n in choices.names if not _testable(fit, n))
     candidates = [n for n in choices.names if n not in untestable]
     level = FALSE_ALARM / max(len(candidates), 1)
-    chosen: list[str] = []
+    chosen, _ = _pruned(choices, candidates, untestable, level)
     while True:
-        now = choices.solved(chosen)
-        gains = {n: now.chi2 - choices.solved([*chosen, n]).chi2 for n in candidates}
+        beside = [*chosen, *untestable]
+        now = choices.solved(beside)
+        gains = {n: now.chi2 - choices.solved([*beside, n]).chi2 for n in candidates}
         passing = [n for n in gains if n not in chosen and _needs(n, chosen)]
-        passing = [n for n in passing if _passes(choices, chosen, n, gains[n], level)]
+        passing = [n for n in passing if _passes(choices, beside, n, gains[n], level)]
         if not passing:
             break
         chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
-    chosen, gains = _pruned(choices, chosen, level)
+    chosen, gains = _pruned(choices, chosen, untestable, level)
     rivals = {n: _rivals(choices, chosen, n) for n in chosen}
     effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
     suspected = _suspected(choices, chosen, level)
@@ -69,8 +76,9 @@ def choose(choices: Choices) -> Chosen:
 def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[str, ...]:
     """Effects that are not taken in, and explain more than chance by numbers that may matter.
 
-    Where gusts leave one combination of an effect's numbers, it has to be large to be named.  That
-    nothing is there is then no longer sure from where the combination is off by :data:`SURE`.
+    One of several that may be it would pass if all others were nominal.  Where gusts leave one
+    combination of an effect's numbers, it has to be large to be named.  That nothing is there is
+    then no longer sure from where the combination is off by :data:`SURE`.
     """
     left = choices.solved(chosen).chi2
     out = []
@@ -79,13 +87,16 @@ def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[s
             continue
         places = choices.fit.model.indices(n)
         its = level
+        gain = left - choices.solved([*chosen, n]).chi2
         if together_testable(choices.fit, places) is not None:
             its = math.erfc(SURE / math.sqrt(2.0))
         elif _testable(choices.fit, n):
+            if _would_pass(choices, chosen, n, gain, level):
+                out.append(n)
             continue
         with_it = choices.solved([*chosen, n])
         slight = _slight(choices.fit, places, with_it)
-        if not slight and _no_chance(choices, chosen, n, left - with_it.chi2, its):
+        if not slight and _no_chance(choices, chosen, n, gain, its):
             out.append(n)
     return tuple(out)
 
@@ -95,7 +106,17 @@ def _needs(name: str, chosen: Sequence[str]) -> bool:
     return name != "wind_profile" or "wind" in chosen
 
 
-def _passes(choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float) -> bool:
+def _passes(choices: Choices, beside: Sequence[str], name: str, gain: float, level: float) -> bool:
+    """Whether it is needed beside these, and differs as it is told, with everything free."""
+    places = choices.fit.model.indices(name)
+    told = _matters(choices.fit, places, choices.told, sure=0.0)
+    return told and _would_pass(choices, beside, name, gain, level)
+
+
+def _would_pass(
+    choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float
+) -> bool:
+    """Whether it is needed beside these, with all others at their nominal numbers."""
     if not _no_chance(choices, chosen, name, gain, level):
         return False
     places = choices.fit.model.indices(name)
@@ -124,18 +145,18 @@ def _no_chance(
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
 
 
-def _matters(fit: Fit, places: Sequence[int], at: Solved) -> bool:
-    """Whether an unknown, or what is known of them together, is surely off by more than matters."""
+def _matters(fit: Fit, places: Sequence[int], at: Solved, sure: float = SURE) -> bool:
+    """Whether an unknown, or what is known of all, is off by so many sigmas more than matters."""
     unknowns = fit.model.unknowns
     off = _off(fit, places, at)
     each = [(unknowns[i].floor, float(at.sigma[i])) for i in places]
-    if any(abs(d) > floor + SURE * s for d, (floor, s) in zip(off.tolist(), each, strict=True)):
+    if any(abs(d) > floor + sure * s for d, (floor, s) in zip(off.tolist(), each, strict=True)):
         return True
     way = together_testable(fit, places)
     if way is None:
         return False
     size, floor, sigma = _along(fit, places, at, way)
-    return size > floor + SURE * sigma
+    return size > floor + sure * sigma
 
 
 def _slight(fit: Fit, places: Sequence[int], at: Solved) -> bool:
@@ -161,15 +182,16 @@ def _along(fit: Fit, places: Sequence[int], at: Solved, way: Array) -> tuple[flo
 
 
 def _pruned(
-    choices: Choices, chosen: list[str], level: float
+    choices: Choices, chosen: list[str], untestable: Sequence[str], level: float
 ) -> tuple[list[str], dict[str, float]]:
     """Without those that are not needed any more, and what each of the others gains."""
     while True:
-        whole = choices.solved(chosen).chi2
-        gains = {n: choices.solved([c for c in chosen if c != n]).chi2 - whole for n in chosen}
+        every = [*chosen, *untestable]
+        whole = choices.solved(every).chi2
+        gains = {n: choices.solved([c for c in every if c != n]).chi2 - whole for n in chosen}
         needless = []
         for n in chosen:
-            others = [c for c in chosen if c != n and _needs(c, [k for k in chosen if k != n])]
+            others = [c for c in every if c != n and _needs(c, [k for k in chosen if k != n])]
             if not _passes(choices, others, n, gains[n], level):
                 needless.append(n)
         if not needless:

@@ -16,6 +16,7 @@ from onboard.core.vehicle.effects.ground_effect import GroundEffect
 from onboard.core.vehicle.effects.gust_drag import GustDrag
 from onboard.core.vehicle.effects.inflow import Inflow
 from onboard.core.vehicle.effects.motor_lag import MotorLag
+from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
@@ -27,6 +28,7 @@ from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.several import wind_sigmas
 from onboard.core.vehicle.signals import Signals, Stream
 
 FULL_RANGE = (0.85, 1.05)
@@ -132,16 +134,24 @@ def copter_model(
     force_sigma: Array,
     variant: Variant = Variant(),
 ) -> ForceModel:
-    """Every effect of a copter that this recording can speak of."""
+    """Every effect of a copter that this recording can speak of.
+
+    Args:
+        flight: of one recording, or of several.
+        frame: to compare with.
+        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
+        variant: which of the forms.
+    """
+    parts = range(flight.parts)
 
     def start(of: Flight) -> Air:
         return Air(of, voltage_of(of))
 
     still = start(flight)
     everything: list[Effect] = [
-        Wind(),
-        WindProfile(variant.profile_top),
-        *([GustDrag()] if variant.gusty else []),
+        own([Wind(sigma) for sigma in wind_sigmas(flight)]),
+        own([WindProfile(variant.profile_top) for _ in parts]),
+        *([own([GustDrag() for _ in parts])] if variant.gusty else []),
         *([AirDensity()] if flown_high(flight) else []),
         VerticalDrag(frame),
         ThrustTilt(),
@@ -153,7 +163,7 @@ def copter_model(
         ThrustScale(frame),
         GroundEffect(frame),
         Inflow(frame),
-        SensorOffset(force_sigma),
+        own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
     ]
     effects = tuple(e for e in everything if not e.missing(still))
     axes = (0, 1, 2) if still.commands is not None else (0, 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from onboard.core.vehicle.trajectory import Motion
 
 _BY_STEP = (
     *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
-    *("outputs", "commands", "battery", "airspeed", "ekf_wind"),
+    *("outputs", "commands", "battery", "airspeed", "ekf_wind", "measured_wind", "part"),
 )
 """Fields that have a value for each step."""
 
@@ -45,6 +45,8 @@ class Flight:
         ekf_wind: (n, 2) or empty (n, 0).
         velocity_sigma: of the velocity, m/s.
         attitude_sigma: of roll and pitch, rad.
+        measured_wind: (n, 3) towards north and east, and its sigma, m/s; or empty (n, 0).
+        part: (n,) which of several recordings a step is of (:mod:`onboard.core.vehicle.several`).
         step_s: length of a step, s.
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
     """
@@ -66,16 +68,40 @@ class Flight:
     ekf_wind: Array
     velocity_sigma: float
     attitude_sigma: float
+    measured_wind: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     step_s: float = STEP_S
     ground_seen: bool = True
+
+    def __post_init__(self) -> None:
+        """One recording, in a wind that nobody measured, where nothing else is said."""
+        n = len(self.t)
+        if len(self.part) != n:
+            object.__setattr__(self, "part", np.zeros(n, dtype=np.int64))
+        if len(self.measured_wind) != n:
+            object.__setattr__(self, "measured_wind", np.zeros((n, 0)))
 
     def __len__(self) -> int:
         return len(self.t)
 
     @property
-    def mean_height(self) -> float:
-        """Mean height above the ground, m."""
-        return float(np.mean(self.height)) - self.ground
+    def parts(self) -> int:
+        """How many recordings it is of."""
+        return int(self.part[-1]) + 1
+
+    @property
+    def since_start(self) -> Array:
+        """(n,) s since the start of the recording that a step is of."""
+        first = np.searchsorted(self.part, self.part)
+        out: Array = self.t - self.t[first]
+        return out
+
+    @property
+    def mean_heights(self) -> Array:
+        """(n,) mean height above the ground of the recording that a step is of, m."""
+        sums = np.bincount(self.part, self.height - self.ground)
+        out: Array = (sums / np.maximum(np.bincount(self.part), 1))[self.part]
+        return out
 
     def levelled(self) -> Flight:
         """The same path and heading, flown without a tilt.
@@ -144,6 +170,7 @@ def flight_of(
         battery=joined["battery"],
         airspeed=joined["airspeed"],
         ekf_wind=joined["ekf_wind"],
+        measured_wind=joined["measured_wind"],
     )
     flight = flight.kept(air)
     # What was cut out divides a piece: the noise's memory must not reach across.
@@ -169,8 +196,11 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
     v_b = np.einsum("nij,nj->ni", R_bn, m.v_n)
     height = mean(m.height)
     n = len(steps)
-    streams = (signals.outputs, commands, signals.battery, signals.airspeed, signals.ekf_wind)
-    outputs, orders, battery, airspeed, wind = (
+    streams = (
+        *(signals.outputs, commands, signals.battery, signals.airspeed),
+        *(signals.ekf_wind, signals.measured_wind),
+    )
+    outputs, orders, battery, airspeed, wind, measured = (
         mean(s.at(m.t)) if s.covers(m.t) else np.zeros((n, 0)) for s in streams
     )
     return {
@@ -188,4 +218,5 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
         "battery": battery,
         "airspeed": airspeed[:, 0] if airspeed.shape[1] else np.full(n, np.nan),
         "ekf_wind": wind,
+        "measured_wind": measured,
     }

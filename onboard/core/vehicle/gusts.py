@@ -31,20 +31,22 @@ def _erf(x: Array) -> Array:
     return out
 
 
-def signed_square(u: Array, variance: float) -> Array:
-    """(n,) mean of ``|u + g| (u + g)``; continued oddly to negative variances."""
+def signed_square(u: Array, variance: Array | float) -> Array:
+    """(n,) mean of ``|u + g| (u + g)``; continued oddly to negative variances, one or (n,)."""
     plain: Array = np.abs(u) * u
-    if abs(variance) < LEAST_VARIANCE:
+    size = np.abs(variance)
+    if np.max(size) < LEAST_VARIANCE:
         return plain
-    s = math.sqrt(abs(variance))
+    s = np.sqrt(np.maximum(size, LEAST_VARIANCE))
     ratio = u / s
     mean = (u * u + s * s) * _erf(ratio / math.sqrt(2.0))
     mean = mean + u * s * math.sqrt(2.0 / math.pi) * np.exp(-0.5 * ratio * ratio)
-    out: Array = mean if variance > 0.0 else 2.0 * plain - mean
+    odd = np.where(np.greater(variance, 0.0), mean, 2.0 * plain - mean)
+    out: Array = np.where(size < LEAST_VARIANCE, plain, odd)
     return out
 
 
-def positive_square(u: Array, variance: float) -> Array:
+def positive_square(u: Array, variance: Array | float) -> Array:
     """(n,) mean of ``max(0, u + g)^2``."""
     out: Array = 0.5 * (signed_square(u, variance) + u * u + variance)
     return out

@@ -56,6 +56,7 @@ def vehicle_match(
         vehicle=vehicle,
         effects=effects,
         wind=wind_of(m),
+        other_winds=tuple(wind_of(m, k) for k in range(1, m.model.flight.parts)),
         mismatch=mismatch_of(m),
         alone_before=float(alone.before[-1]) if alone else NAN,
         alone_after=float(alone.after[-1]) if alone else NAN,
@@ -169,13 +170,15 @@ def drifts_of(m: Matched) -> Alone | None:
 
 
 def series_of(m: Matched) -> ForceSeries:
-    """Forces over time, for a report."""
+    """Forces over time, for a report; of several recordings, those of the first."""
     columns = [k for k, axis in enumerate(m.model.axes) if axis in FORCE]
-    measured = m.model.measured()[:, columns]
-    t = m.model.flight.t - m.model.flight.t[0]
+    flight = m.model.flight
+    mine = np.ix_(flight.part == 0, columns)
+    measured = m.model.measured()[mine]
+    t = flight.since_start[flight.part == 0]
     axes = tuple(AXES[m.model.axes[k]] for k in columns)
-    before, after = measured - m.nominal[:, columns], measured - m.held[:, columns]
-    speed = np.linalg.norm(m.model.flight.v_n, axis=1)
+    before, after = measured - m.nominal[mine], measured - m.held[mine]
+    speed = np.linalg.norm(flight.v_n[flight.part == 0], axis=1)
     return ForceSeries(t, axes, measured, before, after, speed)
 
 

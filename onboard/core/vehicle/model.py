@@ -11,6 +11,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.own import Own
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import HEADING_RAD, TURBULENCE_FLOOR_M_S
 
@@ -175,23 +176,47 @@ class ForceModel:
         out: Array = every[:, list(self.axes)]
         return out
 
+    @property
+    def _directions(self) -> list[list[int]]:
+        """Places of unknowns that are asked about at once: no step has more than one of them.
+
+        They are those of an effect that has numbers of its own in each of several flights.
+        """
+        out: list[list[int]] = []
+        at = 0
+        for effect in self.effects:
+            n = len(effect.unknowns)
+            stride = effect.count if isinstance(effect, Own) else n
+            out += [list(range(at + j, at + n, stride)) for j in range(stride)]
+            at += n
+        return out
+
+    def _spread(self, places: list[int], apart: Array, out: Array) -> None:
+        """Put the differences (n, k) of some places, by their sizes, into (n, k, m) columns."""
+        for number, (j, size) in enumerate(zip(places, self.plausible[places], strict=True)):
+            mine = self.flight.part == number if len(places) > 1 else slice(None)
+            out[mine, :, j] = apart[mine] / (DIFFERENCE * size)
+
     def steps(self, theta: Array) -> Array:
         """(n, k, m) derivatives by one-sided differences: good enough to step by."""
-        here, stages, columns = self.predicted(theta), self._stages(theta), []
-        for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
+        here, stages = self.predicted(theta), self._stages(theta)
+        out, owners = np.zeros((*here.shape, len(theta))), self._owners
+        for places in self._directions:
             there = theta.copy()
-            there[j] += DIFFERENCE * size
-            columns.append((self._from(stages, owner, there) - here) / (DIFFERENCE * size))
-        return np.stack(columns, axis=-1)
+            there[places] += DIFFERENCE * self.plausible[places]
+            self._spread(places, self._from(stages, owners[places[0]], there) - here, out)
+        return out
 
     def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
         """(n, k, m) derivatives by central differences, in air that also moves by ``gust``."""
-        stages, columns = self._stages(theta, gust), []
-        for j, (size, owner) in enumerate(zip(self.plausible, self._owners, strict=True)):
-            h = DIFFERENCE * size
+        stages, owners = self._stages(theta, gust), self._owners
+        out = np.zeros((len(self.flight), len(self.axes), len(theta)))
+        for places in self._directions:
+            h = DIFFERENCE * self.plausible[places]
             up, down = theta.copy(), theta.copy()
-            up[j] += h
-            down[j] -= h
+            up[places] += h
+            down[places] -= h
+            owner = owners[places[0]]
             apart = self._from(stages, owner, up) - self._from(stages, owner, down)
-            columns.append(apart / (2.0 * h))
-        return np.stack(columns, axis=-1)
+            self._spread(places, 0.5 * apart, out)
+        return out

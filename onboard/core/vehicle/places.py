@@ -37,12 +37,12 @@ def places_of(
     """Blocks in which an effect moves the force most, neighbours joined.
 
     Args:
-        flight: n steps.
+        flight: n steps; of several recordings, the first is told of.
         made: (n, k) what the effect adds to the force, m/s^2.
         axes: body axes of the columns.
         block: (n,) number of the block of each step.
     """
-    squares = made**2
+    squares = np.where(flight.part[:, None] == 0, made**2, 0.0)
     whole = float(squares.sum())
     if whole <= 0.0:
         return ()

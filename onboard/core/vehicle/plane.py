@@ -13,6 +13,7 @@ from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.lift import Lift
+from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
@@ -25,6 +26,7 @@ from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import STALL_SHARE
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.several import wind_sigmas
 from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION, Signals, Stream
 
 MIDDLE_US, HALF_US = 1500.0, 500.0
@@ -62,9 +64,17 @@ def has_airspeed(flight: Flight) -> bool:
     )
 
 
-def unstalled(flight: Flight, frame: PlaneAirframe, wind_n: Array) -> Flight:
-    """The flight without what is near or past the stall, or too slow to be flight, by this wind."""
-    u = flight.v_b - np.einsum("nij,j->ni", flight.R_bn, wind_n)
+def unstalled(flight: Flight, frame: PlaneAirframe, winds: Array) -> Flight:
+    """The flight without what is near or past the stall, or too slow to be flight.
+
+    Args:
+        flight: of one recording, or of several.
+        frame: the airframe.
+        winds: (parts, 2) of each beyond what was measured, towards north and east, m/s.
+    """
+    air = Air(flight)
+    air.wind_n[:, :2] += winds[flight.part]
+    u = air.u_b
     speed = np.linalg.norm(u, axis=1)
     alpha = np.arctan2(u[:, 2], u[:, 0])
     good = (np.abs(alpha) < STALL_SHARE * frame.alpha_stall) & (speed > LEAST_AIRSPEED_M_S)
@@ -79,9 +89,9 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
     """Every effect of a plane that this recording can speak of.
 
     Args:
-        flight: with throttle and rudder, if the recording has outputs.
+        flight: with throttle and rudder, if the recording has outputs; of one, or of several.
         frame: to compare with.
-        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
+        force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
     """
     sensor = has_airspeed(flight)
 
@@ -90,8 +100,8 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
 
     still = start(flight)
     everything: list[Effect] = [
-        Wind(),
-        WindProfile(),
+        own([Wind(sigma) for sigma in wind_sigmas(flight)]),
+        own([WindProfile() for _ in range(flight.parts)]),
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),
         ServoLag(),
         Lift(frame),
@@ -101,7 +111,7 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
         Propulsion(frame),
         PropellerInflow(frame),
         *([AirspeedScale(flight.rho)] if sensor else []),
-        SensorOffset(force_sigma),
+        own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
     ]
     effects = tuple(e for e in everything if not e.missing(still))
     if still.commands is None:

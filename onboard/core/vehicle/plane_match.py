@@ -33,14 +33,14 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    flying = unstalled(flight, frame, np.zeros(3))
+    flying = unstalled(flight, frame, np.zeros((flight.parts, 2)))
     if len(flying) < FEWEST_STEPS:
         return None
     found = matched(plane_model(flying, frame, force_sigma))
     places = found.model.indices("wind")
-    wind = np.append(found.fit.theta[places], 0.0)
-    flying = unstalled(flight, frame, wind)
-    if len(flying) >= FEWEST_STEPS and float(np.linalg.norm(wind)) > 1.0:
+    winds = found.fit.theta[places].reshape(-1, 2)
+    flying = unstalled(flight, frame, winds)
+    if len(flying) >= FEWEST_STEPS and float(np.max(np.linalg.norm(winds, axis=1))) > 1.0:
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma))
     effects = differences(found)

@@ -139,6 +139,7 @@ class VehicleMatch:
         vehicle: ``copter`` or ``plane``.
         effects: found, the strongest first.
         wind: of the flight; None where nothing could be said.
+        other_winds: of the other flights of the vehicle that were matched with it.
         mismatch: by axis.
         alone_before: RMS of the velocity that the nominal model gains or loses in ten seconds
             alone, m/s.
@@ -158,6 +159,7 @@ class VehicleMatch:
     vehicle: str
     effects: tuple[Difference, ...] = ()
     wind: WindEstimate | None = None
+    other_winds: tuple[WindEstimate, ...] = ()
     mismatch: Mapping[str, AxisMismatch] = field(default_factory=dict)
     alone_before: float = NAN
     alone_after: float = NAN

@@ -17,6 +17,8 @@ NEGLIGIBLE = 1e-12
 SHORTEST_LAG_S = 0.005
 """A tenth of a step of 0.05 s, of which exp(-10) is left a step later: a shorter lag acts in
 proportion to its length, and a law of that is what a fit needs at none [cost: rounding]."""
+LONGEST_LAG_S = 1.0
+"""Slower than this no motor and no servo is, s [physics]."""
 
 
 def accumulated(z: Array, factor: float, starts: Mask | None = None) -> Array:
@@ -62,3 +64,22 @@ def lagged(x: Array, tau: float, piece: NDArray[np.int64], step_s: float) -> Arr
     drive[1:] = (1.0 - slope) * x[1:] + (slope - decay) * x[:-1]
     drive[starts] = x[starts]
     return accumulated(drive, decay, starts)
+
+
+def behind(x: Array, lag: float, piece: NDArray[np.int64], step_s: float) -> Array:
+    """A signal x (n, k) behind a low-pass; a lag that is less than none leads by as much.
+
+    A fit needs a slope everywhere.  Where a lag of less than the shortest acted as the shortest, a
+    prior that asks for more would turn every step of the fit into one that leads uphill, and leave
+    all other unknowns where they were.
+
+    Args:
+        x: the signal.
+        lag: time constant, s; at most :data:`LONGEST_LAG_S` either way.
+        piece: (n,) number of the uninterrupted piece; each begins settled.
+        step_s: s.
+    """
+    lag = min(max(lag, -LONGEST_LAG_S), LONGEST_LAG_S)
+    tau = max(abs(lag), SHORTEST_LAG_S)
+    out: Array = x + lag / tau * (lagged(x, tau, piece, step_s) - x)
+    return out

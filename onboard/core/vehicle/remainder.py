@@ -35,12 +35,16 @@ MOST_TOLD = 3
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """A span with more than chance: s since the start, body axis, and RMS of it, m/s^2."""
+    """A span with more than chance: s since the start, body axis, and RMS of it, m/s^2.
+
+    ``part`` is the number of the recording, of several.
+    """
 
     start_s: float
     end_s: float
     axis: str
     force: float
+    part: int = 0
 
 
 def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
@@ -59,8 +63,8 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     residual = windows.mean(whole.measured() - whole.predicted(fit.theta))
     sensitivity = windows.mean(whole.sensitivity(fit.theta))
     unclear = windows.mean(whole.unclear(fit.theta))
-    t = flight.t[windows.first] - flight.t[0]
-    block = np.floor(t / BLOCK_S).astype(int)
+    t, part = flight.since_start[windows.first], flight.part[windows.first]
+    block = np.floor((flight.t[windows.first] - flight.t[0]) / BLOCK_S).astype(int)
     numbers = np.unique(block)
     flying = ~near_ground(flight)[windows.first]
     residual = residual * flying[:, None]
@@ -90,7 +94,7 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
             dof = max(round(share * count), 1)
             if matters and survival(dof * its / (usual * count), dof) < level:
                 start, end = float(t[mine][0]), float(t[mine][-1]) + windows.length_s
-                found.append(Remainder(start, end, AXES[axis], force))
+                found.append(Remainder(start, end, AXES[axis], force, int(part[mine][0])))
     return _joined(found)
 
 
@@ -116,9 +120,12 @@ def near_ground(flight: Flight) -> Mask:
 
 
 def left_out(flight: Flight, kept: Mask) -> tuple[tuple[float, float], ...]:
-    """Spans (s since the start) of steps that are not kept (n,), as long as is worth telling."""
+    """Spans (s since the start) of steps that are not kept (n,), as long as is worth telling.
+
+    Of several recordings, the first is told of.
+    """
     out: list[tuple[float, float]] = []
-    for t in (flight.t[~kept] - flight.t[0]).tolist():
+    for t in (flight.t[~kept & (flight.part == 0)] - flight.t[0]).tolist():
         if out and t - out[-1][1] < TOLD_S:
             out[-1] = (out[-1][0], t)
         else:
@@ -132,11 +139,15 @@ def remainder_sentence(found: tuple[Remainder, ...]) -> str:
         return ""
     worst = sorted(found, key=lambda r: -r.force * (r.end_s - r.start_s))
     said = [
-        f"{r.start_s:.0f}-{r.end_s:.0f} s ({r.axis}, {r.force:.2f} m/s^2)"
-        for r in sorted(worst[:MOST_TOLD], key=lambda r: r.start_s)
+        f"{r.start_s:.0f}-{r.end_s:.0f} s{_of(r)} ({r.axis}, {r.force:.2f} m/s^2)"
+        for r in sorted(worst[:MOST_TOLD], key=lambda r: (r.part, r.start_s))
     ]
     more = f" and {len(worst) - MOST_TOLD} more" if len(worst) > MOST_TOLD else ""
     return f"no effect describes the force at {', '.join(said)}{more}"
+
+
+def _of(r: Remainder) -> str:
+    return f" of flight {r.part + 1}" if r.part else ""
 
 
 def left_out_sentence(spans: tuple[tuple[float, float], ...]) -> str:
@@ -154,10 +165,11 @@ def _joined(found: list[Remainder]) -> tuple[Remainder, ...]:
     out: list[Remainder] = []
     for r in found:
         last = out[-1] if out else None
-        if last and last.axis == r.axis and r.start_s - last.end_s < TOLD_S:
+        near = last and (last.axis, last.part) == (r.axis, r.part)
+        if last and near and r.start_s - last.end_s < TOLD_S:
             before, now = last.end_s - last.start_s, r.end_s - r.start_s
             mean = (before * last.force**2 + now * r.force**2) / (before + now)
-            out[-1] = Remainder(last.start_s, r.end_s, r.axis, float(np.sqrt(mean)))
+            out[-1] = Remainder(last.start_s, r.end_s, r.axis, float(np.sqrt(mean)), r.part)
         else:
             out.append(r)
     return tuple(out)

@@ -49,6 +49,7 @@ class Signals:
         battery: voltage (V) and current (A, NaN where it is not measured).
         airspeed: as the autopilot reports it, m/s.
         ekf_wind: the autopilot's own estimate, towards north and east, m/s.
+        measured_wind: by an anemometer or a tunnel: towards north and east, and its sigma, m/s.
         parameters: in force last, by name.
         kind: of vehicle: ``copter``, ``plane`` or another word; empty where nobody says.
         normalised: whether outputs are commands of the motors already.
@@ -58,6 +59,7 @@ class Signals:
     battery: Stream = field(default_factory=Stream)
     airspeed: Stream = field(default_factory=Stream)
     ekf_wind: Stream = field(default_factory=Stream)
+    measured_wind: Stream = field(default_factory=Stream)
     parameters: Mapping[str, float] = field(default_factory=dict)
     kind: str = ""
     normalised: bool = False

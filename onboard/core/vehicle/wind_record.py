@@ -4,39 +4,47 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.vehicle.effects.own import Own
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.records import WindEstimate
 
 
-def wind_of(m: Matched) -> WindEstimate:
-    """The wind of the flight, whether it was found to matter or not."""
+def wind_of(m: Matched, number: int = 0) -> WindEstimate:
+    """The wind of one of the recordings, whether it was found to matter or not."""
     fit, flight = m.fit, m.model.flight
-    places = m.model.indices("wind")
-    north, east = fit.theta[places].tolist()
+    its = flight.part == number
+    places = m.model.indices("wind")[2 * number : 2 * number + 2]
+    measured = np.zeros(2)
+    if flight.measured_wind.shape[1]:
+        measured = np.mean(np.nan_to_num(flight.measured_wind[its, :2]), axis=0)
+    north, east = (fit.theta[places] + measured).tolist()
     sigmas = fit.sigma[places].tolist()
     exponent, exponent_sigma = None, float("nan")
     factor = np.ones(len(flight))
     if "wind_profile" in m.chosen.effects:
-        k = m.model.indices("wind_profile")[0]
+        k = m.model.indices("wind_profile")[number]
         exponent, exponent_sigma = float(fit.theta[k]), float(fit.sigma[k])
         profile = m.model.effect("wind_profile")
-        if isinstance(profile, WindProfile):
-            factor = profile.factor(m.model.start(flight), exponent)
-    numbers = np.unique(fit.block)
+        law_of = profile.each if isinstance(profile, Own) else profile
+        if isinstance(law_of, WindProfile):
+            factor = law_of.factor(m.model.start(flight), exponent)
+    numbers, since = np.unique(fit.block), flight.since_start
     series, spread, when, heights, ekf, law = [], [], [], [], [], []
-    for block, number in zip(fit.blocks, numbers, strict=False):
-        mine = fit.block == number
+    for block, block_number in zip(fit.blocks, numbers, strict=False):
+        mine = fit.block == block_number
+        if not its[mine].all():
+            continue
         information = block.N[np.ix_(places, places)]
         if np.linalg.cond(information) > 1e8:
             continue
         covariance = np.linalg.inv(information) * fit.scale
         here = float(np.mean(factor[mine]))  # the unknown is the wind at the mean height
-        found = fit.theta[places] + np.linalg.solve(information, block.b[places])
+        found = measured + fit.theta[places] + np.linalg.solve(information, block.b[places])
         series.append(here * found)
         spread.append(here * np.sqrt(np.diag(covariance)))
-        law.append(here * fit.theta[places])
-        when.append(float(np.mean(flight.t[mine]) - flight.t[0]))
+        law.append(here * (measured + fit.theta[places]))
+        when.append(float(np.mean(since[mine])))
         heights.append(float(np.mean(flight.height[mine]) - flight.ground))
         has = flight.ekf_wind.shape[1] == 2
         ekf.append(np.mean(flight.ekf_wind[mine], axis=0) if has else np.full(2, np.nan))
@@ -45,7 +53,7 @@ def wind_of(m: Matched) -> WindEstimate:
         east,
         sigmas[0],
         sigmas[1],
-        flight.mean_height,
+        float(np.mean(flight.height[its])) - flight.ground,
         exponent,
         exponent_sigma,
         m.turbulence.rms if m.turbulence.found else None,

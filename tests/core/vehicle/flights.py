@@ -123,6 +123,7 @@ def plane_flight(
     noise=0.05,
     gusts=0.0,
     rudder_by_slip=0.0,
+    servo_lag=0.14,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -131,7 +132,7 @@ def plane_flight(
     sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
     recorded heading, rad, of the force's noise, m/s^2, and of gusts along each axis that carry the
     plane along, so that it flies through them as through still air, m/s.  The rudder moves at
-    random, and by the sideslip that it holds.
+    random, and by the sideslip that it holds.  Servos and motor follow behind a low-pass, s.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -153,7 +154,7 @@ def plane_flight(
     drag = drag + slip_straight * np.abs(beta)
     throttle = 0.5 + np.clip(smooth(rng, n, throttle_swing), -0.48, 0.48)
     rudder = smooth(rng, n, 0.15 if not rudder_by_slip else 0.02) + rudder_by_slip * beta
-    decay = np.exp(-STEP / 0.14)
+    decay = np.exp(-STEP / servo_lag)
     late = np.empty((2, n))
     for row, command in zip(late, (throttle, rudder), strict=True):
         state = command[0]
@@ -161,7 +162,8 @@ def plane_flight(
             # Straight lines between the steps: the exact answer of a low-pass to a ramp.
             before = command[k - 1] if k else command[0]
             slope = (command[k] - before) / STEP
-            state = decay * (state - before + slope * 0.14) + command[k] - slope * 0.14
+            lag = slope * servo_lag
+            state = decay * (state - before + lag) + command[k] - lag
             row[k] = state
     pull = ratio * late[0] - lost * np.sqrt(np.clip(late[0], 0.0, None)) * x
     pull = np.where(pull < 0.0, braking * pull, pull) - bend * (lost * x) ** 2

@@ -147,3 +147,16 @@ def test_without_a_ground_no_wind_is_said_to_grow_with_height():
     assert "ground" in why["wind_profile"]
     assert "ground" in why["ground_effect"]
     assert names(match) == {"wind"}
+
+
+def test_effects_that_undo_each_other_are_found_both():
+    """More thrust by a curve that has less of it at hover: alone, neither explains anything."""
+    match = matched(copter_flight(ratio=1.25, expo=0.946, seed=11))
+    assert names(match) == {"thrust_scale", "thrust_curve"}
+    within(match, "thrust_curve.expo", 0.946)
+
+
+def test_two_are_not_taken_for_a_third():
+    """A battery that gives way and thrust that makes up for it look like another curve."""
+    flight = copter_flight(ratio=1.25, volts=(12.6, 9.5), sag=1.0, seed=12)
+    assert names(matched(flight)) == {"thrust_scale", "voltage_sag"}

@@ -14,7 +14,7 @@ from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.gusts import positive_square, signed_square
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
-from onboard.core.vehicle.recursion import accumulated, lagged
+from onboard.core.vehicle.recursion import accumulated, behind, lagged
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
 from onboard.core.vehicle.spans import grounded_spans
 from tests.core.vehicle.flights import copter_flight
@@ -186,3 +186,15 @@ def test_a_motor_is_a_low_pass_and_no_delay(tau):
     came = (air.commands[200:] * np.exp(1j * omega * t[200:, None]))[:, 0]
     answer = 2.0 * np.mean(came).conjugate()
     assert abs(answer - 1.0 / (1.0 + 1j * omega * tau)) < 0.01
+
+
+def test_a_lag_acts_in_proportion_to_its_length_through_none():
+    """A fit has a slope there, on both sides and the same."""
+    rng = np.random.default_rng(3)
+    x = np.cumsum(rng.normal(size=(100, 2)), axis=0)
+    piece = np.zeros(100, dtype=np.int64)
+    late, later, lead = (behind(x, lag, piece, 0.1) - x for lag in (0.001, 0.002, -0.001))
+    np.testing.assert_allclose(later, 2.0 * late, atol=1e-9)
+    np.testing.assert_allclose(lead, -late, atol=1e-9)
+    assert np.abs(late).max() > 1e-3
+    np.testing.assert_allclose(behind(x, 0.3, piece, 0.1), lagged(x, 0.3, piece, 0.1), atol=1e-9)

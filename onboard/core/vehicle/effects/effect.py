@@ -7,6 +7,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 
 NO_GROUND = "it was never seen on the ground, and heights above it are not known"
@@ -84,3 +87,16 @@ class Effect(ABC):
         """Why this recording cannot speak of it; empty where it can."""
         del air
         return ""
+
+
+class ByStep(Effect):
+    """An effect of the air or of a sensor: its numbers may be others in each of several flights."""
+
+    @abstractmethod
+    def act_by(self, air: Air, values: Sequence[Array]) -> None:
+        """Change the prediction by values (n,) of the unknowns at each step."""
+
+    def act(self, air: Air, values: Sequence[float]) -> None:
+        """The same values at all steps."""
+        n = len(air.flight)
+        self.act_by(air, [np.full(n, v) for v in values])

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.recursion import SHORTEST_LAG_S, lagged
+from onboard.core.vehicle.recursion import behind
 
 FLOOR_S = 0.03
 """Lags below this are within the steps of outputs logged at 10 Hz, s [data sheet]."""
-LONGEST_S = 1.0
 
 
 class MotorLag(Effect):
@@ -33,10 +30,8 @@ class MotorLag(Effect):
         """Slow the commands down; a lag that is less than none leads by as much."""
         if air.commands is None:
             return
-        lag = float(np.clip(values[0], -LONGEST_S, LONGEST_S))
-        tau = max(abs(lag), SHORTEST_LAG_S)
-        late = lagged(air.commands, tau, air.flight.piece, air.flight.step_s)
-        air.commands = air.commands + lag / tau * (late - air.commands)
+        flight = air.flight
+        air.commands = behind(air.commands, values[0], flight.piece, flight.step_s)
 
     def missing(self, air: Air) -> str:
         """It takes outputs."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
-from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.effects.effect import ByStep, Unknown
 
 
-class SensorOffset(Effect):
+class SensorOffset(ByStep):
     """A constant on each axis, as far from zero as the sensor level allows; beside the effects."""
 
     def __init__(self, sigma: Array) -> None:
@@ -23,6 +23,6 @@ class SensorOffset(Effect):
             ]
         )
 
-    def act(self, air: Air, values: Sequence[float]) -> None:
+    def act_by(self, air: Air, values: Sequence[Array]) -> None:
         """Add it."""
-        air.force_b[:, :3] += np.asarray(values)
+        air.force_b[:, :3] += np.stack(values, axis=1)

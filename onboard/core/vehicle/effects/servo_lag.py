@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.recursion import SHORTEST_LAG_S, lagged
+from onboard.core.vehicle.recursion import behind
 
 NOMINAL_S = 0.14
 """SIM_SERVO_SPEED by default: the time constant of the simulator's servos, s."""
@@ -22,8 +20,8 @@ class ServoLag(Effect):
         super().__init__([Unknown("servo_lag", NOMINAL_S, 0.1, 0.0, "s")])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
-        """Slow the commands down."""
+        """Slow the commands down; a lag that is less than none leads by as much."""
         if air.commands is None:
             return
-        tau = float(np.clip(values[0], SHORTEST_LAG_S, 1.0))
-        air.commands = lagged(air.commands, tau, air.flight.piece, air.flight.step_s)
+        flight = air.flight
+        air.commands = behind(air.commands, values[0], flight.piece, flight.step_s)

@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
-from onboard.core.vehicle.effects.effect import NO_GROUND, Effect, Unknown
+from onboard.core.vehicle.effects.effect import NO_GROUND, ByStep, Unknown
 
 TOP_M = 60.0
 """Height from which ArduPilot's simulator lets the wind be constant, m (SIM_WIND_T_ALT)."""
@@ -18,7 +18,7 @@ LEAST_RATIO = 1.5
 """Ratio of the heights flown (95th to 5th percentile) from which a law shows [physics]."""
 
 
-class WindProfile(Effect):
+class WindProfile(ByStep):
     """``w(h) = w (h / h_mean)^exponent``, constant from ``top`` on."""
 
     name = "wind_profile"
@@ -29,16 +29,16 @@ class WindProfile(Effect):
         super().__init__([Unknown("exponent", 0.0, 0.3, 0.05, "1", doubt=0.01)])
         self.top = top
 
-    def act(self, air: Air, values: Sequence[float]) -> None:
+    def act_by(self, air: Air, values: Sequence[Array]) -> None:
         """Scale the wind by height."""
         air.wind_n *= self.factor(air, values[0])[:, None]
 
-    def factor(self, air: Air, exponent: float) -> Array:
+    def factor(self, air: Air, exponent: Array | float) -> Array:
         """(n,) wind over that at the mean height."""
         flight = air.flight
         above = np.clip(flight.height - flight.ground, LOWEST_M, self.top)
-        mean = float(np.clip(flight.mean_height, LOWEST_M, self.top))
-        out: Array = (above / mean) ** float(np.clip(exponent, -1.0, 2.0))
+        mean = np.clip(flight.mean_heights, LOWEST_M, self.top)
+        out: Array = (above / mean) ** np.clip(exponent, -1.0, 2.0)
         return out
 
     def missing(self, air: Air) -> str:

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.copter import copter_model
+from onboard.core.vehicle.copter_match import match_copter
+from onboard.core.vehicle.limits import BLOCK_S
+from onboard.core.vehicle.several import joined, wind_sigmas
+from onboard.core.vehicle.signals import Signals
+from tests.core.vehicle.flights import copter_flight
+
+SIGMA = np.array([0.003, 0.003, 0.01])
+WINDS = ((3.0, -2.0), (-4.0, 1.0), (0.0, 0.0))
+
+
+def flights(**changes):
+    return [
+        copter_flight(seed=20 + k, seconds=70.0, wind=wind, c_m=0.45, noise=0.05, **changes)
+        for k, wind in enumerate(WINDS)
+    ]
+
+
+def matched(every):
+    sigmas = np.tile(SIGMA, (len(every), 1))
+    return match_copter(joined(every), Signals(kind="copter"), CopterAirframe(), sigmas)
+
+
+def measured(flight, north, east, sigma):
+    return replace(flight, measured_wind=np.tile([north, east, sigma], (len(flight), 1)))
+
+
+def test_no_block_and_no_piece_has_steps_of_two_flights():
+    flight = joined(flights())
+    for number in (np.floor((flight.t - flight.t[0]) / BLOCK_S), flight.piece):
+        for its in np.unique(number):
+            assert len(np.unique(flight.part[number == its])) == 1
+    np.testing.assert_allclose(flight.since_start[flight.part == 1][0], 0.0)
+    above = [f.height - f.ground for f in flights()]
+    np.testing.assert_allclose(flight.height - flight.ground, np.concatenate(above))
+    assert joined(flights()[:1]).parts == 1
+
+
+def test_derivatives_of_what_is_each_flights_own_are_those_of_the_whole_prediction():
+    model = copter_model(joined(flights()), CopterAirframe(), np.tile(SIGMA, (3, 1)))
+    theta = model.nominal + 0.05 * model.plausible
+    ours = model.jacobian(theta)
+    for j, size in enumerate(model.plausible):
+        step = np.zeros(len(theta))
+        step[j] = 1e-3 * size
+        apart = model.predicted(theta + step) - model.predicted(theta - step)
+        np.testing.assert_allclose(ours[:, :, j], apart / (2e-3 * size), atol=1e-9)
+
+
+@pytest.mark.slow
+def test_flights_of_one_vehicle_share_its_drag_and_have_winds_of_their_own():
+    every = flights()
+    match = matched(every)
+    assert {"wind", "rotor_drag"} <= {d.name for d in match.effects}
+    drag = match.numbers["rotor_drag.mcoef"]
+    assert abs(drag.real - 0.45) < 4.0 * drag.sigma
+    for found, (north, east) in zip((match.wind, *match.other_winds), WINDS, strict=True):
+        assert found.north == pytest.approx(north, abs=4.0 * found.sigma_north)
+        assert found.east == pytest.approx(east, abs=4.0 * found.sigma_east)
+    # What is drawn over time is the first flight.
+    assert match.series is not None
+    assert len(match.series.t) <= len(every[0])
+
+
+@pytest.mark.slow
+def test_a_hover_tells_its_wind_by_the_drag_of_another_flight():
+    """Alone, its force is as much drag in less wind; the other flight knows the drag."""
+    hover = copter_flight(seed=31, seconds=70.0, wind=(4.0, -2.0), c_m=0.45, still=True)
+    alone, match = matched([hover]), matched([hover, flights()[0]])
+    assert alone.wind is not None
+    assert match.wind is not None
+    assert alone.wind.sigma_north > 5.0 * match.wind.sigma_north
+    assert match.wind.north == pytest.approx(4.0, abs=4.0 * match.wind.sigma_north)
+    assert match.wind.east == pytest.approx(-2.0, abs=4.0 * match.wind.sigma_east)
+
+
+@pytest.mark.slow
+def test_a_wind_that_was_measured_is_known_as_well_as_it_was():
+    """It is no effect, and its error is what is found."""
+    blown = measured(flights()[0], 3.0, -2.0, 0.1)
+    assert wind_sigmas(joined([blown, flights()[1]])) == [pytest.approx(0.1), 10.0]
+    match = matched([blown])
+    assert "wind" not in {d.name for d in match.effects}
+    assert match.wind is not None
+    assert match.wind.north == pytest.approx(3.0, abs=0.3)
+    assert match.wind.east == pytest.approx(-2.0, abs=0.3)
+    assert match.wind.sigma_north < 0.15
