@@ -45,7 +45,8 @@ def test_a_drift_gives_its_temperature_and_what_was_flown(recordings):
 
 @pytest.mark.slow
 def test_a_flight_that_is_not_calibrated_sets_nothing_and_says_why(recordings):
-    text = file_of(explained(recordings / "real" / "real-fixedwing-03.BIN"))
+    """A hover of a bit more than a minute."""
+    text = file_of(explained(recordings / "real" / "real-quad-10-hover.BIN"))
     assert loaded(text) == {}
     assert "the calibration is 'insufficient'" in re.findall("not to be set: (.+)", text)
 

@@ -26,9 +26,10 @@ it is at the very end]."""
 
 # Refinement (engine).
 
-WORTH_A_SEARCH: Final = 2.0
+WORTH_A_SEARCH: Final = 0.5
 """Log-likelihood that another step of the noise levels is expected to gain, below which they stand:
-eleven levels are as uncertain as 5.5 of it [probability]."""
+a level is as uncertain as that by itself, and with it two ways to the same flight differ by less
+than a tenth of a sigma (0.19 with 2.0) [probability]."""
 MOST_ROUNDS: Final = 24
 """Passes of a refinement, at the most; a search takes two a step, and from where a flight begins
 some four to six steps [cost]."""

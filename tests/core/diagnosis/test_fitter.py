@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.block_jumps import OFFSETS, jumps_of_blocks, stepped
-from onboard.core.diagnosis.limits import FORGOTTEN_S
+from onboard.core.diagnosis.limits import SETTLED_S
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.limits import FOLDS
 from onboard.core.estimate.pool import Pool
@@ -181,7 +181,7 @@ def test_stepped_sums_are_those_of_regressors_that_begin_at_the_block(problem, a
 @pytest.mark.parametrize("free", [range(6), [*range(6), 6, 7, 8, 9]])
 def test_jumps_are_scored_as_if_each_had_been_fitted(problem, absent, free):
     scored = jumps_of_blocks(problem.fitter(absent), free)
-    settled = [i for i in range(1, len(problem.y)) if BLOCK_S * i >= FORGOTTEN_S]
+    settled = [i for i in range(1, len(problem.y)) if BLOCK_S * i >= SETTLED_S]
     assert sorted(i for i, _ in scored) == settled
     without = least_squares(problem, free, absent)[1]
     wide = np.concatenate([absent, np.zeros(3)])

@@ -126,7 +126,7 @@ def test_the_truth_comes_out(long):
 
 @pytest.mark.slow
 def test_a_gyroscope_that_is_turned_is_taken_for_an_offset_and_covered(of_copter):
-    e = np.array([0.004, -0.003, 0.0])
+    e = np.array([0.005, -0.004, 0.0])
     imu = dataclasses.replace(TRUE, gyro_turn=tuple(e))
     got = calibrated(flown("copter", 130.0, imu=imu)[0])
     shift = np.array(got.offset) - np.array(of_copter.offset)
