@@ -56,7 +56,7 @@ OWN_KEYS = {
     "wind": OF_QUANTITY | {"sigma"},
 }
 WIND_SIGMA_M_S = 0.1
-"""Of a wind that was measured, where the map does not say [data sheet]."""
+"""Of a measured wind, where the map does not say [data sheet: an ultrasonic anemometer]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,17 @@ G = 9.80665
 STEP = 0.1
 
 
+def assert_derivatives(model):
+    """A model's derivatives are those of its whole prediction, by central differences."""
+    theta = model.nominal + 0.05 * model.plausible
+    ours = model.jacobian(theta)
+    for j, size in enumerate(model.plausible):
+        step = np.zeros(len(theta))
+        step[j] = 1e-3 * size
+        apart = model.predicted(theta + step) - model.predicted(theta - step)
+        np.testing.assert_allclose(ours[:, :, j], apart / (2e-3 * size), atol=1e-9)
+
+
 def smooth(rng, n, scale, correlation_s=2.0):
     """(n,) a smooth random signal of this standard deviation."""
     width = int(4 * correlation_s / STEP)

@@ -7,18 +7,12 @@ import numpy as np
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.smoother import Levels, Steps, likelihoods
-from tests.core.vehicle.flights import copter_flight
+from tests.core.vehicle.flights import assert_derivatives, copter_flight
 
 
 def test_derivatives_from_an_effect_on_are_those_of_the_whole_prediction():
     model = copter_model(copter_flight(seed=1), CopterAirframe(), np.full(3, 0.01))
-    theta = model.nominal + 0.05 * model.plausible
-    ours = model.jacobian(theta)
-    for j, size in enumerate(model.plausible):
-        step = np.zeros(len(theta))
-        step[j] = 1e-3 * size
-        apart = model.predicted(theta + step) - model.predicted(theta - step)
-        np.testing.assert_allclose(ours[:, :, j], apart / (2e-3 * size), atol=1e-9)
+    assert_derivatives(model)
 
 
 def test_likelihoods_at_once_are_those_one_by_one():

@@ -11,7 +11,7 @@ from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.limits import BLOCK_S
 from onboard.core.vehicle.several import joined, wind_sigmas
 from onboard.core.vehicle.signals import Signals
-from tests.core.vehicle.flights import copter_flight
+from tests.core.vehicle.flights import assert_derivatives, copter_flight
 
 SIGMA = np.array([0.003, 0.003, 0.01])
 WINDS = ((3.0, -2.0), (-4.0, 1.0), (0.0, 0.0))
@@ -46,13 +46,7 @@ def test_no_block_and_no_piece_has_steps_of_two_flights():
 
 def test_derivatives_of_what_is_each_flights_own_are_those_of_the_whole_prediction():
     model = copter_model(joined(flights()), CopterAirframe(), np.tile(SIGMA, (3, 1)))
-    theta = model.nominal + 0.05 * model.plausible
-    ours = model.jacobian(theta)
-    for j, size in enumerate(model.plausible):
-        step = np.zeros(len(theta))
-        step[j] = 1e-3 * size
-        apart = model.predicted(theta + step) - model.predicted(theta - step)
-        np.testing.assert_allclose(ours[:, :, j], apart / (2e-3 * size), atol=1e-9)
+    assert_derivatives(model)
 
 
 @pytest.mark.slow
