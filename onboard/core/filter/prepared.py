@@ -125,8 +125,9 @@ def _epochs(
 ) -> Epochs:
     R_att, near = point.attitude(segment, nodes.now.t)
     known = nodes.averaged(point.window) + nodes.swing @ segment.lever_arm_b
-    a_down = np.einsum("ka,ka->k", R_att[:, 2], nodes.now.f_b) + STANDARD_GRAVITY
-    known_height = -a_down * point.window**2 / 24.0 - R_att[:, 2] @ segment.lever_arm_b
+    lower = np.einsum("ka,ka->k", R_att[:, 2], nodes.averaged_place(point.window))
+    lower += STANDARD_GRAVITY * point.window**2 / 24.0
+    known_height = -lower - R_att[:, 2] @ segment.lever_arm_b
     n, _, m = c.velocity_body.shape
     body, ned = np.zeros((n, 9, m + 1)), np.zeros((n, MEASURED, m + 1))
     body[:, 0:3, 0] = -known

@@ -59,6 +59,10 @@ class Around:
         """(K, 3) ``mean(V) - V`` of the force over ``window`` (s), axes of the epoch, m/s."""
         return self._own(self.force.averaged(self.now.t, window))
 
+    def averaged_place(self, window: float) -> Array:
+        """(K, 3) ``mean(X) - X`` of the antenna over ``window`` (s), axes of the epoch, m."""
+        return self._own(self.antenna.averaged_place(self.now.t, window))
+
     def slope(self, window: float) -> Array:
         """(K, 3) derivative of the same, at the antenna, to ``window^2``, m/s^3."""
         return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))

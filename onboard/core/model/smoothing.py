@@ -85,6 +85,18 @@ class Gained:
         out: Array = (mean - self.velocity(t)) * (window / (2.0 * half)) ** 2
         return out
 
+    def averaged_place(self, t: Array, window: float) -> Array:
+        """``mean(X) - X`` for a span of ``window``, s, about times ``t`` (k,): (k, 3), m.
+
+        Simpson's rule, exact for cubics: the force within the span counts as the mean of its place
+        weighs it.  That *at* the epoch is mostly vibration; times the span squared it would be a
+        noise of the height that goes with the force, and so a scale.
+        """
+        half = 0.5 * window
+        ends = self.place(t, half) + self.place(t, -half)
+        out: Array = (ends - 2.0 * self.place(t)) / 6.0
+        return out
+
     def slope(self, t: Array, window: float, longest: float) -> Array:
         """Derivative of :meth:`averaged` to ``window^2``; the limit ``V'' / 24`` at zero.
 

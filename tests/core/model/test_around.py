@@ -89,6 +89,23 @@ def test_smoothing_is_the_average_of_the_velocity(window):
         assert at(got) == pytest.approx(mean - now, abs=2e-4)
 
 
+@pytest.mark.parametrize("window", [0.0, 0.1, 0.346, 0.8])
+def test_a_place_is_averaged_as_the_velocity_is(window):
+    """Against the mean of ``-sin(w t) / w^2`` over the span, to what Simpson leaves of it."""
+    for w, phase in ((3.0, 0.3), (6.0, 1.1)):
+        x = -np.sin(w * np.linspace(-window / 2, window / 2, 20001) + phase) / w**2
+        made = gained(lambda t, w=w, p=phase: np.sin(w * t + p))
+        got = at(made.averaged_place(NOW, window))
+        assert got == pytest.approx(x.mean() - x[10000], abs=1e-5 + window**4 * w**2 / 2880.0)
+
+
+def test_a_place_knows_next_to_nothing_of_vibration():
+    """That at the epoch, taken for the mean over the span, would move it by centimetres."""
+    w, window = 2.0 * np.pi * 30.0, 0.3
+    made = gained(lambda t: 10.0 * np.cos(w * t), step=0.005)
+    assert abs(at(made.averaged_place(NOW, window))) < 10.0 / w**2 < 0.01 * window**2 * 10.0
+
+
 @pytest.mark.parametrize("window", [1e-9, 1e-6, 1e-3])
 def test_the_shortest_spans_go_with_their_square(window):
     got = gained(lambda t: 9.8 + 2.0 * t).averaged(NOW, window)
