@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
@@ -14,7 +16,7 @@ from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
-from onboard.core.inputs.expected_force import expected
+from onboard.core.inputs.expected_force import expected, spectrum, white
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
@@ -52,8 +54,8 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
         testable = [f for f in testable if not f.bent_by_clipping]
     clipped, sampled = rail is not None and batches is flight, batches
-    batches = expected(batches, LIMITS["force_walk"][0])
-    full = Examination(engine, testable, t0=origin.t0, batches=batches).with_noise()
+    full = _felt(engine, testable, origin.t0, batches)
+    batches = full.batches
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
@@ -68,6 +70,21 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         ).with_noise()
     full.let_epochs_go()
     return Cleared(full, testable, absent, rail, fault, clipped, sampled)
+
+
+def _felt(
+    engine: Engine, testable: Sequence[Effect], t0: float, batches: Sequence[Batch]
+) -> Examination:
+    """A flight examined with the force that its samples let one expect.
+
+    How much of them is noise, its velocity says: so it is asked for the noise levels twice.
+    """
+    made = Examination(engine, testable, t0=t0, batches=batches)
+    density = spectrum(batches)
+    if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
+        return made.with_noise()
+    felt = expected(batches, density, made.tuned().noise.force_walk)
+    return Examination(engine, testable, t0=t0, batches=felt, start=made).with_noise()
 
 
 def since_reboot(batches: Sequence[Batch]) -> list[Batch]:

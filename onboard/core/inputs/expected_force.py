@@ -11,6 +11,9 @@ Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples
 
 ``S`` is measured over the flight.  ``q`` is the least of it at any frequency: white noise has no
 more than that, so a tone adds nothing, and vibration that a low-pass has shaped is left as it is.
+Nor is it more than the random walk that the velocity was seen to have: a vehicle that is really
+shaken, in turbulence or by its own motors, has a force as restless as noise, and its receiver
+agrees with every sum of it.
 """
 
 from __future__ import annotations
@@ -25,27 +28,35 @@ from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
 
 
-def expected(batches: Sequence[Batch], least: float) -> list[Batch]:
+def spectrum(batches: Sequence[Batch]) -> Array | None:
+    """Two-sided densities (bins, 3) of the samples of a flight, (m/s^2)^2 s, by frequency.
+
+    None if they are too few to tell.
+    """
+    joined = [_joined(run) for run in _runs(batches)]
+    step = float(np.median(np.concatenate([np.diff(t) for t, _ in joined] or [np.ones(1)])))
+    found = [p for _, raw in joined for p in _periodograms(raw, step)]
+    return np.mean(found, axis=0) if found else None
+
+
+def white(density: Array) -> Array:
+    """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
+    out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
+    return out
+
+
+def expected(batches: Sequence[Batch], density: Array, walk: float) -> list[Batch]:
     """The same flight with the expectation of the force in the place of its samples.
 
     Args:
         batches: the flight.
-        least: velocity random walk, m/s/sqrt(s), below which noise in samples matters to nobody.
-
-    Returns:
-        The very batches where the samples have no more noise than that, or are too few to tell.
+        density: (bins, 3) of its samples.
+        walk: random walk that its velocity was found to have, m/s/sqrt(s).
     """
-    runs = list(_runs(batches))
-    joined = [_joined(run) for run in runs]
-    step = float(np.median(np.concatenate([np.diff(t) for t, _ in joined] or [np.ones(1)])))
-    found = [p for _, raw in joined for p in _periodograms(raw, step)]
-    if not found:
-        return list(batches)
-    gain = _gain(np.mean(found, axis=0), least)
-    if gain is None:
-        return list(batches)
+    gain = _gain(density, walk)
     made: dict[int, Segment] = {}
-    for run, (t, raw) in zip(runs, joined, strict=True):
+    for run in _runs(batches):
+        t, raw = _joined(run)
         felt = _filtered(raw, gain)
         for s in (batch.segment for batch in run):
             made[id(s)] = replace(s, raw_s=felt[np.searchsorted(t, s.t)])
@@ -80,12 +91,10 @@ def _periodograms(raw: Array, step: float) -> Iterator[Array]:
         yield np.abs(np.fft.rfft(piece * window, axis=0)) ** 2 * (step / np.sum(window**2))
 
 
-def _gain(density: Array, least: float) -> Array | None:
-    """(bins, 3) of the filter; None where the noise is less than ``least``."""
-    q = _averaged(density, FLOOR_BINS).min(axis=0)
-    if np.all(q < least**2):
-        return None
-    gain: Array = np.clip(1.0 - q / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
+def _gain(density: Array, walk: float) -> Array:
+    """(bins, 3) of the filter."""
+    noise = np.minimum(white(density), walk**2)
+    gain: Array = np.clip(1.0 - noise / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
     gain[0] = 1.0  # of the mean
     return gain
 

@@ -5,12 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onboard.core.inputs.expected_force import expected
+from onboard.core.inputs.expected_force import expected, spectrum, white
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 
 STEP, SECONDS = 0.02, 240.0
 T = np.arange(0.0, SECONDS, STEP)
-LEAST = 0.01
+NOTHING = 0.01
+"""m/s/sqrt(s) of random walk that matters to nobody."""
 
 
 def manoeuvre(seed=0):
@@ -42,6 +43,11 @@ def batches(raw, pieces=8, gap=()):
     return out
 
 
+def of_noise(flight, walk=np.inf):
+    """What is expected of samples whose velocity walks so."""
+    return expected(flight, spectrum(flight), walk)
+
+
 def felt(made):
     """(n, 3) of all segments, each time once."""
     out = np.full((len(T), 3), np.nan)
@@ -55,7 +61,7 @@ def test_what_is_left_is_in_no_sum_of_what_is_expected():
     rng = np.random.default_rng(1)
     f, sigma = manoeuvre(), np.array([0.25, 0.65, 0.2])
     samples = f + sigma * rng.normal(size=f.shape)
-    got = felt(expected(batches(samples), LEAST))
+    got = felt(of_noise(batches(samples)))
     for lag in (0, 5, 10, 25):
         left = (f - got)[lag:] * (got - got.mean(axis=0))[: len(got) - lag]
         bias = left.mean(axis=0) / sigma**2
@@ -66,10 +72,9 @@ def test_what_is_left_is_in_no_sum_of_what_is_expected():
     assert np.all((f - got).std(axis=0) < 0.5 * sigma)
 
 
-def test_quiet_samples_are_left_as_they_are():
+def test_quiet_samples_have_next_to_no_noise():
     flight = batches(manoeuvre() + 0.005 * np.random.default_rng(2).normal(size=(len(T), 3)))
-    made = expected(flight, LEAST)
-    assert all(a is b for a, b in zip(made, flight, strict=True))
+    assert np.all(white(spectrum(flight)) < NOTHING**2)
 
 
 def test_a_tone_is_no_white_noise():
@@ -77,7 +82,7 @@ def test_a_tone_is_no_white_noise():
     f = manoeuvre()
     tone = 1.5 * np.sin(2.0 * np.pi * 7.0 * T)[:, None]
     noise = 0.15 * np.random.default_rng(3).normal(size=f.shape)
-    got = felt(expected(batches(f + tone + noise), LEAST))
+    got = felt(of_noise(batches(f + tone + noise)))
     smooth = [np.convolve(x[:, 0], np.ones(50) / 50.0, "valid") for x in (got, f)]
     assert np.std(smooth[0] - smooth[1]) < 0.05
 
@@ -85,7 +90,7 @@ def test_a_tone_is_no_white_noise():
 @pytest.mark.parametrize("gap", [(), (3,), (3, 4)])
 def test_segments_that_overlap_have_the_same_force_where_they_do(gap):
     samples = manoeuvre() + 0.4 * np.random.default_rng(4).normal(size=(len(T), 3))
-    made = expected(batches(samples, gap=gap), LEAST)
+    made = of_noise(batches(samples, gap=gap))
     for a, b in pairwise(made):
         both, i, j = np.intersect1d(a.segment.t, b.segment.t, return_indices=True)
         np.testing.assert_array_equal(a.segment.raw_s[i], b.segment.raw_s[j])
@@ -94,6 +99,22 @@ def test_segments_that_overlap_have_the_same_force_where_they_do(gap):
 
 def test_a_flight_too_short_for_a_spectrum_is_left_as_it_is():
     samples = manoeuvre() + np.random.default_rng(5).normal(size=(len(T), 3))
-    flight = batches(samples, pieces=24)[:1]
-    assert expected(flight, LEAST)[0] is flight[0]
-    assert expected([], LEAST) == []
+    assert spectrum(batches(samples, pieces=24)[:1]) is None
+    assert spectrum([]) is None
+
+
+def test_white_noise_is_found_a_little_smaller_than_it_is():
+    """The least of a spectrum that scatters is below its mean, and never above it."""
+    sigma = np.array([0.1, 0.3, 0.9])
+    samples = manoeuvre() + sigma * np.random.default_rng(6).normal(size=(len(T), 3))
+    share = white(spectrum(batches(samples))) / (sigma**2 * STEP)
+    assert np.all((share > 0.75) & (share < 1.0))
+
+
+def test_a_shake_that_the_velocity_agrees_with_is_left_in():
+    """It looks like noise, but its velocity does not walk: turbulence, not a sensor's error."""
+    samples = manoeuvre() + 0.4 * np.random.default_rng(7).normal(size=(len(T), 3))
+    flight = batches(samples)
+    got = felt(of_noise(flight, walk=0.2 * 0.4 * np.sqrt(STEP)))
+    assert np.std(got - samples) < 0.25 * np.std(felt(of_noise(flight)) - samples)
+    np.testing.assert_allclose(felt(of_noise(flight, walk=0.0)), samples, atol=1e-9)
