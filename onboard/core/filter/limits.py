@@ -115,25 +115,29 @@ STAMP_JITTER_S: Final = 8e-4
 # The search for noise levels (noise).
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
-    "velocity": (0.02, 2.0),
+    "velocity": (0.01, 2.0),
     "velocity_colour": (0.005, 1.0),
     "vertical": (0.5, 6.0),
-    "height": (0.05, 10.0),
-    "height_walk": (0.01, 2.0),
+    "height": (0.01, 10.0),
+    "height_walk": (0.002, 2.0),
     "force_walk": (0.01, 3.0),
-    "tilt_walk": (1e-4, 0.03),
-    "bias_walk": (1e-5, 3e-4),
+    "tilt_walk": (5e-5, 0.03),
+    "bias_walk": (1e-6, 3e-3),
     "attitude": (0.02, 0.3),
     "heading": (0.05, 0.6),
-    "attitude_white": (1e-4, 0.03),
-    "jitter": (3e-4, 0.1),
+    "attitude_white": (3e-5, 0.03),
+    "jitter": (3e-4, 0.2),
 }
 """Lowest and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
-No sensor on a small vehicle is better than the lower ends [data sheet]; a noiseless simulation must
-not make the filter believe that timing, interpolation and filters are modelled to the last digit.
-The jitter of a velocity's moment is at least that of whole milliseconds, and at most the time
-between two fixes [physics].
+No sensor on a small vehicle is better than the lower ends: a velocity and a height that a carrier's
+phase gives from one fix to the next are good to a centimetre (a second), a gyroscope to 3 mdps a
+root of a Hertz; hundredths of a degree, in which a log writes attitude, are off by 5e-5 rad [data
+sheets].  They are there for simulations without noise, which must not make the filter believe that
+timing, interpolation and filters are modelled to the last digit.  A gyroscope's bias wanders by
+3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
+[physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
+time between two fixes, five a second being the fewest that ArduPilot flies with [physics].
 
 The slow error of the recorded attitude is no such formality.  Its lower end is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
