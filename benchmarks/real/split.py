@@ -97,7 +97,7 @@ FLIGHTS = (
 )
 """All of them.  A flight never moves from choosing or judging to another part."""
 
-LOOKS: tuple[str, ...] = ()
+LOOKS: tuple[str, ...] = ("lower ends of noise levels: as they were, or those of data sheets",)
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
     "2026-11-23",

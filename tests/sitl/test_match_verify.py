@@ -106,7 +106,14 @@ def test_only_the_part_that_follows_the_recording_is_laid_beside_it():
 
 
 @pytest.fixture
-def flight(tmp_path, monkeypatch):
+def no_ardupilot(tmp_path, monkeypatch):
+    """A machine without ArduPilot's simulator, whatever this one has."""
+    monkeypatch.delenv("ARDUPILOT_SITL_DIR", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path / "none"))
+
+
+@pytest.fixture
+def flight(tmp_path, monkeypatch, no_ardupilot):
     """Asks ``verify`` of a copter that has been matched; returns what was flown, by whom."""
     flown = []
 
@@ -118,8 +125,6 @@ def flight(tmp_path, monkeypatch):
 
         return fly
 
-    monkeypatch.delenv("ARDUPILOT_SITL_DIR", raising=False)
-    monkeypatch.setenv("PATH", str(tmp_path / "none"))
     monkeypatch.setattr(match_verify, "_by_ardupilot", by("ArduPilot"))
     monkeypatch.setattr(match_verify, "_by_built_in", by("built-in"))
     monkeypatch.setattr(match_verify, "match_recordings", lambda *_, **__: None)
@@ -174,7 +179,7 @@ def test_ardupilots_simulator_is_for_verify(capsys):
 
 
 @pytest.mark.slow
-def test_a_flight_is_flown_again_as_it_was(tmp_path):
+def test_a_flight_is_flown_again_as_it_was(tmp_path, no_ardupilot):
     log, answer, page = (tmp_path / n for n in ("flight.tlog", "a.json", "a.html"))
     craft = Airframe().with_drag(mcoef=0.45)
     aircraft = Aircraft(craft=craft, air=Air(north=3.0, east=-2.0))
