@@ -129,6 +129,8 @@ class Epochs:
     """n epochs side by side: fields as in :class:`Epoch`, each with (n,) in front.
 
     ``near`` (n,) says where a sample of the recorded attitude is near; elsewhere there is none.
+    Few unknowns act in NED: ``ned`` (n, 7, c) has the c columns that are not zero, which are the
+    columns ``acting`` (c,) of an epoch's own.
     """
 
     t: Array
@@ -139,6 +141,7 @@ class Epochs:
     near: NDArray[np.bool_]
     body: Array
     ned: Array
+    acting: NDArray[np.int64]
     along_velocity: Array
     trusted: NDArray[np.bool_]
     noise: Array
@@ -149,6 +152,8 @@ class Epochs:
         return len(self.t)
 
     def __getitem__(self, e: int) -> Epoch:
+        ned = np.zeros((MEASURED, self.body.shape[2]))
+        ned[:, self.acting] = self.ned[e]
         return Epoch(
             float(self.t[e]),
             self.velocity[e],
@@ -156,7 +161,7 @@ class Epochs:
             float(self.latitude[e]),
             self.R_attitude[e] if self.near[e] else None,
             self.body[e],
-            self.ned[e],
+            ned,
             self.along_velocity[e],
             bool(self.trusted[e]),
             self.noise[e],

@@ -85,9 +85,9 @@ EAGER_EPOCHS: Final = 60
 LAZY_EPOCHS: Final = 5
 """Later after each so many: it moves no more within half a second [cost]."""
 
-MOST_PREPARED_LIVE_BYTES: Final = 22_000_000
+MOST_PREPARED_LIVE_BYTES: Final = 17_000_000
 """Of segments made ready that are kept for the next pass, beside an autopilot; what is more is made
-anew.  Five minutes with five fixes a second and every effect are 20 MB [cost]."""
+anew.  Five minutes with five fixes a second and every effect are 15 MB [cost]."""
 MOST_PREPARED_BYTES: Final = 66_000_000
 """The same in a program that goes over recordings [cost]."""
 NEAR_BIAS_RAD_S: Final = 2e-3
@@ -147,8 +147,9 @@ levelled with.  So with the heading, whose error goes with the manoeuvre, too: t
 have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
 1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
 sealed ones, which it was not made from]."""
-STENCIL_FACTOR: Final = 2.0
-"""Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
+STENCIL_FACTOR: Final = 1.25
+"""Ratio between neighbouring points of the stencil: the top of a parabola through points a factor
+of two apart is 15 % beside that of the likelihood, and with 1.25 it is 2 % [bound]."""
 LINE_SHARES: Final = (0.25, 0.5, 1.0)
 """Shares of a step that a line search tries: levels that trade with each other make the whole too
 long [cost]."""

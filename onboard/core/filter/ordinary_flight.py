@@ -165,6 +165,7 @@ class OrdinaryFlight:
             epochs.R_attitude,
             epochs.body,
             epochs.ned,
+            epochs.acting,
             epochs.along_velocity,
             epochs.noise,
             epochs.moving,

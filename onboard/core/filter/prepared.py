@@ -139,6 +139,7 @@ def _epochs(
     ned[:, V, 1:] = c.velocity_ned
     ned[:, H, 1:] = -c.position_ned[:, 2]
     ned[:, PSI, 1:] = c.attitude_ned
+    acting = np.flatnonzero(ned.any(axis=(0, 1)))
     noise = np.zeros((n, MEASURED))
     rate = np.linalg.norm(nodes.now.w_b, axis=1)
     noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
@@ -154,7 +155,8 @@ def _epochs(
         R_att,
         near,
         body,
-        ned,
+        np.ascontiguousarray(ned[:, :, acting]),
+        acting,
         c.along_velocity,
         trusted,
         noise,

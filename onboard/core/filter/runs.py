@@ -66,6 +66,16 @@ def _numbers(offered: Index) -> Index:
 
 
 @part
+def _spread(ned: Array, acting: Index, m1: int) -> Array:
+    """What an epoch has in NED, (n, m1), from the columns that there are."""
+    z = np.zeros((len(ned), m1))
+    for i in range(len(ned)):
+        for j in range(len(acting)):
+            z[i, acting[j]] = ned[i, j]
+    return z
+
+
+@part
 def _sum(white: Array, more: Array, jitter: Array, moving: Array) -> Array:
     """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
@@ -113,9 +123,9 @@ def _note(
 
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
-    " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
-    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1],"
-    " f8, i8, i8,"
+    " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], i8[::1],"
+    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1],"
+    " f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -135,6 +145,7 @@ def run(
     R_attitude: Array,
     body: Array,
     ned: Array,
+    acting: Index,
     along: Array,
     noise: Array,
     moving: Array,
@@ -173,10 +184,11 @@ def run(
         ends: (K,) the epoch at the end of each step; -1: none.
         offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
             the velocity: 0 nothing, 1 that it is not refused, 2 that it is.
-        R_attitude: (n, 3, 3) and body, ned, along, noise and moving as in
+        R_attitude: (n, 3, 3) and body, ned, acting, along, noise and moving as in
             :class:`~..innovations.Epochs`.
         body: see there.
         ned: see there.
+        acting: see there.
         along: see there.
         noise: see there.
         moving: see there.
@@ -232,7 +244,7 @@ def run(
         turned[0] = turned[1] = turned[2] = 0.0
         if offered[e, 2]:
             angle_of(R_attitude[e], R_nb, turned)
-        z = ned[e].copy()
+        z = _spread(ned[e], acting, m1)
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
         det = np.empty(members)

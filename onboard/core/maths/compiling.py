@@ -16,6 +16,7 @@ from onboard.core.maths.arrays import Array
 
 class _Choice:
     compiled = False
+    loops: ModuleType | None = None
 
 
 def prefer_compiled(*, yes: bool = True) -> None:
@@ -35,14 +36,20 @@ def compiled_loops() -> ModuleType | None:
     """
     if not _Choice.compiled:
         return None
-    try:
-        from onboard.core.maths import loops  # noqa: PLC0415 - a second, and only if wanted
-    except ImportError:
-        _Choice.compiled = False
-        return None
-    return loops
+    if _Choice.loops is None:
+        try:
+            from onboard.core.maths import loops  # noqa: PLC0415 - a second, and only if wanted
+        except ImportError:
+            _Choice.compiled = False
+            return None
+        _Choice.loops = loops
+    return _Choice.loops
 
 
 def plain(x: ArrayLike) -> Array:
     """Numbers as compiled loops take them: contiguous, and not marked as read-only."""
+    if isinstance(x, np.ndarray) and x.dtype == np.float64:
+        flags = x.flags  # nearly all are so already, and seventy are asked for in a segment
+        if flags.c_contiguous and flags.writeable:
+            return x
     return np.require(x, np.float64, ("C", "W"))

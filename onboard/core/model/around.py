@@ -131,7 +131,7 @@ class _Followed:
 
     def swung(self, lever: Array) -> Array:
         """(n, 3) acceleration of the end of a lever arm (3,), body axes, m: second differences."""
-        place = self._R @ lever
+        place = (self._R.reshape(-1, 3) @ lever).reshape(-1, 3)
         out = np.empty_like(place)
         out[1:-1] = (place[2:] - 2.0 * place[1:-1] + place[:-2]) / self._step**2
         out[0], out[-1] = out[1], out[-2]

@@ -1,0 +1,23 @@
+"""Samples to nodes as loops that numba compiles: curves, turns in a row, integrals.
+
+Equal to numpy's way to rounding (no fast-math): :class:`~onboard.core.maths.interpolation.Hermite`,
+:func:`~onboard.core.maths.frames.rotation_from_vector` and their callers, which are what these are
+held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
+"""
+
+from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
+from onboard.core.maths.loops.integrals import gained, integrals, twice
+from onboard.core.maths.loops.turns import attitudes, turns_in_a_row
+
+__all__ = [
+    "attitudes",
+    "cubics",
+    "dragged",
+    "gained",
+    "integrals",
+    "signals",
+    "straight",
+    "turns_in_a_row",
+    "twice",
+    "values",
+]
