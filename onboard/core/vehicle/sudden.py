@@ -1,0 +1,203 @@
+"""Whether the mass or the thrust became another at a moment that nobody announced.
+
+A level that changes once, at an unknown moment, is looked for at every window of the flight (the
+supremum of a score test: D. W. K. Andrews, *Econometrica* 61, 1993), with a level of chance that is
+divided by the number of moments.  A fit that knows no change takes it for noise that wanders, so it
+tells little but the moment; how much the change explains is told by a fit that has it, with noise
+of its own.  What goes from one level to another over a part of the flight, or over all of it (a
+battery that nobody measured), is no sudden change: that is asked of the same likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.chi_square import survival
+from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
+from onboard.core.vehicle.fit import Fit, fitted
+from onboard.core.vehicle.instruments import whitened_rows
+from onboard.core.vehicle.limits import (
+    AMBIGUOUS,
+    BLOCK_S,
+    FALSE_ALARM,
+    LEAST_NOISE_M_S2,
+    WINDOW_STEPS,
+)
+from onboard.core.vehicle.matching import deviance
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import AxisNoise, rms, whitened
+from onboard.core.vehicle.windows import windows_of
+
+CHANGES = (MassChange.name, ThrustChange.name)
+GRADUAL = (0.25, 1.0)
+"""Shares of a flight over which a change may go that is no sudden one [use]."""
+AT_ONCE = 64
+"""Moments that are scored in one product of matrices [cost]."""
+
+Changing: TypeAlias = Callable[[Change], ForceModel]
+"""Makes the model of the fit's flight that has this change besides."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Whitened residuals (r,) and regressors (r, m) of a fit, and its covariance (m, m)."""
+
+    y: Array
+    H: Array
+    covariance: Array
+
+
+def change_of(fit: Fit, changing: Changing) -> Change | None:
+    """The sudden change of a flight; None where there is none beyond chance.
+
+    Args:
+        fit: of a model that knows no change, and of the likelihood's least.
+        changing: makes the model that has one.
+    """
+    moments = _moments(fit)
+    if not len(moments) or fit.model.flight.commands.shape[1] == 0:
+        return None
+    gains = scores(fit, changing, moments)
+    if _by_chance(float(np.max(gains)), len(moments)):
+        return None
+    plain = scores(replace(fit, noise=_white(fit)), changing, moments)
+    at = {int(moments[np.argmax(g)]) for g in (gains, plain)}
+    its, change = min((_at(fit, changing, k) for k in at), key=lambda x: deviance(x[0]))
+    if _by_chance((deviance(fit) - deviance(its)) / its.scale, len(moments)):
+        return None
+    others = [_with(fit, changing(c)) for c in _gradual(fit, change)]
+    ahead = min(deviance(other) - deviance(its) for other in others) / its.scale
+    return change if ahead > AMBIGUOUS else None
+
+
+def _by_chance(gain: float, moments: int) -> bool:
+    """Whether so much is gained somewhere by chance."""
+    return survival(max(gain, 0.0), len(CHANGES)) * moments > FALSE_ALARM
+
+
+def _at(fit: Fit, changing: Changing, window: int) -> tuple[Fit, Change]:
+    """The fit with a change near a window, at its likeliest moment."""
+    t = float(fit.model.flight.t[windows_of(fit.model.flight).first[window]])
+    change = Change(t, t)
+    change = _placed(_with(fit, changing(change)), changing, change)
+    return _with(fit, changing(change)), change
+
+
+def _white(fit: Fit) -> tuple[AxisNoise, ...]:
+    """Noise without a memory: least squares find the moment whatever the noise is.
+
+    J. Bai, *Review of Economics and Statistics* 79 (1997).  What a change leaves to a fit that does
+    not know it looks like noise that wanders, for which a level is nothing and a jump everything.
+    """
+    return tuple(AxisNoise(max(rms(x), LEAST_NOISE_M_S2)) for x in fit.residual.T)
+
+
+def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
+    """(p,) fall of chi-square by a change at each of these windows, to first order."""
+    flight = fit.model.flight
+    windows = windows_of(flight)
+    always = Change(float(flight.t[0]) - 1.0, float(flight.t[0]) - 1.0)
+    whole = changing(always)
+    places = [i for n in CHANGES for i in whole.indices(n)]
+    prior = np.diag(1.0 / whole.plausible[places] ** 2)
+    slope = windows.mean(whole.jacobian(_padded(fit, whole))[:, :, places])
+    rows, part = _rows_of(fit), flight.part[windows.first]
+    out = []
+    for some in np.array_split(moments, 1 + len(moments) // AT_ONCE):
+        after = (np.arange(len(part))[:, None] >= some) & (part[:, None] == part[some])
+        z = _whitened_columns(fit, slope[..., None] * after[:, None, None, :])
+        left = z - np.einsum("rm,mpc->rpc", rows.H, _told(rows, z))
+        u = np.einsum("rpc,r->cp", left, rows.y)
+        S = np.einsum("rpc,rqc->cpq", z, left) + prior
+        out.append(np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0]))
+    return np.concatenate(out)
+
+
+def _told(rows: _Rows, z: Array) -> Array:
+    """(m, p, c) by how much the unknowns of the fit would move for columns (r, p, c)."""
+    out: Array = np.tensordot(rows.covariance, np.tensordot(rows.H, z, (0, 0)), (1, 0))
+    return out
+
+
+def _rows_of(fit: Fit) -> _Rows:
+    made = whitened_rows(fit.model, fit.residual, fit.jacobian, fit.noise, fit.sensitivity)
+    y = np.concatenate([r[:, 0] for r in made])
+    H = np.concatenate([r[:, 1:] for r in made])
+    return _Rows(y, H, np.linalg.inv(H.T @ H + np.diag(fit.prior)))
+
+
+def _whitened_columns(fit: Fit, columns: Array) -> Array:
+    """(r, p, c) of all axes in a row, of means over windows (w, k, p, c)."""
+    windows = windows_of(fit.model.flight)
+    count, _, p, c = columns.shape
+    sensitivity = windows.mean(fit.sensitivity)
+    out = [
+        whitened(
+            columns[:, k].reshape(count, p * c),
+            its,
+            sensitivity[:, k],
+            windows.piece,
+            windows.length_s,
+        )
+        for k, its in enumerate(fit.noise)
+    ]
+    return np.concatenate(out).reshape(-1, p, c)
+
+
+def _moments(fit: Fit) -> NDArray[np.intp]:
+    """Windows that begin a block's length and more from either end of their recording."""
+    flight = fit.model.flight
+    first = windows_of(flight).first
+    since = flight.since_start
+    length = np.array([since[flight.part == k].max() for k in range(flight.parts)])[flight.part]
+    inside = (since >= BLOCK_S) & (since <= length - BLOCK_S)
+    return np.flatnonzero(inside[first])
+
+
+def _placed(fit: Fit, changing: Changing, near: Change) -> Change:
+    """The change at the likeliest step within a window of this moment, its numbers held."""
+    t = fit.model.flight.t
+    at = int(np.searchsorted(t, near.begin))
+    steps = range(max(at - WINDOW_STEPS, 1), min(at + WINDOW_STEPS + 1, len(t)))
+
+    def squares(moment: float) -> float:
+        model = changing(Change(moment, moment))
+        left = model.measured() - model.predicted(fit.theta)
+        rows = whitened_rows(model, left, None, fit.noise, fit.sensitivity)
+        return float(sum(np.sum(r**2) for r in rows))
+
+    moment = min((float(t[k]) for k in steps), key=squares)
+    return Change(moment, moment)
+
+
+def _gradual(fit: Fit, change: Change) -> list[Change]:
+    """Changes over parts of the recording, as far as they are inside it."""
+    flight = fit.model.flight
+    t = flight.t[flight.part == change.part(flight)]
+    out = []
+    for share in GRADUAL:
+        half = 0.5 * share * float(t[-1] - t[0])
+        begin, end = max(change.begin - half, float(t[0])), min(change.begin + half, float(t[-1]))
+        out.append(Change(float(t[0]), float(t[-1])) if share == 1.0 else Change(begin, end))
+    return out
+
+
+def _with(fit: Fit, model: ForceModel) -> Fit:
+    """The model with a change fitted, from where the fit without it ended."""
+    return fitted(model, _padded(fit, model))
+
+
+def _padded(fit: Fit, model: ForceModel) -> Array:
+    """(m,) unknowns of the fit, in a model that has a change besides, which is none yet."""
+    out = model.nominal
+    added = {i for n in CHANGES for i in model.indices(n)}
+    if len(fit.theta) == len(out):
+        return fit.theta.copy()
+    out[[i for i in range(len(out)) if i not in added]] = fit.theta
+    return out
