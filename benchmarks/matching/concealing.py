@@ -120,7 +120,7 @@ class Secret:
         )
         share = SMALL if self.level == "small" else 1.0
         extra: list[sensors.Effect] = []
-        for name in sorted(self.wanted | set(self.names)):
+        for name in sorted((self.wanted - set(NAMED.values())) | set(self.names)):
             if name in SENSORS:
                 imu, effects = _sensor(name, rng, imu)
                 extra += effects

@@ -58,6 +58,8 @@ class _Changed(Effect):
         self._change = change
         first = float(flight.t[flight.part == change.part(flight)][0])
         self._moment = 0.5 * (change.begin + change.end) - first
+        side = "after" if change.since else "before"
+        self.note = f"all other numbers are those of the vehicle {side} the change"
 
     def _factor(self, air: Air, value: float) -> Array:
         return np.exp(value * self._change.share(air.flight))
