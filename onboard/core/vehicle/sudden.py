@@ -102,11 +102,7 @@ def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
     """(p,) fall of chi-square by a change at each of these windows, to first order."""
     flight = fit.model.flight
     windows = windows_of(flight)
-    always = Change(float(flight.t[0]) - 1.0, float(flight.t[0]) - 1.0)
-    whole = changing(always)
-    places = [i for n in CHANGES for i in whole.indices(n)]
-    prior = np.diag(1.0 / whole.plausible[places] ** 2)
-    slope = windows.mean(whole.jacobian(_padded(fit, whole))[:, :, places])
+    slope, prior = _always(fit, changing)
     rows, part = _rows_of(fit), flight.part[windows.first]
     out = []
     for some in np.array_split(moments, 1 + len(moments) // AT_ONCE):
@@ -117,6 +113,20 @@ def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
         S = np.einsum("rpc,rqc->cpq", z, left) + prior
         out.append(np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0]))
     return np.concatenate(out)
+
+
+def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
+    """Derivatives (w, k, p) by changes that are there all the time, and their prior (p, p)."""
+    flight = fit.model.flight
+    begins = [float(flight.t[flight.part == part][0]) for part in range(flight.parts)]
+    models = [changing(Change(begin, begin)) for begin in begins]
+    places = [i for n in CHANGES for i in models[0].indices(n)]
+    # Each is of its own recording, and nothing elsewhere.
+    slope = sum(
+        (m.jacobian(_padded(fit, m))[:, :, places] for m in models),
+        np.zeros((len(flight), len(fit.model.axes), len(places))),
+    )
+    return windows_of(flight).mean(slope), np.diag(1.0 / models[0].plausible[places] ** 2)
 
 
 def _told(rows: _Rows, z: Array) -> Array:

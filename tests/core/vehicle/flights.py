@@ -76,8 +76,9 @@ def copter_flight(
 ):
     """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
 
-    The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and ``weaker``
-    are (moment, factor): from so many seconds on the mass, or the thrust, is so many times itself.
+    The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and
+    ``weaker`` are (moment, factor): from so many seconds on it, or the thrust, is so many times
+    itself.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
