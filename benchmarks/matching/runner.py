@@ -51,9 +51,6 @@ def made(secret: Secret) -> tuple[Flight, dict[str, Any]]:
     aircraft = flight.spec.aircraft
     assert aircraft is not None
     answer = differences(aircraft, flight.pieces[-1].trajectory)
-    craft = aircraft.craft
-    if craft.payload:
-        answer["mass_change"] = {"ratio": craft.mass / (craft.mass + craft.payload)}
     record = truth_record(flight.spec)
     for effect in record["effects"]:
         if effect["name"] == "gps_latency":
