@@ -11,7 +11,7 @@ battery that nobody measured), is no sudden change: that is asked of the same li
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -31,26 +31,15 @@ from onboard.core.vehicle.limits import (
 )
 from onboard.core.vehicle.matching import deviance
 from onboard.core.vehicle.model import ForceModel
-from onboard.core.vehicle.noise import AxisNoise, rms, whitened
+from onboard.core.vehicle.noise import AxisNoise, onsets, rms
+from onboard.core.vehicle.recursion import accumulated, starts_of
 from onboard.core.vehicle.windows import windows_of
 
 CHANGES = (MassChange.name, ThrustChange.name)
 GRADUAL = (0.25, 1.0)
 """Shares of a flight over which a change may go that is no sudden one [use]."""
-AT_ONCE = 64
-"""Moments that are scored in one product of matrices [cost]."""
-
 Changing: TypeAlias = Callable[[Change], ForceModel]
 """Makes the model of the fit's flight that has this change besides."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Whitened residuals (r,) and regressors (r, m) of a fit, and its covariance (m, m)."""
-
-    y: Array
-    H: Array
-    covariance: Array
 
 
 def change_of(fit: Fit, changing: Changing) -> Change | None:
@@ -99,20 +88,60 @@ def _white(fit: Fit) -> tuple[AxisNoise, ...]:
 
 
 def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
-    """(p,) fall of chi-square by a change at each of these windows, to first order."""
+    """(c,) fall of chi-square by a change at each of these windows, to first order."""
+    slope, prior = _always(fit, changing)
+    made = whitened_rows(fit.model, fit.residual, fit.jacobian, fit.noise, fit.sensitivity)
+    m, p = fit.jacobian.shape[-1], slope.shape[-1]
+    by_rows, squares = np.zeros((len(moments), p, 1 + m)), np.zeros((len(moments), p, p))
+    for k, rows in enumerate(made):
+        its, with_itself = _products(fit, k, slope[:, k], rows)
+        by_rows += its[moments]
+        squares += with_itself[moments]
+    whole = sum((rows.T @ rows for rows in made), np.zeros((1 + m, 1 + m)))
+    # What the other unknowns would take of it.
+    told = np.linalg.solve(whole[1:, 1:] + np.diag(fit.prior), np.swapaxes(by_rows[..., 1:], 1, 2))
+    u = by_rows[..., 0] - np.einsum("cmp,m->cp", told, whole[1:, 0])
+    S = squares - by_rows[..., 1:] @ told + prior
+    out: Array = np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0])
+    return out
+
+
+def _products(fit: Fit, axis: int, slope: Array, rows: Array) -> tuple[Array, Array]:
+    """Of whitened columns that begin at each window, with rows and with one another.
+
+    By sums over what comes after: a product for each moment would take the square of their number.
+
+    Args:
+        fit: whose noise whitens.
+        axis: number of the axis.
+        slope: (w, p) columns that begin at the beginning.
+        rows: (w, j) whitened.
+
+    Returns:
+        (w, p, j) and (w, p, p).
+    """
     flight = fit.model.flight
     windows = windows_of(flight)
-    slope, prior = _always(fit, changing)
-    rows, part = _rows_of(fit), flight.part[windows.first]
-    out = []
-    for some in np.array_split(moments, 1 + len(moments) // AT_ONCE):
-        after = (np.arange(len(part))[:, None] >= some) & (part[:, None] == part[some])
-        z = _whitened_columns(fit, slope[..., None] * after[:, None, None, :])
-        left = z - np.einsum("rm,mpc->rpc", rows.H, _told(rows, z))
-        u = np.einsum("rpc,r->cp", left, rows.y)
-        S = np.einsum("rpc,rqc->cpq", z, left) + prior
-        out.append(np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0]))
-    return np.concatenate(out)
+    sensitivity = windows.mean(fit.sensitivity)[:, axis]
+    begun = onsets(slope, fit.noise[axis], sensitivity, windows.piece, windows.length_s)
+    whole, apart = begun.whole, begun.apart
+    both = np.hstack([rows, whole])
+    after = _after(whole[:, :, None] * both[:, None, :], 1.0, flight.part[windows.first])
+    fading = _after(both, begun.decay, windows.piece)
+    products = after + apart[:, :, None] * fading[:, None, :]
+    j = rows.shape[1]
+    once = np.ones((len(rows), 1))
+    tail = _after(once, begun.decay**2, windows.piece)[:, :, None]
+    squares = products[..., j:] + fading[:, j:, None] * apart[:, None, :]
+    squares = squares + tail * apart[:, :, None] * apart[:, None, :]
+    return products[..., :j], squares
+
+
+def _after(x: Array, decay: float, piece: NDArray[np.int64]) -> Array:
+    """(n, ...) sums of ``decay^(k - i) x_k`` over k from i to the end of a piece."""
+    turned = x[::-1].reshape(len(x), -1)
+    out: Array = accumulated(turned, decay, starts_of(piece[::-1]))[::-1].reshape(x.shape)
+    return out
 
 
 def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
@@ -127,37 +156,6 @@ def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
         np.zeros((len(flight), len(fit.model.axes), len(places))),
     )
     return windows_of(flight).mean(slope), np.diag(1.0 / models[0].plausible[places] ** 2)
-
-
-def _told(rows: _Rows, z: Array) -> Array:
-    """(m, p, c) by how much the unknowns of the fit would move for columns (r, p, c)."""
-    out: Array = np.tensordot(rows.covariance, np.tensordot(rows.H, z, (0, 0)), (1, 0))
-    return out
-
-
-def _rows_of(fit: Fit) -> _Rows:
-    made = whitened_rows(fit.model, fit.residual, fit.jacobian, fit.noise, fit.sensitivity)
-    y = np.concatenate([r[:, 0] for r in made])
-    H = np.concatenate([r[:, 1:] for r in made])
-    return _Rows(y, H, np.linalg.inv(H.T @ H + np.diag(fit.prior)))
-
-
-def _whitened_columns(fit: Fit, columns: Array) -> Array:
-    """(r, p, c) of all axes in a row, of means over windows (w, k, p, c)."""
-    windows = windows_of(fit.model.flight)
-    count, _, p, c = columns.shape
-    sensitivity = windows.mean(fit.sensitivity)
-    out = [
-        whitened(
-            columns[:, k].reshape(count, p * c),
-            its,
-            sensitivity[:, k],
-            windows.piece,
-            windows.length_s,
-        )
-        for k, its in enumerate(fit.noise)
-    ]
-    return np.concatenate(out).reshape(-1, p, c)
 
 
 def _moments(fit: Fit) -> NDArray[np.intp]:

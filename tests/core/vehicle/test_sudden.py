@@ -12,6 +12,7 @@ from onboard.core.vehicle.copter import Variant, copter_model
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.mass_change import Change
 from onboard.core.vehicle.fit import fitted, summed
+from onboard.core.vehicle.noise import AxisNoise, onsets, whitened
 from onboard.core.vehicle.several import joined
 from onboard.core.vehicle.signals import Signals
 from onboard.core.vehicle.sudden import CHANGES, change_of, scores
@@ -137,3 +138,20 @@ def test_by_chance_a_change_is_found_no_more_often_than_is_said():
 def test_derivatives_of_a_change_are_those_of_the_whole_prediction():
     flight = copter_flight(seed=1)
     assert_derivatives(model_of(flight, Change(120.0, 120.0, since=True)))
+
+
+def test_a_column_that_begins_later_is_whitened_as_if_it_had_been_nothing_before():
+    rng = np.random.default_rng(4)
+    piece = np.repeat([0, 1], [30, 25])
+    column, sensitivity = rng.normal(size=(55, 1)), rng.uniform(0.5, 2.0, 55)
+    noise = AxisNoise(0.2, 0.1, correlation_s=2.0, white=0.3)
+    begun = onsets(column, noise, sensitivity, piece, 0.5)
+    rows = np.arange(55)
+    for start in (0, 11, 29, 30, 40):
+        masked = np.where(rows[:, None] >= start, column, 0.0)
+        fading = np.where(piece == piece[start], begun.decay ** (rows - float(start)), 0.0)
+        told = np.where(
+            rows[:, None] >= start, begun.whole + begun.apart[start] * fading[:, None], 0.0
+        )
+        made = whitened(masked, noise, sensitivity, piece, 0.5)
+        np.testing.assert_allclose(told, made, atol=1e-12)
