@@ -312,3 +312,8 @@ def gusty_planes(first: int, alone: int = 10, each: int = 3) -> list[Secret]:
         Secret(first + i, "plane", kind, n)
         for i, (kind, n) in enumerate(zip(kinds, names, strict=True))
     ]
+
+
+def dropped(first: int, count: int = 24) -> list[Secret]:
+    """Copters whose payload goes in flight."""
+    return [Secret(first + i, "copter", "outside", ("payload",)) for i in range(count)]
