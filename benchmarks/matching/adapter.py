@@ -60,6 +60,7 @@ KEYS: dict[str, dict[str, dict[str, Converted]]] = {
     "turbulence": {"rms": {"rms": _same, "turbulence_rms": _same, "sigma": _same}},
     "air_density": {"ratio": {"ratio": _same, "excess": _excess}},
     "ground_effect": {"gain": {"gain": _same}},
+    "mass_change": {"ratio": {"ratio": _same}},
     "voltage_sag": {"share": {"share": _same, "exponent": _half}},
     "drag": {"c_drag_p": {"c_drag_p": _same}},
     "lift": {"c_lift_0": {"c_lift_0": _same}, "c_lift_a": {"c_lift_a": _same}},

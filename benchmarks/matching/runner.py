@@ -21,7 +21,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from benchmarks.challenge import answers, kept, parser, summary
 from benchmarks.matching.adapter import Asked, MatchError, by_command
-from benchmarks.matching.concealing import ATTEMPTS, DRAWS, Challenge, Secret, gusty_planes
+from benchmarks.matching.concealing import ATTEMPTS, DRAWS, Challenge, Secret, dropped, gusty_planes
 from benchmarks.matching.scoring import LEGEND, Outcome, describe, measured, table
 from sitl.builtin.airframe.differences import differences
 from sitl.builtin.airframe.frame import Airframe
@@ -119,11 +119,14 @@ def main(arguments: list[str] | None = None) -> None:
         "--name", help="single recordings of this effect alone; with --gusts those with it"
     )
     options.add_argument("--gusts", action="store_true", help="planes in turbulence alone")
+    options.add_argument("--payloads", action="store_true", help="copters that drop one alone")
     options.add_argument("--all", action="store_true", help="say what was said of each")
     chosen = options.parse_args(arguments)
     secrets = Challenge(chosen.first).secrets()
     if chosen.gusts:
         secrets = gusty_planes(chosen.first)
+    if chosen.payloads:
+        secrets = dropped(chosen.first)
     if chosen.vehicle:
         secrets = [s for s in secrets if s.vehicle == chosen.vehicle]
     if chosen.name:

@@ -40,7 +40,7 @@ NAMES = {
     "copter": (
         *("wind", "wind_profile", "turbulence", "rotor_drag", "body_drag", "thrust_scale"),
         *("thrust_curve", "voltage_sag", "motor_lag", "thrust_tilt", "ground_effect"),
-        "air_density",
+        *("air_density", "mass_change", "thrust_change"),
     ),
     "plane": (
         *("wind", "wind_profile", "turbulence", "lift", "drag", "side_force", "thrust_scale"),

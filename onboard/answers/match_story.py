@@ -212,6 +212,17 @@ def _density(v: Values) -> str:
     return f"The air was {size} {way} than that of the standard atmosphere."
 
 
+def _change(what: str) -> Callable[[Values], str]:
+    def say(v: Values) -> str:
+        r, t = v["ratio"], v["moment"]
+        way = "more" if r.real > 1.0 else "less"
+        size = whole(100.0 * abs(r.real - 1.0), 100.0 * r.sigma, "%")
+        when = whole(t.real, t.sigma, "s")
+        return f"{what} changes in flight, all at once: {size} {way} from {when} on."
+
+    return say
+
+
 def _coefficients(what: str, names: Mapping[str, str]) -> Callable[[Values], str]:
     def say(v: Values) -> str:
         told = [
@@ -252,6 +263,8 @@ SENTENCES: Mapping[str, Callable[[Values], str]] = {
     "thrust_tilt": _tilt,
     "ground_effect": _ground,
     "air_density": _density,
+    "mass_change": _change("The vehicle's mass"),
+    "thrust_change": _change("The thrust of the same command"),
     "lift": _coefficients(
         "The wing's lift differs from the simulation's",
         {"c_lift_0": "at zero angle", "c_lift_a": "per radian"},

@@ -21,6 +21,8 @@ TITLES = {
     "thrust_tilt": "direction of the thrust",
     "ground_effect": "ground effect",
     "air_density": "density of the air",
+    "mass_change": "mass that changes in flight",
+    "thrust_change": "thrust that changes in flight",
     "lift": "lift",
     "drag": "drag",
     "side_force": "side force",

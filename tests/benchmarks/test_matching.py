@@ -58,10 +58,22 @@ def test_small_ones_are_smaller_and_need_not_be_found():
 
 
 def test_a_thing_outside_the_catalogue_has_no_name_but_near_ones():
-    secret = Secret(9, "copter", "outside", ("payload",))
+    secret = Secret(9, "copter", "outside", ("gust",))
     assert secret.wanted == set()
+    assert not secret.testable
+    assert "turbulence" in secret.allowed
+    assert "rotor_drag" not in secret.allowed
+
+
+def test_a_payload_has_a_name_that_must_be_said():
+    secret = Secret(9, "copter", "outside", ("payload",))
+    assert secret.wanted == {"mass_change"}
+    assert secret.testable
     assert "thrust_scale" in secret.allowed
     assert "rotor_drag" not in secret.allowed
+    spec = secret.spec()
+    craft = spec.aircraft.craft
+    assert answer_of(spec)["mass_change"]["ratio"] == craft.mass / (craft.mass + craft.payload)
 
 
 def test_what_has_no_name_must_not_be_called_clean():

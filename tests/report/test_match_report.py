@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pytest
@@ -156,5 +157,8 @@ def test_sentences_say_what_a_pilot_asks():
     assert story.sentence(tilt).endswith("they lean 3.43 ± 0.06° forward.")
     lag = Difference("motor_lag", "vehicle", {"time_constant": Compared(0.0, 0.06, 0.003, "s")})
     assert "60 ± 3 ms late" in story.sentence(lag)
+    values = {"ratio": Compared(1.0, 0.877, 0.002, "1"), "moment": Compared(nan, 97.5, 0.14, "s")}
+    dropped = Difference("mass_change", "vehicle", values)
+    assert "12.3 ± 0.2 % less from 97.5 ± 0.1 s on" in story.sentence(dropped)
     late = Difference("gps_latency", "sensor", {"delay": Compared(0.1, 0.22, 0.004, "s")})
     assert "0.220 ± 0.004 s (simulation 0.100 s)" in story.sentence(late)

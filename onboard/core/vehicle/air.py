@@ -20,6 +20,7 @@ class Air:
         gust_variance: of the air along each axis, m^2/s^2; one, or (n,).
         tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
+        mass: (n,) over that at the start of the flight, or one.
         commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
             plane: throttle and rudder.  None where they were not recorded.
         volts: (n,) of the battery; None where it was not recorded.
@@ -43,6 +44,7 @@ class Air:
         self.gust_variance: Array | float = 0.0
         self.tilt = (0.0, 0.0)
         self.rho = flight.rho
+        self.mass: Array | float = 1.0
         self.commands: Array | None = flight.commands if flight.commands.shape[1] else None
         self.volts = volts
         self.power: Array | None = None

@@ -15,6 +15,7 @@ from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.ground_effect import GroundEffect
 from onboard.core.vehicle.effects.gust_drag import GustDrag
 from onboard.core.vehicle.effects.inflow import Inflow
+from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
@@ -50,11 +51,13 @@ class Variant:
         by_components: whether rotors that lean drag as the simulator's do.
         gusty: whether the air is turbulent, so that gusts act on the mean force, and commands
             answer them.
+        change: when the mass or the thrust became another; None: never.
     """
 
     profile_top: float = TOP_M
     by_components: bool = False
     gusty: bool = False
+    change: Change | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +145,7 @@ def copter_model(
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
         variant: which of the forms.
     """
-    parts = range(flight.parts)
+    parts, change = range(flight.parts), variant.change
 
     def start(of: Flight) -> Air:
         return Air(of, voltage_of(of))
@@ -153,6 +156,7 @@ def copter_model(
         own([WindProfile(variant.profile_top) for _ in parts]),
         *([own([GustDrag() for _ in parts])] if variant.gusty else []),
         *([AirDensity()] if flown_high(flight) else []),
+        *([MassChange(change, flight)] if change else []),
         VerticalDrag(frame),
         ThrustTilt(),
         RotorDrag(frame, by_components=variant.by_components),
@@ -161,6 +165,7 @@ def copter_model(
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),
         ThrustScale(frame),
+        *([ThrustChange(change, flight)] if change else []),
         GroundEffect(frame),
         Inflow(frame),
         own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
@@ -180,6 +185,7 @@ def copter_missing(flight: Flight, frame: CopterAirframe) -> dict[str, str]:
         VoltageSag(full_voltage(flight, frame)),
         ThrustScale(frame),
         GroundEffect(frame),
+        *(kind(Change(0.0, 0.0), flight) for kind in (MassChange, ThrustChange)),
     ]
     absent = {e.name: why for e in asked if (why := e.missing(air))}
     if not flown_high(flight):

@@ -22,6 +22,7 @@ from onboard.core.vehicle.copter import (
 from onboard.core.vehicle.copter_curves import copter_curves
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.ground_effect import GroundEffect
+from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
@@ -30,14 +31,19 @@ from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import AMBIGUOUS, APART
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
-from onboard.core.vehicle.matching import Matched, held_out, matched
+from onboard.core.vehicle.matching import Matched, held_out, likelier, matched
+from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Signals
+from onboard.core.vehicle.sudden import CHANGES, change_of
 
 MANOEUVRES = {
     e.name: e.manoeuvre
-    for e in (AirDensity, GroundEffect, MotorLag, ThrustCurve, ThrustScale, VoltageSag, WindProfile)
+    for e in (
+        *(AirDensity, GroundEffect, MotorLag, ThrustCurve, ThrustScale, VoltageSag, WindProfile),
+        *(MassChange, ThrustChange),
+    )
 }
 
 RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -60,8 +66,7 @@ def match_copter(
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    variant = Variant()
-    found = matched(copter_model(flight, frame, force_sigma, variant))
+    variant, found = _with_change(flight, frame, force_sigma)
     if found.turbulence.found:
         variant = replace(variant, gusty=True)
         found = matched(copter_model(flight, frame, force_sigma, variant))
@@ -84,6 +89,31 @@ def match_copter(
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
     )
+
+
+def _with_change(
+    flight: Flight, frame: CopterAirframe, force_sigma: Array
+) -> tuple[Variant, Matched]:
+    """The model, with a sudden change of mass or thrust where one is needed, and what it finds.
+
+    Before anything else is asked: whatever else may be free would be bent to take the change in.
+    """
+
+    def model(change: Change | None) -> ForceModel:
+        return copter_model(flight, frame, force_sigma, Variant(change=change))
+
+    first = likelier(model(None))
+    change = change_of(first, model)
+    if change is not None:
+        found = matched(model(change))
+        if set(CHANGES) & set(found.chosen.effects):
+            # Either of the two vehicles that flew may be the airframe's: that which needs less.
+            since = replace(change, since=True)
+            other = matched(model(since))
+            if _better(other, found):
+                change, found = since, other
+            return Variant(change=change), found
+    return Variant(), matched(model(None), first)
 
 
 def _better(other: Matched, found: Matched) -> bool:

@@ -216,6 +216,7 @@ def is_explained(m: Matched) -> bool:
 def note_of(m: Matched) -> str:
     """What a person must know of flight that is not described or was not used; may be empty."""
     said = (
+        *dict.fromkeys(m.model.effect(n).note for n in m.chosen.effects),
         suspected_sentence(m.chosen.suspected),
         remainder_sentence(m.remainders),
         left_out_sentence(m.left_out),

@@ -54,9 +54,14 @@ class Matched:
         return self.fit.model
 
 
-def matched(model: ForceModel) -> Matched:
-    """Fit, leave out what is no part of the model, fit again, decide."""
-    whole, fit = model, likelier(model)
+def matched(model: ForceModel, first: Fit | None = None) -> Matched:
+    """Fit, leave out what is no part of the model, fit again, decide.
+
+    Args:
+        model: of the whole flight.
+        first: the fit of it, where it is there already.
+    """
+    whole, fit = model, likelier(model) if first is None else first
     kept = _inlying(fit)
     if not kept.all():
         model = replace(model, flight=_cut(model.flight, kept))

@@ -94,6 +94,32 @@ def whitened(
     return out
 
 
+@dataclass(frozen=True, slots=True)
+class Onsets:
+    """Whitened columns (n, p), and what they are if a column is nothing before a row.
+
+    Begun at row i, the whitened column is ``whole + apart[i] decay^(k - i)`` in the rows k of the
+    same piece from i on, and ``whole`` in pieces after it.
+    """
+
+    whole: Array
+    apart: Array
+    decay: float
+
+
+def onsets(
+    rows: Array, noise: AxisNoise, sensitivity: Array, piece: NDArray[np.int64], step_s: float
+) -> Onsets:
+    """Columns (n, p) whitened as by :func:`whitened`, for a beginning at any of their rows."""
+    rec = _recursion(step_s, noise.correlation_s, noise.white)
+    whole = whitened(rows, noise, sensitivity, piece, step_s)
+    scaled = rows / noise.size(sensitivity)[:, None]
+    apart = np.zeros_like(whole)
+    apart[1:] = rec.phi * scaled[:-1] / math.sqrt(rec.variance) - rec.decay * whole[:-1]
+    apart[starts_of(piece)] = 0.0
+    return Onsets(whole, apart, rec.decay)
+
+
 def fitted_noise(
     residual: Array,
     sensitivity: Array,

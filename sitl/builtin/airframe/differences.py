@@ -28,7 +28,8 @@ def differences(
     ``rotor_drag`` in 1/s; ``body_drag`` as ``areaCd / mass``, m^2/kg; ``wind`` in m/s towards north
     and east, at the flight's mean height where a flight is given; ``thrust_scale`` as full thrust
     over mass against the nominal; ``thrust_tilt`` forwards and to the right, rad; ``voltage_sag``
-    as the share of the voltage's law that holds, which is 1 or 0.
+    as the share of the voltage's law that holds, which is 1 or 0; ``mass_change`` as the mass after
+    a payload was dropped over that before.
 
     Args:
         aircraft: what flies, where.
@@ -78,6 +79,7 @@ def _of_a_copter(frame: Airframe) -> dict[str, dict[str, float]]:
         "motor_lag": {"time_constant": frame.motor_lag},
         "thrust_tilt": {"x": float(np.arctan2(x, -z)), "y": float(np.arctan2(y, -z))},
         "ground_effect": {"gain": frame.ground_effect},
+        "mass_change": {"ratio": frame.mass / (frame.mass + frame.payload)},
     }
 
 

@@ -71,10 +71,14 @@ def copter_flight(
     noise=0.01,
     still=False,
     lag=0.0,
+    mass=None,
+    weaker=None,
 ):
     """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
 
-    The motors follow what is asked of them behind a low-pass of ``lag``, s.
+    The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and
+    ``weaker`` are (moment, factor): from so many seconds on it, or the thrust, is so many times
+    itself.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -98,13 +102,17 @@ def copter_flight(
     voltage = np.full(n, 12.6) if volts is None else np.linspace(*volts, n)
     rho_ref = 1.225 * (1 - 0.0065 * 593.0 / 288.15) ** 4.2559
     outflow = 2 * 29.3 * 12.09 / (3.0 * G)
-    thrust = ratio * G / 0.39 * rho / rho_ref * power * (voltage / 12.6) ** (2 * sag)
+    heavy, strong = (
+        np.where(t - t[0] < of[0], 1.0, of[1]) if of else np.ones(n) for of in (mass, weaker)
+    )
+    thrust = ratio * G / 0.39 * rho / rho_ref * power * (voltage / 12.6) ** (2 * sag) * strong
     thrust = thrust - G / outflow**2 * rho / rho_ref * np.maximum(-u[:, 2], 0.0) ** 2
     linear = c_m * np.sqrt(rho / 1.225 * np.maximum(thrust, 0.5) / G)
-    f_b = -linear[:, None] * u - 0.5 * (rho * area)[:, None] * np.abs(u) * u
-    f_b[:, 0] += tilt[0] * thrust
-    f_b[:, 1] += tilt[1] * thrust
-    f_b[:, 2] -= thrust
+    force = -linear[:, None] * u - 0.5 * (rho * area)[:, None] * np.abs(u) * u
+    force[:, 0] += tilt[0] * thrust
+    force[:, 1] += tilt[1] * thrust
+    force[:, 2] -= thrust
+    f_b = force / heavy[:, None]
     f_b = f_b + noise * np.stack([smooth(rng, n, 1.0, 1.0) for _ in range(3)], axis=1)
     asked = command + lag * np.gradient(command, STEP)
     commands = np.stack([asked, asked**2, np.ones(n)], axis=1)

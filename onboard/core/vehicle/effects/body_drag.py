@@ -38,7 +38,7 @@ class BodyDrag(Effect):
         """Add the drag."""
         for axis, value in enumerate(values):
             square = signed_square(air.u_b[:, axis], air.gust_variance)
-            air.force_b[:, axis] -= 0.5 * value * air.rho * square
+            air.force_b[:, axis] -= 0.5 * value * air.rho * square / air.mass
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Ballistic coefficients, as EK3_DRAG_BCOEF_X and _Y; none where there is no drag."""

@@ -61,11 +61,13 @@ class Effect(ABC):
         name: in the controlled vocabulary; empty for what is only estimated beside the effects.
         unknowns: its numbers.
         manoeuvre: what would show it, as an imperative.
+        note: what a person must know where it is found, as a part of a sentence; may be empty.
         together: whether it is asked what its unknowns do together where gusts hide single ones.
     """
 
     name: str = ""
     manoeuvre: str = ""
+    note: str = ""
     together: bool = False
 
     def __init__(self, unknowns: Sequence[Unknown]) -> None:

@@ -26,5 +26,5 @@ class Inflow(Effect):
         if air.thrust is None:
             return
         square = positive_square(-air.u_b[:, 2], air.gust_variance)
-        air.thrust = air.thrust - values[0] * air.rho / self._density * square
+        air.thrust = air.thrust - values[0] * air.rho / self._density * square / air.mass
         air.force_b[:, 2] -= air.thrust

@@ -28,7 +28,7 @@ class ThrustScale(Effect):
         """Power to thrust."""
         if air.power is not None:
             scale = self._full * math.exp(min(values[0], 5.0))
-            air.thrust = scale * air.rho / self._density * air.power
+            air.thrust = scale * air.rho / self._density * air.power / air.mass
 
     def missing(self, air: Air) -> str:
         """It takes outputs."""

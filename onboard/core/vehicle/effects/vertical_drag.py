@@ -23,10 +23,11 @@ TURNS = 4
 def rotor_root(air: Air) -> Array:
     """(n,) ``sqrt(rho T / (rho_0 T_hover))``: what momentum drag is proportional to.
 
-    It is summed over the motors: those that share the thrust unevenly have less.
+    It is summed over the motors: those that share the thrust unevenly have less.  By mass it goes
+    with the root of it, as the thrust of a heavier vehicle has grown with it.
     """
     load = np.maximum(air.pull / STANDARD_GRAVITY, LEAST_PULL)
-    out: Array = air.evenness * np.sqrt(air.rho / SEA_LEVEL_DENSITY * load)
+    out: Array = air.evenness * np.sqrt(air.rho / SEA_LEVEL_DENSITY * load / air.mass)
     return out
 
 
@@ -46,7 +47,7 @@ class VerticalDrag(Effect):
         """Free the measured force of it, and predict it."""
         linear, quadratic = values
         u = air.u_b[:, 2]
-        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance)
+        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance) / air.mass
         measured = -air.flight.f_b[:, 2]
         air.pull = measured
         for _ in range(TURNS):

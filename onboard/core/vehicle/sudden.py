@@ -1,0 +1,211 @@
+"""Whether the mass or the thrust became another at a moment that nobody announced.
+
+A level that changes once, at an unknown moment, is looked for at every window of the flight (the
+supremum of a score test: D. W. K. Andrews, *Econometrica* 61, 1993), with a level of chance that is
+divided by the number of moments.  A fit that knows no change takes it for noise that wanders, so it
+tells little but the moment; how much the change explains is told by a fit that has it, with noise
+of its own.  What goes from one level to another over a part of the flight, or over all of it (a
+battery that nobody measured), is no sudden change: that is asked of the same likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.chi_square import survival
+from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
+from onboard.core.vehicle.fit import Fit, fitted
+from onboard.core.vehicle.instruments import whitened_rows
+from onboard.core.vehicle.limits import (
+    AMBIGUOUS,
+    BLOCK_S,
+    FALSE_ALARM,
+    LEAST_NOISE_M_S2,
+    WINDOW_STEPS,
+)
+from onboard.core.vehicle.matching import deviance
+from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.noise import AxisNoise, onsets, rms
+from onboard.core.vehicle.recursion import accumulated, starts_of
+from onboard.core.vehicle.windows import windows_of
+
+CHANGES = (MassChange.name, ThrustChange.name)
+GRADUAL = (0.25, 1.0)
+"""Shares of a flight over which a change may go that is no sudden one [use]."""
+Changing: TypeAlias = Callable[[Change], ForceModel]
+"""Makes the model of the fit's flight that has this change besides."""
+
+
+def change_of(fit: Fit, changing: Changing) -> Change | None:
+    """The sudden change of a flight; None where there is none beyond chance.
+
+    Args:
+        fit: of a model that knows no change, and of the likelihood's least.
+        changing: makes the model that has one.
+    """
+    moments = _moments(fit)
+    if not len(moments) or fit.model.flight.commands.shape[1] == 0:
+        return None
+    gains = scores(fit, changing, moments)
+    if _by_chance(float(np.max(gains)), len(moments)):
+        return None
+    plain = scores(replace(fit, noise=_white(fit)), changing, moments)
+    at = {int(moments[np.argmax(g)]) for g in (gains, plain)}
+    its, change = min((_at(fit, changing, k) for k in at), key=lambda x: deviance(x[0]))
+    if _by_chance((deviance(fit) - deviance(its)) / its.scale, len(moments)):
+        return None
+    others = [_with(fit, changing(c)) for c in _gradual(fit, change)]
+    ahead = min(deviance(other) - deviance(its) for other in others) / its.scale
+    return change if ahead > AMBIGUOUS else None
+
+
+def _by_chance(gain: float, moments: int) -> bool:
+    """Whether so much is gained somewhere by chance."""
+    return survival(max(gain, 0.0), len(CHANGES)) * moments > FALSE_ALARM
+
+
+def _at(fit: Fit, changing: Changing, window: int) -> tuple[Fit, Change]:
+    """The fit with a change near a window, at its likeliest moment."""
+    t = float(fit.model.flight.t[windows_of(fit.model.flight).first[window]])
+    change = Change(t, t)
+    change = _placed(_with(fit, changing(change)), changing, change)
+    return _with(fit, changing(change)), change
+
+
+def _white(fit: Fit) -> tuple[AxisNoise, ...]:
+    """Noise without a memory: least squares find the moment whatever the noise is.
+
+    J. Bai, *Review of Economics and Statistics* 79 (1997).  What a change leaves to a fit that does
+    not know it looks like noise that wanders, for which a level is nothing and a jump everything.
+    """
+    return tuple(AxisNoise(max(rms(x), LEAST_NOISE_M_S2)) for x in fit.residual.T)
+
+
+def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
+    """(c,) fall of chi-square by a change at each of these windows, to first order."""
+    slope, prior = _always(fit, changing)
+    made = whitened_rows(fit.model, fit.residual, fit.jacobian, fit.noise, fit.sensitivity)
+    m, p = fit.jacobian.shape[-1], slope.shape[-1]
+    by_rows, squares = np.zeros((len(moments), p, 1 + m)), np.zeros((len(moments), p, p))
+    for k, rows in enumerate(made):
+        its, with_itself = _products(fit, k, slope[:, k], rows)
+        by_rows += its[moments]
+        squares += with_itself[moments]
+    whole = sum((rows.T @ rows for rows in made), np.zeros((1 + m, 1 + m)))
+    # What the other unknowns would take of it.
+    told = np.linalg.solve(whole[1:, 1:] + np.diag(fit.prior), np.swapaxes(by_rows[..., 1:], 1, 2))
+    u = by_rows[..., 0] - np.einsum("cmp,m->cp", told, whole[1:, 0])
+    S = squares - by_rows[..., 1:] @ told + prior
+    out: Array = np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0])
+    return out
+
+
+def _products(fit: Fit, axis: int, slope: Array, rows: Array) -> tuple[Array, Array]:
+    """Of whitened columns that begin at each window, with rows and with one another.
+
+    By sums over what comes after: a product for each moment would take the square of their number.
+
+    Args:
+        fit: whose noise whitens.
+        axis: number of the axis.
+        slope: (w, p) columns that begin at the beginning.
+        rows: (w, j) whitened.
+
+    Returns:
+        (w, p, j) and (w, p, p).
+    """
+    flight = fit.model.flight
+    windows = windows_of(flight)
+    sensitivity = windows.mean(fit.sensitivity)[:, axis]
+    begun = onsets(slope, fit.noise[axis], sensitivity, windows.piece, windows.length_s)
+    whole, apart = begun.whole, begun.apart
+    both = np.hstack([rows, whole])
+    after = _after(whole[:, :, None] * both[:, None, :], 1.0, flight.part[windows.first])
+    fading = _after(both, begun.decay, windows.piece)
+    products = after + apart[:, :, None] * fading[:, None, :]
+    j = rows.shape[1]
+    once = np.ones((len(rows), 1))
+    tail = _after(once, begun.decay**2, windows.piece)[:, :, None]
+    squares = products[..., j:] + fading[:, j:, None] * apart[:, None, :]
+    squares = squares + tail * apart[:, :, None] * apart[:, None, :]
+    return products[..., :j], squares
+
+
+def _after(x: Array, decay: float, piece: NDArray[np.int64]) -> Array:
+    """(n, ...) sums of ``decay^(k - i) x_k`` over k from i to the end of a piece."""
+    turned = x[::-1].reshape(len(x), -1)
+    out: Array = accumulated(turned, decay, starts_of(piece[::-1]))[::-1].reshape(x.shape)
+    return out
+
+
+def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
+    """Derivatives (w, k, p) by changes that are there all the time, and their prior (p, p)."""
+    flight = fit.model.flight
+    begins = [float(flight.t[flight.part == part][0]) for part in range(flight.parts)]
+    models = [changing(Change(begin, begin)) for begin in begins]
+    places = [i for n in CHANGES for i in models[0].indices(n)]
+    # Each is of its own recording, and nothing elsewhere.
+    slope = sum(
+        (m.jacobian(_padded(fit, m))[:, :, places] for m in models),
+        np.zeros((len(flight), len(fit.model.axes), len(places))),
+    )
+    return windows_of(flight).mean(slope), np.diag(1.0 / models[0].plausible[places] ** 2)
+
+
+def _moments(fit: Fit) -> NDArray[np.intp]:
+    """Windows that begin a block's length and more from either end of their recording."""
+    flight = fit.model.flight
+    first = windows_of(flight).first
+    since = flight.since_start
+    length = np.array([since[flight.part == k].max() for k in range(flight.parts)])[flight.part]
+    inside = (since >= BLOCK_S) & (since <= length - BLOCK_S)
+    return np.flatnonzero(inside[first])
+
+
+def _placed(fit: Fit, changing: Changing, near: Change) -> Change:
+    """The change at the likeliest step within a window of this moment, its numbers held."""
+    t = fit.model.flight.t
+    at = int(np.searchsorted(t, near.begin))
+    steps = range(max(at - WINDOW_STEPS, 1), min(at + WINDOW_STEPS + 1, len(t)))
+
+    def squares(moment: float) -> float:
+        model = changing(Change(moment, moment))
+        left = model.measured() - model.predicted(fit.theta)
+        rows = whitened_rows(model, left, None, fit.noise, fit.sensitivity)
+        return float(sum(np.sum(r**2) for r in rows))
+
+    moment = min((float(t[k]) for k in steps), key=squares)
+    return Change(moment, moment)
+
+
+def _gradual(fit: Fit, change: Change) -> list[Change]:
+    """Changes over parts of the recording, as far as they are inside it."""
+    flight = fit.model.flight
+    t = flight.t[flight.part == change.part(flight)]
+    out = []
+    for share in GRADUAL:
+        half = 0.5 * share * float(t[-1] - t[0])
+        begin, end = max(change.begin - half, float(t[0])), min(change.begin + half, float(t[-1]))
+        out.append(Change(float(t[0]), float(t[-1])) if share == 1.0 else Change(begin, end))
+    return out
+
+
+def _with(fit: Fit, model: ForceModel) -> Fit:
+    """The model with a change fitted, from where the fit without it ended."""
+    return fitted(model, _padded(fit, model))
+
+
+def _padded(fit: Fit, model: ForceModel) -> Array:
+    """(m,) unknowns of the fit, in a model that has a change besides, which is none yet."""
+    out = model.nominal
+    added = {i for n in CHANGES for i in model.indices(n)}
+    if len(fit.theta) == len(out):
+        return fit.theta.copy()
+    out[[i for i in range(len(out)) if i not in added]] = fit.theta
+    return out
