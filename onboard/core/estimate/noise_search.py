@@ -11,9 +11,6 @@ from onboard.core.filter.noise import NoiseLevels, line_search, stencil
 from onboard.core.filter.noise_step import NoiseStep, newton_step
 from onboard.core.maths.arrays import Array
 
-SHORTER = 0.125
-"""Share of a step that is tried where none of its shares was likelier [cost]."""
-
 
 class NoiseSearch:
     """Says which levels a filter bank should try next, and which are the best so far."""
@@ -22,17 +19,12 @@ class NoiseSearch:
         """Take whether the levels stand, without a search."""
         self._step: NoiseStep | None = None
         self._members: tuple[NoiseLevels, ...] = ()
-        self._begun = False
         self.settled = settled
         """Whether another step is expected to gain too little to be worth its passes."""
 
     def members(self, levels: NoiseLevels) -> tuple[NoiseLevels, ...]:
-        """Levels of the next pass's bank, the first of them ``levels``.
-
-        The first pass has no others: until the unknowns are known what they leave is no noise, and
-        a step by it goes the wrong way.
-        """
-        if self.settled or not self._begun:
+        """Levels of the next pass's bank, the first of them ``levels``."""
+        if self.settled:
             self._members = (levels,)
         elif self._step is None:
             self._members = stencil(levels)
@@ -50,8 +42,7 @@ class NoiseSearch:
             log_likelihoods: of the B members.
             trades: (B, B) as in :class:`~onboard.core.filter.passes.Pass`.
         """
-        begun, self._begun = self._begun, True
-        if self.settled or not begun:
+        if self.settled:
             return levels
         if self._step is None:
             self._step = newton_step(levels, log_likelihoods, trades)
@@ -59,10 +50,8 @@ class NoiseSearch:
             return levels
         rise = np.array(log_likelihoods) - log_likelihoods[0]
         best, step, self._step = int(np.argmax(rise)), self._step, None
-        if float(rise[best]) >= WORTH_A_SEARCH:
-            # Where it is the parabola that it was taken for, its top has been reached.
-            self.settled = abs(float(rise[-1]) - step.gain) < WORTH_A_SEARCH and not step.cut
-            return self._members[best]
-        self._step = step.shortened(levels, SHORTER)
-        self.settled = self._step.gain < WORTH_A_SEARCH
-        return levels
+        # Where it rises by next to nothing along the step, another one is not worth it; nor where
+        # it is the parabola that it was taken for, for then its top has been reached.
+        reached = abs(float(rise[-1]) - step.gain) < WORTH_A_SEARCH and not step.cut
+        self.settled = reached or float(rise[best]) < WORTH_A_SEARCH
+        return self._members[best]

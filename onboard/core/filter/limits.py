@@ -147,9 +147,8 @@ levelled with.  So with the heading, whose error goes with the manoeuvre, too: t
 have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
 1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
 sealed ones, which it was not made from]."""
-STENCIL_FACTOR: Final = 1.25
-"""Ratio between neighbouring points of the stencil: the top of a parabola through points a factor
-of two apart is 15 % beside that of the likelihood, and with 1.25 it is 2 % [bound]."""
+STENCIL_FACTOR: Final = 2.0
+"""Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
 LINE_SHARES: Final = (0.25, 0.5, 1.0)
 """Shares of a step that a line search tries: levels that trade with each other make the whole too
 long [cost]."""

@@ -103,13 +103,19 @@ def stencil(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[Nois
 
 def line_search(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
     """The centre, then the shares :data:`LINE_SHARES` of the way to ``target``, in log-levels."""
-    return (centre, *(on_the_way(centre, target, share) for share in LINE_SHARES))
-
-
-def on_the_way(centre: NoiseLevels, target: NoiseLevels, share: float) -> NoiseLevels:
-    """A share of the way from one to the other, in log-levels."""
-    pairs = [(getattr(centre, f.name), getattr(target, f.name)) for f in fields(NoiseLevels)]
-    return NoiseLevels(*(a * (b / a) ** share for a, b in pairs))
+    return (
+        centre,
+        *(
+            NoiseLevels(
+                *(
+                    getattr(centre, f.name)
+                    * (getattr(target, f.name) / getattr(centre, f.name)) ** share
+                    for f in fields(NoiseLevels)
+                )
+            )
+            for share in LINE_SHARES
+        ),
+    )
 
 
 def distance(a: NoiseLevels, b: NoiseLevels) -> float:

@@ -45,33 +45,15 @@ def test_what_begins_far_away_takes_longer():
 
 
 def test_it_ends_where_nothing_rises_along_the_step():
-    """A likelihood with a kink: its slopes promise what no part of the step keeps."""
+    """A likelihood with a kink: its slopes promise what it does not keep."""
     levels, search = NoiseLevels(), NoiseSearch()
-    assert search.members(levels) == (levels,)
-    assert search.better(levels, [0.0], np.eye(1)) == levels
     trades = np.eye(len(search.members(levels)))
     said = [0.0] + [-50.0, 40.0] + [-1.0, -1.0] * ((len(trades) - 3) // 2)
     assert search.better(levels, said, trades) == levels
     assert not search.settled
-    furthest = []
-    while not search.settled:
-        members = search.members(levels)
-        furthest.append(members[-1].velocity / levels.velocity)
-        assert search.better(levels, [0.0, -1.0, -2.0, -3.0], np.eye(len(members))) == levels
-    assert furthest == sorted(furthest, reverse=True)
-    assert 1.0 < furthest[-1] < 1.01
-
-
-def test_a_step_that_is_too_long_is_taken_in_part():
-    """What a parabola promises far off may be kept near by: that is not the end of a search."""
-    levels, search = NoiseLevels(), NoiseSearch()
-    for said in ([0.0], [0.0, -50.0, 40.0] + [-1.0, -1.0] * 11, [0.0, -1.0, -2.0, -3.0]):
-        trades = np.eye(len(search.members(levels)))
-        assert search.better(levels, said, trades) == levels
     members = search.members(levels)
-    assert search.better(levels, [0.0, 1.0, 2.0, 3.0], np.eye(4)) == members[3]
-    assert levels.velocity < members[3].velocity < 1.2 * levels.velocity
-    assert not search.settled
+    assert search.better(levels, [0.0, -1.0, -2.0, -3.0], np.eye(len(members))) == levels
+    assert search.settled
 
 
 def test_levels_that_are_told_are_not_searched_for():
