@@ -106,6 +106,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-23-4",
     "2026-11-23-5",
     "2026-11-24",
+    "2026-11-24-2",
 )
 """Releases that have been judged."""
 
