@@ -13,8 +13,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled, part
 from onboard.core.maths.loops.curves import place
 
-PIVOT_SHARE = 1e-12
-"""Sine of half an angle below which a rotation vector is twice the quaternion's."""
+NO_TURN = 1e-12
+"""Sine of half an angle below which a rotation vector is twice the quaternion's [bound: to rounding]."""
 
 
 @part
@@ -122,7 +122,7 @@ def _vector(R: Array, out: Array) -> None:
         size = -size
     q /= size
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    factor = 2.0 if sine < PIVOT_SHARE else 2.0 * math.atan2(sine, q[0]) / sine
+    factor = 2.0 if sine < NO_TURN else 2.0 * math.atan2(sine, q[0]) / sine
     for i in range(3):
         out[i] = factor * q[i + 1]
 
