@@ -14,7 +14,8 @@ from onboard.core.maths.compiler import compiled, part
 from onboard.core.maths.loops.curves import place
 
 NO_TURN = 1e-12
-"""Sine of half an angle below which a rotation vector is twice the quaternion's [bound: to rounding]."""
+"""Sine of half an angle below which a rotation vector is twice the quaternion's [bound: to
+rounding]."""
 
 
 @part
