@@ -104,7 +104,9 @@ class Flown:
             v = np.array([(f.v_n, f.v_e, math.nan if f.v_d is None else f.v_d) for f in fixes])
             height = np.array([f.altitude for f in fixes])
             if not self.airborne:
-                self.grounded = grounded_spans(t, v, height, rolls=self.kind != "copter")
+                self.grounded = grounded_spans(
+                    t, v, height, rolls=self.kind != "copter", wings=self.kind == "plane"
+                )
             self.ground = float(np.percentile(height, 0.5))
         step = _averaged_over(self._kept)
         for sample in _with_landings(_slower(self._kept, step), self.grounded):

@@ -5,43 +5,67 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.limits import GROUND_M, LEVEL_M_S, MARGIN_S, STILL_M_S, STILL_S
+from onboard.core.vehicle.limits import (
+    GROUND_M,
+    HEIGHT_WANDER_M,
+    LEVEL_M_S,
+    MARGIN_S,
+    STILL_M_S,
+    STILL_S,
+)
 
 
 def grounded_spans(
-    t: Array, v_n: Array, height: Array, *, rolls: bool = False
+    t: Array, v_n: Array, height: Array, *, rolls: bool = False, wings: bool = False
 ) -> list[tuple[float, float]]:
     """Intervals (s) in which a vehicle stands on the ground, with a margin to either side.
 
-    A hover is still, too: only what is as low as the lowest such place counts.
+    A hover is still, too: only what is as low as the lowest such place counts.  Wings hold no
+    hover, so that a plane's stands may differ by what a receiver's height wanders from the
+    take-off to the landing.
 
     Args:
         t: (n,) times of fixes, s.
         v_n: (n, 3) velocity, m/s; NaN down where it is not measured.
         height: (n,) m.
-        rolls: whether it may move on the ground: then what is level and lowest is the ground.
+        rolls: whether it may move on the ground: then what is level, and as low as where it
+            stands before or after, is the ground.
+        wings: whether it is a plane.
     """
     if len(t) < 2:
         return []
     v_n = np.where(np.isnan(v_n), np.stack([0.0 * t, 0.0 * t, -_climb(t, height)], axis=1), v_n)
     slow = np.linalg.norm(v_n, axis=1) < STILL_M_S
     runs = [(i, j) for i, j in _runs(slow) if t[j - 1] - t[i] >= STILL_S]
+    apart_m = HEIGHT_WANDER_M if wings else GROUND_M
     if rolls:
         level = np.abs(v_n[:, 2]) < LEVEL_M_S
-        low = height < float(np.min(height)) + GROUND_M
+        low = height < _ground(t, height, runs, apart_m) + GROUND_M
         runs += [(i, j) for i, j in _runs(level & low) if t[j - 1] - t[i] >= STILL_S]
     if not runs:
         return []
     levels = [float(np.median(height[i:j])) for i, j in runs]
     lowest = min(levels)
     # A flight that is recorded in parts may begin in a hover: nothing was lower then either.
-    if float(np.percentile(height, 1)) < lowest - GROUND_M:
+    if float(np.percentile(height, 1)) < lowest - apart_m:
         return []
     return [
         (float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S)
         for (i, j), level_m in zip(runs, levels, strict=True)
-        if level_m < lowest + GROUND_M
+        if level_m < lowest + apart_m
     ]
+
+
+def _ground(t: Array, height: Array, stands: list[tuple[int, int]], apart_m: float) -> Array:
+    """(n,) height of the ground, m, from stand to stand; the lowest height where there is none."""
+    lowest = float(np.min(height))
+    levels = [(0.5 * (t[i] + t[j - 1]), float(np.median(height[i:j]))) for i, j in stands]
+    near = [(at, level) for at, level in levels if level < lowest + apart_m]
+    if not near:
+        return np.full(len(t), lowest)
+    times, grounds = zip(*near, strict=True)
+    out: Array = np.interp(t, times, grounds)
+    return out
 
 
 def _climb(t: Array, height: Array) -> Array:

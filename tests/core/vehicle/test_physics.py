@@ -16,7 +16,7 @@ from onboard.core.vehicle.gusts import positive_square, signed_square
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.recursion import accumulated, behind, lagged
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
-from onboard.core.vehicle.spans import grounded_spans
+from onboard.core.vehicle.spans import grounded_spans, inside
 from tests.core.vehicle.flights import copter_flight
 
 
@@ -129,6 +129,39 @@ def test_the_ground_is_found_but_a_hover_is_not_the_ground():
     assert 9.0 < spans[0][1] < 15.0
     assert all(not a <= 40.0 <= b for a, b in spans)
     assert any(a < 75.0 and b >= 99.0 for a, b in spans)
+
+
+def _taken_off(wander_m, *, measured=True):
+    """A plane that stands for 10 s, rolls for 6 s, flies, and lands, as a receiver has it."""
+    t = np.arange(0.0, 200.0, 0.2)
+    speed = np.interp(t, [0, 10, 16, 180, 186, 200], [0, 0, 20, 20, 0, 0])
+    climbed = np.interp(t, [0, 16, 40, 150, 180, 200], [0, 0, 60, 60, 0, 0])
+    down = -np.gradient(climbed, t) if measured else np.full(len(t), np.nan)
+    return t, np.stack([speed, 0 * t, down], axis=1), climbed + wander_m * t / t[-1]
+
+
+def _covered(spans, begin, end):
+    at = np.linspace(begin, end, 50)
+    return inside(at, spans).all()
+
+
+@pytest.mark.parametrize("wander_m", [-6.0, -2.5, 0.0, 2.5, 6.0])
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_plane_rolls_before_it_flies_wherever_its_height_wanders_to(wander_m, measured):
+    t, v, height = _taken_off(wander_m, measured=measured)
+    spans = grounded_spans(t, v, height, rolls=True, wings=True)
+    assert _covered(spans, 0.0, 15.5)
+    assert _covered(spans, 181.0, 199.0)
+    assert not inside(np.linspace(25.0, 170.0, 50), spans).any()
+
+
+def test_what_may_hover_has_not_landed_above_where_it_stood():
+    t, v, height = _taken_off(0.0)
+    hovering = (t > 80.0) & (t < 90.0)
+    v[hovering] = 0.0
+    for wings in (False, True):
+        spans = grounded_spans(t, v, height, rolls=True, wings=wings)
+        assert not inside(t[hovering], spans).any()
 
 
 def test_a_model_without_error_does_not_drift_alone():
