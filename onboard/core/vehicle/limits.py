@@ -79,6 +79,8 @@ NOISE_ROUNDS: Final = 3
 OUTLYING: Final = 5.0
 """Robust sigmas past which a step is no part of what the model describes (stall, gust front,
 contact): 6e-7 of normal ones [probability]."""
+LEAVING_ROUNDS: Final = 6
+"""Times that such steps are left out and the rest is fitted anew, at the most [cost]."""
 
 STALL_SHARE: Final = 0.85
 """Of the angle of stall: up to it lift is a straight line to a per cent [physics]."""

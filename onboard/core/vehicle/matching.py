@@ -15,7 +15,7 @@ from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import turned_by_gusts
-from onboard.core.vehicle.limits import MOST_OUTLYING, OUTLYING
+from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import likelihood
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
@@ -61,11 +61,9 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         model: of the whole flight.
         first: the fit of it, where it is there already.
     """
-    whole, fit = model, likelier(model) if first is None else first
-    kept = _inlying(fit)
-    if not kept.all():
-        model = replace(model, flight=_cut(model.flight, kept))
-        fit = fitted(model, fit.theta)
+    whole = model
+    fit, kept = described(likelier(model) if first is None else first)
+    model = fit.model
     turbulence = turbulence_of(fit)
     if AirspeedScale.name in {e.name for e in model.effects}:
         felt = felt_by(fit) if turbulence.found else None
@@ -88,19 +86,36 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
     )
 
 
-def likelier(model: ForceModel) -> Fit:
-    """The likelier of two fits: from still air, and anew in the wind that it finds.
+def described(fit: Fit) -> tuple[Fit, Mask]:
+    """The fit of what the model describes, and which of the steps (n,) that is.
+
+    What is far from a fit has bent it: from the one without it other steps are far, and another
+    valley may be the likelier.  Both are asked of each fit anew until the steps are the same.
+    """
+    whole = fit.model
+    kept = np.ones(len(whole.flight), dtype=bool)
+    for _ in range(LEAVING_ROUNDS):
+        now = _inlying(whole.measured() - whole.predicted(fit.theta))
+        if np.array_equal(now, kept) or np.mean(~now) > MOST_OUTLYING:
+            break
+        kept = now
+        fit = likelier(replace(whole, flight=_cut(whole.flight, kept)), fit.theta)
+    return fit, kept
+
+
+def likelier(model: ForceModel, start: Array | None = None) -> Fit:
+    """The likelier of two fits: from still air, or ``start`` (m,), and anew in its wind.
 
     Beside a wind that is not known yet all else is pulled about, and may be left in another valley
     of the likelihood: a propeller that brakes, and twice the thrust to make up for it.
     """
-    first = fitted(model)
+    first = fitted(model, start)
     if model.instrumented:
         # Regressors that are told from the past lead to no minimum of a likelihood.
         return first
-    start, wind = model.nominal, model.indices(Wind.name)
-    start[wind] = first.theta[wind]
-    again = fitted(model, start)
+    anew, wind = model.nominal, model.indices(Wind.name)
+    anew[wind] = first.theta[wind]
+    again = fitted(model, anew)
     return min(first, again, key=deviance)
 
 
@@ -127,15 +142,12 @@ def held_out(choices: Choices, effects: tuple[str, ...]) -> Array:
     return out
 
 
-def _inlying(fit: Fit) -> Mask:
-    """(n,) steps that the model describes; all of them if it fails on too many."""
-    centre = np.median(fit.residual, axis=0)
-    spread = 1.4826 * np.median(np.abs(fit.residual - centre), axis=0)
-    far: Mask = np.abs(fit.residual - centre) > OUTLYING * np.maximum(spread, 0.02)
-    kept: Mask = np.logical_not(far.any(axis=1))
-    if np.mean(~kept) > MOST_OUTLYING:
-        return np.ones(len(kept), dtype=bool)
-    return kept
+def _inlying(residual: Array) -> Mask:
+    """(n,) steps whose residual (n, k), m/s^2, is no further off than noise goes."""
+    apart = np.abs(residual - np.median(residual, axis=0))
+    spread = 1.4826 * np.median(apart, axis=0)
+    out: Mask = np.all(apart <= OUTLYING * np.maximum(spread, 0.02), axis=1)
+    return out
 
 
 def _cut(flight: Flight, kept: Mask) -> Flight:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
-from tests.core.vehicle.flights import plane_flight
+from tests.core.vehicle.flights import G, plane_flight
 
 pytestmark = pytest.mark.slow
 SIGMA = np.array([0.003, 0.003, 0.01])
@@ -217,3 +219,31 @@ def test_of_two_valleys_the_likelier_is_taken(monkeypatch):
     again = starts[1]
     assert again[model.index("north")] == right.theta[model.index("north")]
     assert again[model.index("log_ratio")] == 0.0
+
+
+def rolling(flight, seconds):
+    """The flight, begun by a roll along a runway that nobody has told it from."""
+    n = round(seconds / flight.step_s)
+    R_bn, v_n, f_b = flight.R_bn.copy(), flight.v_n.copy(), flight.f_b.copy()
+    airspeed, commands = flight.airspeed.copy(), flight.commands.copy()
+    speed = 20.0 * np.minimum(np.arange(n) / (0.6 * n), 1.0)
+    R_bn[:n] = np.eye(3)
+    v_n[:n] = speed[:, None] * np.array([1.0, 0.0, 0.0])
+    f_b[:n] = np.stack([np.gradient(speed, flight.step_s), 0.0 * speed, 0.0 * speed - G], axis=1)
+    airspeed[:n] = speed
+    commands[:n, 0] = 0.8
+    v_b = np.einsum("nij,nj->ni", R_bn, v_n)
+    return replace(
+        flight, R_bn=R_bn, v_n=v_n, v_b=v_b, f_b=f_b, airspeed=airspeed, commands=commands
+    )
+
+
+@pytest.mark.parametrize("seed", range(20, 25))
+def test_what_no_airframe_does_bends_no_number(seed):
+    flight = plane_flight(
+        seed=seed, seconds=150.0, wind=(-3.0, -6.0), c_drag_p=0.145, throttle_swing=0.12
+    )
+    match = matched(rolling(flight, 6.0))
+    assert names(match) == {"wind", "drag"}
+    drag = match.numbers["drag.c_drag_p"]
+    assert abs(drag.real - 0.145) < 3.0 * drag.sigma
