@@ -76,9 +76,11 @@ def choose(choices: Choices) -> Chosen:
 def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[str, ...]:
     """Effects that are not taken in, and explain more than chance by numbers that may matter.
 
-    One of several that may be it would pass if all others were nominal.  Where gusts leave one
-    combination of an effect's numbers, it has to be large to be named.  That nothing is there is
-    then no longer sure from where the combination is off by :data:`SURE`.
+    One of several that may be it would pass if all others were nominal.  To be named, an effect is
+    off by more than matters, and by :data:`SURE` beyond; that it is not there can no longer be said
+    from where it is off by more than matters.  Where gusts leave one combination of an effect's
+    numbers, it has to be large to be named.  That nothing is there is then no longer sure from
+    where the combination is off by :data:`SURE`.
     """
     left = choices.solved(chosen).chi2
     out = []
@@ -91,7 +93,7 @@ def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[s
         if together_testable(choices.fit, places) is not None:
             its = math.erfc(SURE / math.sqrt(2.0))
         elif _testable(choices.fit, n):
-            if _would_pass(choices, chosen, n, gain, level):
+            if _would_pass(choices, chosen, n, gain, level, sure=0.0):
                 out.append(n)
             continue
         with_it = choices.solved([*chosen, n])
@@ -114,14 +116,19 @@ def _passes(choices: Choices, beside: Sequence[str], name: str, gain: float, lev
 
 
 def _would_pass(
-    choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float
+    choices: Choices,
+    chosen: Sequence[str],
+    name: str,
+    gain: float,
+    level: float,
+    sure: float = SURE,
 ) -> bool:
     """Whether it is needed beside these, with all others at their nominal numbers."""
     if not _no_chance(choices, chosen, name, gain, level):
         return False
     places = choices.fit.model.indices(name)
     with_it = choices.solved([*chosen, name])
-    if not _matters(choices.fit, places, with_it):
+    if not _matters(choices.fit, places, with_it, sure):
         return False
     return choices.lasting([*chosen, name], places, with_it)
 

@@ -158,6 +158,23 @@ def test_a_difference_whose_size_nobody_knows_is_not_called_none(monkeypatch, c_
     assert ("lift" in told) is not explained
 
 
+@pytest.mark.parametrize(("c_lift_0", "explained"), [(0.4, False), (0.55, True)])
+def test_what_is_not_surely_large_is_not_called_nothing(monkeypatch, c_lift_0, explained):
+    """Nearly three times what matters, with a sigma of half of that: no name, and not explained."""
+
+    def doubt(fit):
+        out = np.zeros(len(fit.theta))
+        out[fit.model.indices("lift")] = 0.08, 0.5
+        return out
+
+    monkeypatch.setattr("onboard.core.vehicle.matching.propeller_doubt", doubt)
+    match = matched(plane_flight(seed=5, c_lift_0=c_lift_0))
+    assert "lift" not in {n.name for n in match.not_testable}
+    assert names(match) == set()
+    assert match.explained is explained
+    assert ("lift" in match.note.partition(" would explain ")[0]) is not explained
+
+
 def test_what_could_not_be_tested_is_not_taken_for_nominal(monkeypatch):
     """With a throttle that hardly moves, less thrust and more drag are one to the flight.
 
