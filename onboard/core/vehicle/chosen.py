@@ -63,7 +63,8 @@ def choose(choices: Choices) -> Chosen:
         passing = [n for n in passing if _passes(choices, beside, n, gains[n], level)]
         if not passing:
             break
-        chosen.append(max(passing, key=lambda n: gains[n] - CREDIT * len(fit.model.indices(n))))
+        counted = {n: _counted(choices, beside, n, gains[n]) for n in passing}
+        chosen.append(max(passing, key=lambda n: counted[n] - CREDIT * len(fit.model.indices(n))))
     chosen, gains = _pruned(choices, chosen, untestable, level)
     rivals = {n: _rivals(choices, chosen, n) for n in chosen}
     effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
@@ -136,20 +137,26 @@ def _would_pass(
 def _no_chance(
     choices: Choices, chosen: Sequence[str], name: str, gain: float, level: float
 ) -> bool:
-    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are.
-
-    What gusts may have turned explains nothing: so far from nominal its numbers must be then.
-    """
+    """Whether it explains more than chance, also on flight not fitted, whatever its numbers are."""
     fit, places = choices.fit, choices.fit.model.indices(name)
-    if fit.turned is not None:
-        at = choices.solved([*chosen, name])
-        off = (fit.theta + at.x - fit.model.nominal)[places]
-        gain = min(gain, at.apart(places, off))
+    gain = _counted(choices, chosen, name, gain)
     # What is known of unknowns together is one number.
     count = len(places) if together_testable(fit, places) is None else 1
     if survival(gain, count) > level:
         return False
     return choices.held_out(chosen) - choices.held_out([*chosen, name]) > 0.0
+
+
+def _counted(choices: Choices, chosen: Sequence[str], name: str, gain: float) -> float:
+    """What of a fall of chi-square counts: what gusts may have turned explains nothing.
+
+    So far from nominal its numbers must be then.
+    """
+    fit, places = choices.fit, choices.fit.model.indices(name)
+    if fit.turned is None:
+        return gain
+    at = choices.solved([*chosen, name])
+    return min(gain, at.apart(places, _off(fit, places, at)))
 
 
 def _matters(fit: Fit, places: Sequence[int], at: Solved, sure: float = SURE) -> bool:
@@ -196,14 +203,14 @@ def _pruned(
         every = [*chosen, *untestable]
         whole = choices.solved(every).chi2
         gains = {n: choices.solved([c for c in every if c != n]).chi2 - whole for n in chosen}
-        needless = []
+        needless = {}
         for n in chosen:
             others = [c for c in every if c != n and _needs(c, [k for k in chosen if k != n])]
             if not _passes(choices, others, n, gains[n], level):
-                needless.append(n)
+                needless[n] = _counted(choices, others, n, gains[n])
         if not needless:
             return chosen, gains
-        weakest = min(needless, key=lambda n: gains[n])
+        weakest = min(needless, key=lambda n: needless[n])
         chosen = [
             c for c in chosen if c != weakest and _needs(c, [k for k in chosen if k != weakest])
         ]

@@ -264,3 +264,20 @@ def test_what_no_airframe_does_bends_no_number(seed):
     assert names(match) == {"wind", "drag"}
     drag = match.numbers["drag.c_drag_p"]
     assert abs(drag.real - 0.145) < 3.0 * drag.sigma
+
+
+@pytest.mark.parametrize("seed", [3, 42])
+def test_what_gusts_may_have_turned_is_no_reason_to_name_drag_before_thrust(seed):
+    """The throttle hardly moves; beside all others induced drag is off by what gusts turn it."""
+    match = matched(
+        plane_flight(
+            seed=seed,
+            seconds=150.0,
+            ratio=0.75,
+            gusts=0.5,
+            throttle_swing=0.09,
+            noise=0.2,
+            reading=1.0,
+        )
+    )
+    assert names(match) - {"turbulence"} == {"thrust_scale"}
