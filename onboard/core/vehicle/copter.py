@@ -11,6 +11,7 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.body_drag import BodyDrag
+from onboard.core.vehicle.effects.charge import Charge
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.ground_effect import GroundEffect
 from onboard.core.vehicle.effects.gust_drag import GustDrag
@@ -165,6 +166,7 @@ def copter_model(
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),
         ThrustScale(frame),
+        own([Charge(alone=flight.parts == 1) for _ in parts]),
         *([ThrustChange(change, flight)] if change else []),
         GroundEffect(frame),
         Inflow(frame),

@@ -87,3 +87,20 @@ def test_a_wind_that_was_measured_is_known_as_well_as_it_was():
     assert match.wind.north == pytest.approx(3.0, abs=0.3)
     assert match.wind.east == pytest.approx(-2.0, abs=0.3)
     assert match.wind.sigma_north < 0.15
+
+
+@pytest.mark.slow
+def test_each_flight_began_with_a_battery_of_its_own_where_no_voltage_tells():
+    """One thrust by command for all of them is off by a tenth, and its sigma has to say so."""
+    ratios = (0.9, 1.0, 1.1)
+    every = [replace(f, battery=np.zeros((len(f), 0))) for f in flights()]
+    for flight, ratio in zip(every, ratios, strict=True):
+        # The pull of the rotors, which the command does not tell: 90 to 110 % of it.
+        flight.f_b[:, 2] *= ratio
+    match = matched(every)
+    assert match.mismatch["z"].after < 0.2
+    scale = match.numbers["thrust_scale.log_ratio"]
+    assert scale.sigma > 0.03
+    assert abs(scale.real) < 3.0 * scale.sigma
+    alone = matched(every[:1]).numbers["thrust_scale.log_ratio"]
+    assert alone.real == pytest.approx(np.log(0.9), abs=0.03)
