@@ -100,7 +100,9 @@ def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
     whole = sum((rows.T @ rows for rows in made), np.zeros((1 + m, 1 + m)))
     # What the other unknowns would take of it.
     told = np.linalg.solve(whole[1:, 1:] + np.diag(fit.prior), np.swapaxes(by_rows[..., 1:], 1, 2))
-    u = by_rows[..., 0] - np.einsum("cmp,m->cp", told, whole[1:, 0])
+    # At the fit what the flight asks of them is what their prior holds back.
+    asked = whole[1:, 0] + fit.prior * (fit.model.nominal - fit.theta)
+    u = by_rows[..., 0] - np.einsum("cmp,m->cp", told, asked)
     S = squares - by_rows[..., 1:] @ told + prior
     out: Array = np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0])
     return out

@@ -101,15 +101,16 @@ def test_without_outputs_nothing_is_looked_for():
     assert set(CHANGES) <= {n.name for n in matched(flight).not_testable}
 
 
-def test_scores_are_the_fall_of_chi_square_of_a_fit_that_has_the_change():
-    flight = copter_flight(seed=9, seconds=90.0, mass=(45.0, 1.05))
+@pytest.mark.parametrize("volts", [None, (12.6, 12.5)])
+def test_scores_are_the_fall_of_chi_square_of_a_fit_that_has_the_change(volts):
+    flight = copter_flight(seed=9, seconds=90.0, mass=(45.0, 1.05), volts=volts)
     fit = fitted(model_of(flight))
     moments = np.array([40, 90, 120])
     told = scores(fit, lambda c: model_of(flight, c), moments)
     for window, its in zip(moments, told, strict=True):
         t = float(flight.t[5 * window])
         changed = model_of(flight, Change(t, t))
-        assert its == pytest.approx(_fall(fit, changed), rel=0.02)
+        assert its == pytest.approx(_fall(fit, changed), rel=1e-9)
 
 
 def _fall(fit, changed):
