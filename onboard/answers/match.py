@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +19,7 @@ from onboard.answers.sensor_level import (
 from onboard.core.diagnosis.records import NotTestable, Verdict
 from onboard.core.inputs.segments import Batch
 from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.contradiction import Contradiction, contradiction
 from onboard.core.vehicle.copter import Outputs
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.wind_profile import TOP_M
@@ -30,7 +31,7 @@ from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.several import joined
 from onboard.core.vehicle.signals import Stream
-from onboard.core.vehicle.trajectory import motions
+from onboard.core.vehicle.trajectory import Motion, motions
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording
 
@@ -167,7 +168,9 @@ def vehicle_level(
     """
     kind = recording.signals.kind or guessed_kind(recording.batches)
     airframe, plane = CopterAirframe.of(frame), PlaneAirframe.of(frame)
-    flight = _flight(recording, kind, airframe)
+    pieces = motions(recording.batches, recording.sensors)
+    flight = _flight(recording, kind, airframe, pieces)
+    doubt = _doubt(recording, pieces)
     names = NAMES.get(kind, NAMES["copter"])
     why = ""
     if kind and kind not in (*COPTERS, *PLANES):
@@ -176,6 +179,8 @@ def vehicle_level(
         why = NOTHING
     elif not kind:
         why = "the recording does not say what kind of vehicle it is"
+    elif doubt.hopeless:
+        why = str(doubt)
     if why or flight is None:
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
@@ -183,10 +188,10 @@ def vehicle_level(
     flight = joined([flight, *(_further(other, kind, airframe) for other in others)])
     try:
         if kind in COPTERS:
-            return match_copter(flight, recording.signals, airframe, sigma)
+            return _doubted(match_copter(flight, recording.signals, airframe, sigma), doubt)
         found = match_plane(flight, plane, sigma)
         if found is not None:
-            return found
+            return _doubted(found, doubt)
         why = "it never flew faster than a plane stalls"
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         why = f"its numbers fit no model ({error})"
@@ -212,21 +217,37 @@ def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> 
         RecordingError: it is of another kind of vehicle, or none.
     """
     its = recording.signals.kind or kind
-    flight = None if its != kind else _flight(recording, kind, airframe)
+    pieces = motions(recording.batches, recording.sensors)
+    flight = None if its != kind else _flight(recording, kind, airframe, pieces)
     if flight is None or len(flight) < FEWEST_STEPS:
         why = NOTHING if its == kind else f"is of a {its}, not of a {kind}"
         raise RecordingError(f"{recording.name}: {why}")
+    doubt = _doubt(recording, pieces)
+    if doubt.hopeless:
+        raise RecordingError(f"{recording.name}: {doubt}")
     return flight
 
 
-def _flight(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> Flight | None:
+def _doubt(recording: FlownRecording, pieces: Sequence[Motion]) -> Contradiction:
+    """A force that is the slope of the velocity contradicts nothing."""
+    return Contradiction() if recording.derived else contradiction([m.fixed for m in pieces])
+
+
+def _doubted(found: VehicleMatch, doubt: Contradiction) -> VehicleMatch:
+    """With what it says of itself in the note."""
+    note = "; ".join(s for s in (found.note, str(doubt)) if s)
+    return replace(found, note=note)
+
+
+def _flight(
+    recording: FlownRecording, kind: str, airframe: CopterAirframe, pieces: Sequence[Motion]
+) -> Flight | None:
     commands = Stream()
     if kind in COPTERS:
         outputs = Outputs.of(recording.signals, airframe)
         commands = outputs.commands(recording.signals, airframe.propExpo)
     elif kind in PLANES:
         commands = plane_commands(recording.signals)
-    pieces = motions(recording.batches, recording.sensors)
     if not pieces:
         return None
     grounded = list(recording.grounded)

@@ -39,6 +39,15 @@ LEVELS_FROM: Final = 400
 FEWEST_FIXES: Final = 5
 """Fewer are no piece of flight [physics]."""
 
+# Flight that contradicts itself (contradiction).
+
+CONTRADICTION_S: Final = 1.0
+"""s over which force and velocity are compared: several fixes, and no time to drift [physics]."""
+CONTRADICTION_M_S2: Final = 5.0
+"""Past this one of them is wrong, m/s^2: an accelerometer that nobody calibrated is 0.7 off and an
+attitude that is five degrees off 0.9, so that it is three times what both may be together; an
+attitude that is half a right angle off, or a velocity that jumps, is more [physics]."""
+
 # Noise (noise).
 
 CORRELATION_S: Final = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0)

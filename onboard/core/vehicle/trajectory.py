@@ -67,6 +67,8 @@ class Motion:
         height: (n,) above mean sea level, m.
         velocity_sigma: of the velocity, m/s.
         attitude_sigma: of roll and pitch, rad.
+        fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
+            force and recorded attitude, m/s, but for a constant.
     """
 
     t: Array
@@ -77,6 +79,7 @@ class Motion:
     height: Array
     velocity_sigma: float
     attitude_sigma: float
+    fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
 
 
 def motions(batches: Sequence[Batch], sensors: Sensors) -> list[Motion]:
@@ -134,6 +137,7 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         np.interp(t, true_t, fix_h),
         float(np.max(errors.sigma[V])),
         float(np.max(errors.sigma[PSI][:2])),
+        (true_t, fix_v - average),
     )
 
 
