@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.flown_alone import drift_alone
+from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.matching import Matched, held_out
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
@@ -203,14 +205,22 @@ def is_explained(m: Matched) -> bool:
     """Whether what is left is less than errors of the motion, or the gusts found, make."""
     if m.remainders or m.chosen.suspected:
         return False
-    if m.turbulence.found:
-        return True
     unclear = m.model.unclear(m.fit.theta)
+    gusts = _gusts(m) * m.fit.sensitivity
     return all(
-        rms(m.held[:, k]) < rms(unclear[:, k])
+        rms(m.held[:, k]) < math.hypot(rms(unclear[:, k]), rms(gusts[:, k]))
         for k, axis in enumerate(m.model.axes)
         if axis in FORCE
     )
+
+
+def _gusts(m: Matched) -> float:
+    """RMS of the gusts that are named, m/s, as large as they may be; none where none are."""
+    air = m.turbulence
+    if not air.found:
+        return 0.0
+    slow = air.rms + SURE * air.sigma
+    return slow if air.whole is None else max(slow, air.whole + SURE * air.whole_sigma)
 
 
 def note_of(m: Matched) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.turned import Turned
-from tests.core.vehicle.flights import plane_flight
+from tests.core.vehicle.flights import plane_flight, smooth
 
 SIGMA = np.array([0.003, 0.003, 0.01])
 
@@ -147,3 +149,15 @@ def test_a_lift_between_nothing_and_what_can_be_named_is_not_called_explained():
     assert not match.explained
     assert "lift would explain" in match.note
     assert "gusts" in next(n.why for n in match.not_testable if n.name == "lift")
+
+
+@pytest.mark.parametrize(("beside", "explained"), [(0.0, True), (8.0, False)])
+def test_gusts_explain_no_more_than_gusts_of_their_size_do(beside, explained):
+    """A force to the side that wanders, thrice what gusts of 0.8 m/s make of it."""
+    flight = plane_flight(reading=1.0, gusts=0.8, seed=3)
+    force = beside * smooth(np.random.default_rng(1), len(flight), 1.0)
+    f_b = flight.f_b + force[:, None] * (0.0, 1.0, 0.0)
+    match = match_plane(replace(flight, f_b=f_b), PlaneAirframe(), SIGMA)
+    assert match is not None
+    assert {d.name for d in match.effects} == {"turbulence"}
+    assert match.explained is explained
