@@ -194,13 +194,13 @@ def flown(
     wanted = imu or 1
     collected = Flown(wanted, airborne=isinstance(path, Recording) and path.airborne)
     source = read([path], collected, imu=imu, progress=progress)
-    if wanted in collected.imus:
+    derived = any(r.derived for r in source.recordings)
+    there = wanted in collected.imus
+    batches = tuple(collected.recorded.calibrator.engine(wanted).batches) if there else ()
+    if there and not derived:
         diagnosis = collected.answer(wanted).diagnosis
-        batches = tuple(collected.recorded.calibrator.engine(wanted).batches)
     else:
         diagnosis = unanswered(source.vehicle.unanswered(wanted)).diagnosis
-        batches = ()
-    derived = any(r.derived for r in source.recordings)
     return FlownRecording(
         source,
         diagnosis,
