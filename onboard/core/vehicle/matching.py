@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.choices import Choices
@@ -95,7 +96,7 @@ def described(fit: Fit) -> tuple[Fit, Mask]:
     whole = fit.model
     kept = np.ones(len(whole.flight), dtype=bool)
     for _ in range(LEAVING_ROUNDS):
-        now = _inlying(whole.measured() - whole.predicted(fit.theta))
+        now = _inlying(whole.measured() - whole.predicted(fit.theta), whole.flight.part)
         if np.array_equal(now, kept) or np.mean(~now) > MOST_OUTLYING:
             break
         kept = now
@@ -142,11 +143,19 @@ def held_out(choices: Choices, effects: tuple[str, ...]) -> Array:
     return out
 
 
-def _inlying(residual: Array) -> Mask:
-    """(n,) steps whose residual (n, k), m/s^2, is no further off than noise goes."""
-    apart = np.abs(residual - np.median(residual, axis=0))
-    spread = 1.4826 * np.median(apart, axis=0)
-    out: Mask = np.all(apart <= OUTLYING * np.maximum(spread, 0.02), axis=1)
+def _inlying(residual: Array, part: NDArray[np.int64]) -> Mask:
+    """(n,) steps whose residual (n, k), m/s^2, is no further off than noise goes in its flight.
+
+    Args:
+        residual: what the model leaves.
+        part: (n,) which of several recordings a step is of: each flew in air of its own.
+    """
+    out: Mask = np.ones(len(residual), dtype=bool)
+    for number in np.unique(part):
+        mine = part == number
+        apart = np.abs(residual[mine] - np.median(residual[mine], axis=0))
+        spread = 1.4826 * np.median(apart, axis=0)
+        out[mine] = np.all(apart <= OUTLYING * np.maximum(spread, 0.02), axis=1)
     return out
 
 
