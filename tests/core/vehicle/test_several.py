@@ -9,6 +9,7 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.limits import BLOCK_S
+from onboard.core.vehicle.matching import described, likelier
 from onboard.core.vehicle.several import joined, wind_sigmas
 from onboard.core.vehicle.signals import Signals
 from tests.core.vehicle.flights import assert_derivatives, copter_flight
@@ -104,3 +105,12 @@ def test_each_flight_began_with_a_battery_of_its_own_where_no_voltage_tells():
     assert abs(scale.real) < 3.0 * scale.sigma
     alone = matched(every[:1]).numbers["thrust_scale.log_ratio"]
     assert alone.real == pytest.approx(np.log(0.9), abs=0.03)
+
+
+@pytest.mark.slow
+def test_what_is_far_from_the_model_is_far_in_its_own_flight():
+    """Noise that is 2.6 times as large in one flight as in the others is nothing to leave out."""
+    rough = copter_flight(seed=20, seconds=70.0, wind=WINDS[0], c_m=0.45, noise=0.13)
+    flight = joined([rough, *flights()[1:]])
+    model = copter_model(flight, CopterAirframe(), np.tile(SIGMA, (3, 1)))
+    assert described(likelier(model))[1].mean() > 0.999
