@@ -175,12 +175,12 @@ def vehicle_level(
     why = ""
     if kind and kind not in (*COPTERS, *PLANES):
         why = f"there is no model of the airframe of a {kind}"
+    elif doubt.hopeless:
+        why = str(doubt)
     elif flight is None or len(flight) < FEWEST_STEPS:
         why = NOTHING
     elif not kind:
         why = "the recording does not say what kind of vehicle it is"
-    elif doubt.hopeless:
-        why = str(doubt)
     if why or flight is None:
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
