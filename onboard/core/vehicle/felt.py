@@ -186,12 +186,13 @@ def _summed(fit: Fit, theta: Array, rows: tuple[Rows, ...], mine: Sequence[int])
     every[: len(rows)] = [np.column_stack([its.left, its.regressors]) for its in rows]
     for k, axis in enumerate(every):
         axis[:, 1:] = np.where(told == (k == AHEAD), axis[:, 1:], 0.0)
-    of_row = fit.block[windows.first]
+    of_row, part = fit.block[windows.first], model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
-        its = np.concatenate([r[of_row == number] for r in every])
+        here = of_row == number
+        its = np.concatenate([r[here] for r in every])
         y, h = its[:, 0], its[:, 1:]
-        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y)))
+        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), int(part[here][0])))
     return replace(
         fit,
         theta=theta,

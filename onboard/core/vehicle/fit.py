@@ -29,12 +29,16 @@ from onboard.core.vehicle.windows import windows_of
 
 @dataclass(frozen=True, slots=True)
 class BlockSums:
-    """Sums of whitened rows about the estimate: ``N = sum h h^T``, ``b = sum h y``, ``s``."""
+    """Sums of whitened rows about the estimate: ``N = sum h h^T``, ``b = sum h y``, ``s``.
+
+    ``part`` is which of several recordings they are of.
+    """
 
     N: Array
     b: Array
     s: float
     rows: int
+    part: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,12 +158,13 @@ def summed(
     of_row = block[windows_of(model.flight).first]
     level = _level(model, theta)
     rows = whitened_rows(model, residual, jacobian, noise, sensitivity, level)
+    part = model.flight.part[windows_of(model.flight).first]
     sums = []
     for number in np.unique(of_row):
         mine = of_row == number
         y = np.concatenate([r[mine, 0] for r in rows])
         h = np.concatenate([r[mine, 1:] for r in rows])
-        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y)))
+        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), int(part[mine][0])))
     return Fit(
         model,
         theta,
@@ -220,22 +225,29 @@ def _level(model: ForceModel, theta: Array) -> Array | None:
 
 
 def inflation_of(blocks: Sequence[BlockSums], prior: Array) -> Array:
-    """(m,) variance of the estimate by the scatter of the blocks' scores, over that of the sums.
+    """(m,) variance of the estimate by the scatter of the scores, over that of the sums.
 
     The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
     Each unknown has its own, but none less than the mean of all: a few blocks know single ones
-    badly.
+    badly.  Errors of one flight go together (its sensors, its load, how well its wind was
+    measured), and flights that contradict each other do not show it from block to block: where
+    there are enough of them, their scores' scatter counts, too, if it is the larger.
     """
     m = len(prior)
-    count = len(blocks)
-    if count < FEWEST_BLOCKS:
-        return np.ones(m)
     inverse = np.linalg.inv(sum((b.N for b in blocks), np.diag(prior)))
-    scores = np.array([b.b for b in blocks])
-    robust = inverse @ (scores.T @ scores) @ inverse * count / (count - 1.0)
     known = np.diag(inverse @ (np.linalg.inv(inverse) - np.diag(prior)) @ inverse)
-    ratio = np.diag(robust) / np.maximum(known, 1e-300)
     told = np.diag(inverse) * prior < 0.5
-    mean = float(np.mean(ratio[told])) if told.any() else 1.0
-    out: Array = np.maximum(np.maximum(ratio, mean), 1.0)
+    scores = np.array([b.b for b in blocks])
+    numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
+    of_flights = np.zeros((len(numbers), m))
+    np.add.at(of_flights, which, scores)
+    out = np.ones(m)
+    for clusters in (scores, of_flights):
+        count = len(clusters)
+        if count < FEWEST_BLOCKS:
+            continue
+        robust = inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
+        ratio = np.diag(robust) / np.maximum(known, 1e-300)
+        mean = float(np.mean(ratio[told])) if told.any() and clusters is scores else 1.0
+        out = np.maximum(out, np.maximum(ratio, mean))
     return out
