@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from onboard.answers.match import Match
+from onboard.answers.match_words import instead
 from onboard.answers.words import (
     capital,
     fixed,
@@ -60,6 +61,15 @@ def wind_from(north: float, east: float) -> float:
 
 def sentence(d: Difference) -> str:
     """What one effect is and how large, for a pilot."""
+    said = _alone(d)
+    others = instead(d)
+    if not others:
+        return said
+    return f"{said.removesuffix('.')}; or it is {' or '.join(others)}: this flight does not tell which."
+
+
+def _alone(d: Difference) -> str:
+    """The same without what it may be in its place."""
     say = SENTENCES.get(d.name)
     if say is not None and d.level == "vehicle":
         try:

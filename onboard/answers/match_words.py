@@ -49,9 +49,19 @@ def title(name: str) -> str:
     return TITLES.get(name, name.replace("_", " "))
 
 
+def named(d: Difference) -> str:
+    """An effect for people, with those that this flight does not tell from it."""
+    return " or ".join([title(d.name), *instead(d)])
+
+
+def instead(d: Difference) -> list[str]:
+    """What it may be in its place, for people; of a sensor's effect its own card says it."""
+    return [title(name) for name in d.rivals] if d.level == "vehicle" else []
+
+
 def headline(match: Match) -> str:
     """The verdict as a sentence without its full stop."""
-    names = [title(d.name) for d in match.effects]
+    names = [named(d) for d in match.effects]
     said = HEADLINES[match.verdict]
     return f"{said}: {', '.join(names)}" if names else said
 

@@ -13,6 +13,7 @@ import pytest
 from onboard.answers import match_story as story
 from onboard.answers import words
 from onboard.answers.match_document import match_document
+from onboard.answers.match_words import named
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch, WindEstimate
 from onboard.report.match import match_html
@@ -162,3 +163,13 @@ def test_sentences_say_what_a_pilot_asks():
     assert "12.3 ± 0.2 % less from 97.5 ± 0.1 s on" in story.sentence(dropped)
     late = Difference("gps_latency", "sensor", {"delay": Compared(0.1, 0.22, 0.004, "s")})
     assert "0.220 ± 0.004 s (simulation 0.100 s)" in story.sentence(late)
+
+
+def test_what_a_flight_does_not_tell_apart_is_said_in_headline_and_sentence():
+    thrust = Difference(
+        "thrust_scale", "vehicle", {"ratio": Compared(1.0, 1.29, 0.08, "1")}, rivals=("drag",)
+    )
+    assert named(thrust) == "thrust by mass or drag"
+    assert story.sentence(thrust).endswith("; or it is drag: this flight does not tell which.")
+    assert "or it is" not in story.sentence(replace(thrust, rivals=()))
+    assert named(replace(thrust, level="sensor")) == "thrust by mass"
