@@ -65,7 +65,8 @@ def sentence(d: Difference) -> str:
     others = instead(d)
     if not others:
         return said
-    return f"{said.removesuffix('.')}; or it is {' or '.join(others)}: this flight does not tell which."
+    more = f"or it is {' or '.join(others)}: this flight does not tell which."
+    return f"{said.removesuffix('.')}; {more}"
 
 
 def _alone(d: Difference) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from onboard.answers.flown_again import ARDUPILOT, BUILT_IN, FlownAgain, Part, flown_again
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
+from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.errors import RecordingError, UsageError
 
 if TYPE_CHECKING:
@@ -123,7 +124,8 @@ def _by_built_in(result: Match, recording: Path, folder: Path, binary: Path | No
 
     del binary
     nominal, found = folder / "nominal.tlog", folder / "again.tlog"
-    plain = Wing() if result.vehicle.vehicle == "plane" else Airframe()
+    plane = result.vehicle.vehicle == "plane"
+    plain = as_sitl(Wing(), altitude_of(result)) if plane else Airframe()
     air = air_of(result)
     try:
         fly_again(recording, plain, Air(), nominal, recorded_in=air)
@@ -147,8 +149,11 @@ def craft_of(result: Match) -> Airframe | Wing:
             keys["hover_throttle"] = Wing().hover_throttle / ratio
         ratios = [s.value for s in result.settings if s.name == "SIM_ARSPD_RATIO"]
         if ratios:
-            keys["airspeed_ratio"] = ratios[0]
-        return Wing.from_dict(keys)
+            # The autopilot of the recording may have another ratio set than the built-in one has.
+            usual = Wing().airspeed_ratio
+            told = result.real.signals.parameters.get("ARSPD_RATIO", usual)
+            keys["airspeed_ratio"] = ratios[0] * usual / told
+        return as_sitl(Wing.from_dict(keys), altitude_of(result))
     for effect, unknown, key in (
         ("motor_lag", "motor_lag.time_constant", "motor_lag"),
         ("ground_effect", "ground_effect.gain", "ground_effect"),
@@ -156,6 +161,23 @@ def craft_of(result: Match) -> Airframe | Wing:
         if effect in names and unknown in v.numbers:
             keys[key] = max(v.numbers[unknown].real, 0.0)
     return Airframe.from_dict(keys)
+
+
+def as_sitl(wing: Wing, altitude: float) -> Wing:
+    """The wing on which the air presses as on ArduPilot's at this altitude, m.
+
+    ArduPilot's plane takes the density twice: coefficients that are handed back are meant for that
+    (:mod:`onboard.core.vehicle.plane_airframe`), and the built-in plane takes it once.  So its area
+    is as much smaller as the air is thinner; induced drag by lift stays what it is.
+    """
+    once = float(density(altitude)) / SEA_LEVEL_DENSITY
+    return replace(wing, s=wing.s * once, oswald=wing.oswald * once)
+
+
+def altitude_of(result: Match) -> float:
+    """Mean altitude of the flight above mean sea level, m."""
+    wind = result.vehicle.wind
+    return result.real.ground + (0.0 if wind is None else wind.height)
 
 
 def air_of(result: Match) -> Air:

@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 
 from onboard.answers.flown_again import Courses, beside, flown_again, numbers_twice
+from onboard.answers.match import Setting
 from onboard.cli import match_verify
 from onboard.cli.main import run
-from onboard.cli.match_verify import air_of, craft_of
+from onboard.cli.match_verify import air_of, altitude_of, as_sitl, craft_of
+from onboard.core.vehicle.atmosphere import density
+from onboard.core.vehicle.plane_airframe import MASS_KG, PlaneAirframe
 from onboard.core.vehicle.records import Compared, Difference
 from onboard.errors import UsageError
 from onboard.report.match import match_html
 from sitl.builtin.airframe.air import Air
 from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.airframe.frame import Airframe
+from sitl.builtin.airframe.wing import Wing
 from sitl.recording import FlightSpec, write_tlog
 from tests.report.html_page import Page
 from tests.report.matches_by_hand import by_hand
@@ -70,6 +74,22 @@ def test_thrust_is_compared_with_the_first_flights_and_not_with_the_frame_that_h
         assert twice.agrees is agrees
 
 
+def test_the_air_presses_on_the_built_in_plane_as_on_ardupilots():
+    """Whose coefficients are meant for the density taken twice; at 2000 m that is a fifth."""
+    ours, theirs = as_sitl(Wing(), 2000.0), PlaneAirframe()
+    rho, speed = density(2000.0), 22.0
+    alpha, still = np.array([0.06]), np.zeros(1)
+    pressure = np.array([0.5 * rho * speed**2])
+    lift, drag = ours.coefficients(alpha)
+    by_mass = theirs.pressure(rho, np.array(speed)) * MASS_KG
+    force = ours.force(alpha, still, still, pressure)[0]
+    assert np.linalg.norm(force) == pytest.approx(by_mass * np.hypot(lift[0], drag[0]))
+    np.testing.assert_allclose(ours.coefficients(alpha), Wing().coefficients(alpha))
+    assert as_sitl(Wing(), 0.0).s == pytest.approx(Wing().s)
+    match: Any = replace(by_hand(), real=SimpleNamespace(ground=580.0))
+    assert altitude_of(match) == pytest.approx(580.0 + match.vehicle.wind.height)
+
+
 def test_the_air_that_is_flown_is_the_air_that_was_found():
     match = by_hand()
     assert air_of(match) == Air(north=-3.0, east=4.0)
@@ -85,6 +105,18 @@ def test_the_airframe_that_is_flown_has_the_keys_of_the_frame_file():
     craft = craft_of(match)
     assert craft.mdrag_coef == 0.4
     assert craft.motor_vector == (0.06, 0.0, -1.0)
+
+
+def test_an_airspeed_sensor_errs_by_the_ratio_that_is_set_over_the_right_one():
+    """Set to 1.6 where 2.0 is right: the built-in autopilot has 2.0 set."""
+    real: Any = SimpleNamespace(
+        ground=0.0, signals=SimpleNamespace(parameters={"ARSPD_RATIO": 1.6})
+    )
+    setting = Setting("SIM_ARSPD_RATIO", 2.0, 0.01, "airspeed_scale")
+    match = replace(by_hand(vehicle="plane"), real=real, settings=(setting,), frame={})
+    craft = craft_of(match)
+    assert isinstance(craft, Wing)
+    assert Wing().airspeed_ratio / craft.airspeed_ratio == pytest.approx(1.6 / 2.0)
 
 
 def test_a_recording_that_cannot_be_flown_again_is_named(tmp_path, capsys):
