@@ -14,6 +14,7 @@ from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
 from onboard.recordings.bulk import no_collection
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
+from onboard.recordings.dataflash_formats import parse_format
 from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
 from onboard.recordings.dataflash_records import (
     CONVERTERS,
@@ -22,7 +23,7 @@ from onboard.recordings.dataflash_records import (
     Batch,
     record_times,
 )
-from onboard.recordings.dataflash_walk import MAGIC
+from onboard.recordings.dataflash_walk import FMT_LENGTH, MAGIC
 from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 
 BLOCK = 4096
@@ -31,9 +32,19 @@ WANTED = frozenset(CONVERTERS) | {"GPA"}
 
 
 def is_dataflash(head: bytes) -> bool:
-    """Whether a file that begins so is a DataFlash log: a record header followed by FMT."""
-    at = head.find(MAGIC + b"\x80")
-    return 0 <= at < len(head) - 3
+    """Whether a file that begins so is a DataFlash log: with an FMT record, or one that is whole.
+
+    Three bytes are not enough: packets of one telemetry log in 250 have them by chance.
+    """
+    start = MAGIC + b"\x80"
+    at = head.find(start)
+    while at > 0:
+        record = head[at : at + FMT_LENGTH]
+        layout = parse_format(record) if len(record) == FMT_LENGTH else None
+        if layout is not None and layout.dtype is not None and layout.columns:
+            return True
+        at = head.find(start, at + 1)
+    return at == 0
 
 
 def open_dataflash(path: Path) -> Recording:

@@ -17,9 +17,10 @@ from onboard.core.inputs.samples import (
     VehicleState,
 )
 from onboard.errors import RecordingError
-from onboard.recordings.opening import open_recording
+from onboard.mavlink.dialect import mavlink
+from onboard.recordings.opening import kind_of, open_recording
 from tests.recordings.dataflash_writer import modern_log, old_log
-from tests.recordings.telemetry_writer import px4_log, telemetry
+from tests.recordings.telemetry_writer import TelemetryWriter, px4_log, telemetry
 
 LOGS = {
     "modern.BIN": bytes(modern_log(1)),
@@ -41,6 +42,23 @@ def test_the_kind_is_found_from_the_content(tmp_path):
         "mavlink.tlog": "tlog",
         "px4.ulg": "ulog",
     }
+
+
+def test_telemetry_in_which_a_dataflash_header_stands_by_chance_is_telemetry(tmp_path):
+    """Three bytes of 64 KiB: one log in 250 has them."""
+    log = TelemetryWriter()
+    log.add(mavlink.MAVLink_statustext_message(6, b"\xa3\x95\x80\x07\x20FM"))
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(bytes(log) + LOGS["mavlink.tlog"])
+    assert b"\xa3\x95\x80" in path.read_bytes()
+    assert open_recording(path).kind == "tlog"
+
+
+@pytest.mark.parametrize("lost", [1, 100])
+def test_a_dataflash_log_that_begins_in_the_middle_is_one(tmp_path, lost):
+    path = tmp_path / "flight.dat"
+    path.write_bytes(LOGS["modern.BIN"][lost:])
+    assert kind_of(path) == "dataflash"
 
 
 @pytest.mark.parametrize(
