@@ -13,7 +13,8 @@ from pathlib import Path
 from onboard.cli.main import run
 from tests.batches.logs import write
 
-LOGS = {f"{k}.BIN": 3 + k for k in range(6)}
+LOGS = {f"{k}.BIN": 3 + k for k in range(30)}
+"""So many that no machine is through with them before it is noticed that two are done."""
 LIMIT_S = 120.0
 
 
