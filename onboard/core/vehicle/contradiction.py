@@ -2,7 +2,8 @@
 
 Turned by the attitude, the force is what the velocity changes by, gravity taken off: no airframe
 and no air has a part in that.  Where it is not so by far, one of the three is wrong (a marker that
-cameras took for another, a filter that was lost), and what a model finds there is nothing.
+cameras took for another, a filter that was lost), and what a model finds there is nothing.  Level
+alone: many a receiver has no vertical speed, and what is made of its height lags in a climb.
 """
 
 from __future__ import annotations
@@ -51,12 +52,12 @@ def contradiction(pieces: Sequence[tuple[Array, Array]]) -> Contradiction:
 
     Args:
         pieces: times (k,), s, and by how much the velocity is off the integral of force, attitude
-            and gravity there, (k, 3), m/s, but for a constant; NaN where it is not believed.
+            and gravity there, (k, 3), m/s, NED, but for a constant; NaN where it is not believed.
     """
     sizes: list[float] = []
     for t, apart in pieces:
-        known = np.all(np.isfinite(apart), axis=1)
-        at, off = t[known], apart[known]
+        known = np.all(np.isfinite(apart[:, :2]), axis=1)
+        at, off = t[known], apart[known, :2]
         if len(at) == 0:
             continue
         for start in np.arange(at[0], at[-1] - CONTRADICTION_S, CONTRADICTION_S):

@@ -51,3 +51,9 @@ def test_velocities_that_are_not_believed_say_nothing():
     assert contradiction([(t, off)]).seconds == 0.0
     assert contradiction([(t, np.full_like(off, np.nan))]) == Contradiction()
     assert contradiction([]) == Contradiction()
+
+
+def test_a_vertical_speed_that_lags_in_a_climb_contradicts_nothing():
+    t, off = wander(4)
+    off[:, 2] += 10.0 * np.sin(t)
+    assert contradiction([(t, off)]).seconds == 0.0
