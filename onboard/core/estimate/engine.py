@@ -276,7 +276,7 @@ class Engine:
             if not self.point.stands_for(at):
                 self._move(at, self.noise)
                 ready = Preparations()
-        self._move(at, self.noise)
+        self._move(at, search.best(self.noise))
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = self.shift(self.point, point)

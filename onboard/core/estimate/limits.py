@@ -31,8 +31,7 @@ WORTH_A_SEARCH: Final = 0.5
 a level is as uncertain as that by itself, and with it two ways to the same flight differ by less
 than a tenth of a sigma (0.19 with 2.0) [probability]."""
 MOST_ROUNDS: Final = 24
-"""Passes of a refinement, at the most; a search takes two a step, and from where a flight begins
-some four to six steps [cost]."""
+"""Passes of a refinement, at the most: a search takes five to ten of them [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
 """Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
 worth another pass [cost]."""

@@ -1,4 +1,4 @@
-"""The search for noise levels, pass by pass: a stencil, a line search along its step, and again."""
+"""The search for noise levels, pass by pass: each tells how good the last step was, and goes on."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.estimate.limits import WORTH_A_SEARCH
-from onboard.core.filter.noise import NoiseLevels, line_search, stencil
-from onboard.core.filter.noise_step import NoiseStep, newton_step
+from onboard.core.filter.limits import SHARES
+from onboard.core.filter.noise import NoiseLevels, between, log_prior, neighbours
+from onboard.core.filter.noise_step import scoring_step
 from onboard.core.maths.arrays import Array
 
 
@@ -17,41 +18,43 @@ class NoiseSearch:
 
     def __init__(self, *, settled: bool = False) -> None:
         """Take whether the levels stand, without a search."""
-        self._step: NoiseStep | None = None
-        self._members: tuple[NoiseLevels, ...] = ()
+        self._before: NoiseLevels | None = None
+        self._way: list[NoiseLevels] = []
         self.settled = settled
-        """Whether another step is expected to gain too little to be worth its passes."""
+        """Whether another step is expected to gain too little to be worth its pass."""
 
     def members(self, levels: NoiseLevels) -> tuple[NoiseLevels, ...]:
         """Levels of the next pass's bank, the first of them ``levels``."""
         if self.settled:
-            self._members = (levels,)
-        elif self._step is None:
-            self._members = stencil(levels)
-        else:
-            self._members = line_search(levels, self._step.levels)
-        return self._members
+            return (levels,)
+        self._way = [] if self._before is None else between(self._before, levels, SHARES)
+        return (levels, *self._way, *neighbours(levels))
 
     def better(
         self, levels: NoiseLevels, log_likelihoods: Sequence[float], trades: Array
     ) -> NoiseLevels:
-        """Levels from here on, from what the bank of :meth:`members` has shown.
+        """Levels to go on with, from what the bank of :meth:`members` has shown.
 
         Args:
-            levels: those that held.
+            levels: those of the first member.
             log_likelihoods: of the B members.
             trades: (B, B) as in :class:`~onboard.core.filter.passes.Pass`.
         """
         if self.settled:
             return levels
-        if self._step is None:
-            self._step = newton_step(levels, log_likelihoods, trades)
-            self.settled = self._step.gain < WORTH_A_SEARCH
-            return levels
+        near = 1 + len(self._way)
         rise = np.array(log_likelihoods) - log_likelihoods[0]
-        best, step, self._step = int(np.argmax(rise)), self._step, None
-        # Where it rises by next to nothing along the step, another one is not worth it; nor where
-        # it is the parabola that it was taken for, for then its top has been reached.
-        reached = abs(float(rise[-1]) - step.gain) < WORTH_A_SEARCH and not step.cut
-        self.settled = reached or float(rise[best]) < WORTH_A_SEARCH
-        return self._members[best]
+        likely = rise[:near] + [log_prior(tried) for tried in (levels, *self._way)]
+        best = int(np.argmax(likely))
+        if best:
+            # The step was too long.  If no part of it was any good, then no other step will be.
+            self.settled, self._before = best == 1, None
+            return self._way[best - 1]
+        step = scoring_step(levels, rise[near:], trades[near:, near:])
+        self.settled = step.gain < WORTH_A_SEARCH
+        self._before = levels
+        return levels if self.settled else step.levels
+
+    def best(self, levels: NoiseLevels) -> NoiseLevels:
+        """The likeliest levels that a pass has seen, if it ends with ``levels`` to be tried yet."""
+        return levels if self.settled or self._before is None else self._before

@@ -34,7 +34,7 @@ def whiten(carried: Array, z: Array, reading: Reading, noise: Array) -> Whitenin
         np.empty((r, z.shape[1])),
         np.empty((members, r, columns)),
         np.zeros((r, r)),
-        np.empty(members),
+        np.empty((members, r)),
     )
     if loops.whiten(carried, z, reading.number, noise, *made):
         raise np.linalg.LinAlgError("the covariance of the innovations is not positive")

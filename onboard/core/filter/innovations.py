@@ -178,6 +178,7 @@ class WhitenedInnovations:
         t: time of the epoch, s.
         y: (B, r) whitened innovations at ``theta = 0``, dimensionless.
         h: (B, r, m) their regressors: at ``theta`` they are ``y - h theta``.
+        log_var: (B, r) log variance of each before whitening, given those before it.
         log_det: (B,) log determinant of the covariance before whitening, and what else is taken off
             twice the log-likelihood.
         velocities: how many of the r are of velocity: they come first.
@@ -192,6 +193,7 @@ class WhitenedInnovations:
     t: float
     y: Array
     h: Array
+    log_var: Array
     log_det: Array
     velocities: int
     height: bool

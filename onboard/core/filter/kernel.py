@@ -69,13 +69,14 @@ class Whitening(NamedTuple):
         W: (B, r, C) whitened innovations of all that is carried: ``y`` (column 0), its regressors
             ``h``, then the transposed Kalman gain with the sign changed, then others.
         whitener: (r, r) of member 0: inverse of ``L``, with ``L L^T`` the innovations' covariance.
-        log_det: (B,) log determinants of the innovations' covariances.
+        log_var: (B, r) log variances of the innovations before whitening, each given those before
+            it: their sum is the log determinant of the covariance.
     """
 
     E: Array
     W: Array
     whitener: Array
-    log_det: Array
+    log_var: Array
 
 
 Run = Callable[..., int]
@@ -212,8 +213,8 @@ def whiten(carried: Array, z: Array, reading: Reading, noise: Array) -> Whitenin
     np.einsum("bii->bi", S)[:] += noise[:, reading.first]
     L = np.linalg.cholesky(S)
     whitener = np.linalg.inv(L)
-    log_det = 2.0 * np.log(np.einsum("bii->bi", L)).sum(axis=1)
-    return Whitening(E[0, :, :m1], whitener @ E, whitener[0], log_det)
+    log_var = 2.0 * np.log(np.einsum("bii->bi", L))
+    return Whitening(E[0, :, :m1], whitener @ E, whitener[0], log_var)
 
 
 def take(carried: Array, made: Whitening, reading: Reading, gram: Array | None) -> None:

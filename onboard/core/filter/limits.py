@@ -147,11 +147,17 @@ levelled with.  So with the heading, whose error goes with the manoeuvre, too: t
 have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
 1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
 sealed ones, which it was not made from]."""
-STENCIL_FACTOR: Final = 2.0
-"""Ratio between neighbouring points of the stencil [cost: only the order of magnitude matters]."""
-LINE_SHARES: Final = (0.25, 0.5, 1.0)
-"""Shares of a step that a line search tries: levels that trade with each other make the whole too
-long [cost]."""
+USUAL_SIGMA: Final = math.log(10.0)
+"""Log ratio between a level and the usual one, one sigma: of what sensors and vehicles do to noise
+no more is known than its order of magnitude [data sheets]."""
+NUDGE: Final = 0.01
+"""Log ratio between a level and its neighbour, which tell a slope: as small as rounding allows by
+far [cost]."""
+LONGEST_STEP: Final = 1.4
+"""Log ratio by which a step changes a level at the most, fourfold: past it neither slope nor
+information are those of before [cost]."""
+SHARES: Final = (0.0, 0.25, 0.5)
+"""Shares of a step that are tried beside the whole of it, in case it was too long [cost]."""
 
 # Noise in the regressors (regressor_noise).
 

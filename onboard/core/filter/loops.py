@@ -160,7 +160,7 @@ def predict(
 
 
 @compiled(
-    "i8(f8[:,:,::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[::1])"
+    "i8(f8[:,:,::1], f8[:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])"
 )
 def whiten(
     carried: Array,
@@ -170,9 +170,9 @@ def whiten(
     E: Array,
     W: Array,
     whitener: Array,
-    log_det: Array,
+    log_var: Array,
 ) -> int:
-    """Innovations of the numbers ``number`` into E, W, whitener and log_det.
+    """Innovations of the numbers ``number`` into E, W, whitener and log_var.
 
     Returns:
         0, or the first (from 1) whose covariance is not positive.
@@ -180,7 +180,6 @@ def whiten(
     m1, r, columns = z.shape[1], len(number), carried.shape[2]
     L = np.empty((r, r))
     for b in range(len(carried)):
-        log_det[b] = 0.0
         for a in range(r):
             i = number[a]
             row, one, two = W[b, a], carried[b, i], carried[b, i + ERRORS]
@@ -204,7 +203,7 @@ def whiten(
                     return a + 1
                 else:
                     L[a, a] = np.sqrt(x)
-                    log_det[b] += np.log(x)
+                    log_var[b, a] = np.log(x)
         for a in range(r):
             row = W[b, a]
             for k in range(a):

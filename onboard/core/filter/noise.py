@@ -1,10 +1,11 @@
 """Noise levels of the whitening filter and their estimation from the data.
 
-The levels are found by maximum likelihood.  One pass over the data runs a filter bank on a
-*stencil* of levels: the centre, and every level up and down by a factor, which tells a step
-(:mod:`onboard.core.filter.noise_step`).  The next pass is a *line search*: it tries shares of that
-step and takes the likeliest.  The honesty of sigmas is checked again by the residuals
-(:mod:`onboard.core.estimate.solution`).
+The levels are the likeliest after the flight and what is known of them beforehand, which keeps
+those that a flight says nothing of where they usually are.  One pass over the data runs a filter
+bank: the levels that it is at; for each of them a neighbour, a nudge away, which tell the slope and
+Fisher's information, and with them a step (:mod:`onboard.core.filter.noise_step`); and points on
+the way that the last step came, in case it was too long.  The honesty of sigmas is checked again by
+the residuals (:mod:`onboard.core.estimate.solution`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from onboard.core.filter.limits import LIMITS, LINE_SHARES, STENCIL_FACTOR
+from onboard.core.filter.limits import LIMITS, NUDGE, USUAL_SIGMA
+from onboard.core.maths.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,9 @@ class NoiseLevels:
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
 
+USUAL = NoiseLevels()
+"""Levels that a flight is expected to have."""
+
 ESTIMATED = (
     "velocity",
     "velocity_colour",
@@ -77,49 +82,35 @@ ESTIMATED = (
 )
 
 
-def triple(level: float, limits: tuple[float, float]) -> tuple[float, float]:
-    """Two more values of a level: one to each side, or both to the inner side of a limit."""
-    low, high = limits
-    lower, upper = max(level / STENCIL_FACTOR, low), min(level * STENCIL_FACTOR, high)
-    # A value clipped to (nearly) the centre itself would bend the parabola: take a half step in.
-    if level / lower < STENCIL_FACTOR**0.25:
-        lower = level * STENCIL_FACTOR**0.5
-    elif upper / level < STENCIL_FACTOR**0.25:
-        upper = level / STENCIL_FACTOR**0.5
-    return lower, upper
+def log_prior(levels: NoiseLevels, names: Sequence[str] = ESTIMATED) -> float:
+    """Of levels beforehand, up to a constant: log-normal about the usual ones."""
+    off = [getattr(levels, n) / getattr(USUAL, n) for n in names]
+    return -0.5 * float(np.square(np.log(off) / USUAL_SIGMA).sum())
 
 
-def stencil(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[NoiseLevels, ...]:
-    """The centre, then two other values of each level in ``names``, one level at a time."""
-    return (
-        centre,
-        *(
-            replace(centre, **{name: value})
-            for name in names
-            for value in triple(getattr(centre, name), LIMITS[name])
-        ),
-    )
+def nudges(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> Array:
+    """(n,) log ratios that :func:`neighbours` are apart from ``centre``, inside the limits."""
+    out = [
+        NUDGE if getattr(centre, name) * np.exp(NUDGE) <= LIMITS[name][1] else -NUDGE
+        for name in names
+    ]
+    return np.array(out)
 
 
-def line_search(centre: NoiseLevels, target: NoiseLevels) -> tuple[NoiseLevels, ...]:
-    """The centre, then the shares :data:`LINE_SHARES` of the way to ``target``, in log-levels."""
-    return (
-        centre,
-        *(
-            NoiseLevels(
-                *(
-                    getattr(centre, f.name)
-                    * (getattr(target, f.name) / getattr(centre, f.name)) ** share
-                    for f in fields(NoiseLevels)
-                )
+def neighbours(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[NoiseLevels, ...]:
+    """One for each level in ``names``, which is nudged, the others being those of ``centre``."""
+    apart = np.exp(nudges(centre, names)).tolist()
+    return tuple(centre.scaled(name, by) for name, by in zip(names, apart, strict=True))
+
+
+def between(start: NoiseLevels, end: NoiseLevels, shares: Sequence[float]) -> list[NoiseLevels]:
+    """Levels at some shares of the way from ``start`` to ``end``, in log-levels."""
+    return [
+        NoiseLevels(
+            *(
+                getattr(start, f.name) * (getattr(end, f.name) / getattr(start, f.name)) ** share
+                for f in fields(NoiseLevels)
             )
-            for share in LINE_SHARES
-        ),
-    )
-
-
-def distance(a: NoiseLevels, b: NoiseLevels) -> float:
-    """Largest absolute log ratio of any level."""
-    return max(
-        abs(float(np.log(getattr(a, f.name) / getattr(b, f.name)))) for f in fields(NoiseLevels)
-    )
+        )
+        for share in shares
+    ]

@@ -53,7 +53,7 @@ class Gone(NamedTuple):
         first_row: (n + 1,) where the whitened innovations of each begin, and where the last end.
         rows: (B, r, m + 1) the innovations: ``y``, then ``h``.
         raw: (r, m + 1) those of member 0 before whitening.
-        log_det: (B,) sum of the log determinants of their covariances.
+        log_var: (B, r) log variances of each before whitening.
         states: (n, 15) velocity innovation (3, NaN where there is none), attitude (9) and velocity
             (3) after each epoch.
     """
@@ -66,7 +66,7 @@ class Gone(NamedTuple):
     first_row: Index
     rows: Array
     raw: Array
-    log_det: Array
+    log_var: Array
     states: Array
 
     def noted(self, ready: Epochs, bias_b: Array) -> list[EpochState]:
@@ -131,6 +131,7 @@ class OrdinaryFlight:
         n, most, m1 = len(numbers), int(numbers.sum()), made.m + 1
         self._rows = np.empty((len(made.bank), most, m1))
         self._raw = np.empty((most, m1))
+        self._log_var = np.empty((len(made.bank), most))
         self._taken = np.empty(n, dtype=np.int64)
         self._states = np.empty((n, 15))
         self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
@@ -145,7 +146,6 @@ class OrdinaryFlight:
         """
         made, steps, epochs = self._filter, self._ready.steps, self._ready.epochs
         progress = np.array([step, 0, 0, made.updates])
-        log_det = np.zeros(len(made.bank))
         made.R_nb = np.array(made.R_nb)
         levels, gram = made.variances, made.noise_gram
         pending = self._run(
@@ -182,13 +182,13 @@ class OrdinaryFlight:
             np.zeros(3) if gram is None else gram,
             self._rows,
             self._raw,
-            log_det,
+            self._log_var,
             self._taken,
             self._states,
         )
-        return self._gone(step, progress, log_det, pending=bool(pending))
+        return self._gone(step, progress, pending=bool(pending))
 
-    def _gone(self, step: int, progress: Index, log_det: Array, *, pending: bool) -> Gone:
+    def _gone(self, step: int, progress: Index, *, pending: bool) -> Gone:
         """What a call has done, from step number ``step`` on; the filter's time follows."""
         made = self._filter
         after, rows, count, made.updates = progress.tolist()
@@ -208,7 +208,7 @@ class OrdinaryFlight:
             first,
             self._rows[:, :rows],
             self._raw[:rows],
-            log_det,
+            self._log_var[:, :rows],
             self._states[:count],
         )
 

@@ -203,7 +203,7 @@ class Pass:
         if made is None:
             return
         sums.add(made.y, made.h, made.log_det)
-        self._compare(made.y, made.h)
+        self._compare(made.y, made.h, made.log_var)
         self._note(made, result)
         if made.velocities and self.keep_states:
             result.states.append(self._state(made))
@@ -214,8 +214,8 @@ class Pass:
         if not len(gone.epochs):
             return
         result.epochs += len(gone.epochs)
-        sums.add_rows(gone.rows, gone.log_det)
-        self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:])
+        sums.add_rows(gone.rows, gone.log_var.sum(axis=1))
+        self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_var)
         with_velocity = gone.epochs[gone.velocities > 0]
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
@@ -225,13 +225,14 @@ class Pass:
             result.states += gone.noted(ready.epochs, self.bias_b)
         self._estimate(sums, len(gone.epochs))
 
-    def _compare(self, y: Array, h: Array) -> None:
+    def _compare(self, y: Array, h: Array, log_var: Array) -> None:
         """Add to :attr:`trades` what innovations ``y`` (B, r), with regressors, show of it."""
         if len(y) == 1:
             return
-        e = y - h @ self.theta
+        e, s = y - h @ self.theta, log_var / 2.0
         e -= e[0].copy()
-        self.trades += e @ e.T
+        s = s - s[0]
+        self.trades += e @ e.T + s @ s.T
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:
         """Count what was refused, keep the trace if traces are kept."""

@@ -86,12 +86,12 @@ def _sum(white: Array, more: Array, jitter: Array, moving: Array) -> Array:
 
 
 @part
-def _keep(W: Array, E: Array, det: Array, at: int, rows: Array, raw: Array, log_det: Array) -> None:
+def _keep(W: Array, E: Array, var: Array, at: int, rows: Array, raw: Array, log_var: Array) -> None:
     """Write down the innovations of an epoch from row ``at`` on."""
     r, m1 = E.shape
     for b in range(len(W)):
-        log_det[b] += det[b]
         for a in range(r):
+            log_var[b, at + a] = var[b, a]
             for c in range(m1):
                 rows[b, at + a, c] = W[b, a, c]
     for a in range(r):
@@ -126,7 +126,7 @@ def _note(
     " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], i8[::1],"
     " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1],"
     " f8[::1], f8, i8, i8,"
-    " f8[::1], f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1])"
+    " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
     carried: Array,
@@ -162,7 +162,7 @@ def run(
     gram: Array,
     rows: Array,
     raw: Array,
-    log_det: Array,
+    log_var: Array,
     taken: Index,
     states: Array,
 ) -> int:
@@ -205,7 +205,7 @@ def run(
         gram: (3,) of it.
         rows: (B, .., m + 1) whitened innovations are written to.
         raw: (.., m + 1) those of member 0 before whitening.
-        log_det: (B,) is added to.
+        log_var: (B, ..) logarithms of their variances before whitening.
         taken: (n,) epochs that were taken, in order, are written to.
         states: (n, 15) velocity innovation, attitude and velocity after each of them.
 
@@ -247,9 +247,9 @@ def run(
         z = _spread(ned[e], acting, m1)
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
-        det = np.empty(members)
+        var = np.empty((members, r))
         if whiten(
-            carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, det
+            carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, var
         ):
             return 1
         if not _ordinary(W, theta, offered[e], 1 - offered[e, 3], gates, tails):
@@ -261,7 +261,7 @@ def run(
         if progress[3] % symmetry == 0:
             _symmetric(carried, m1)
         at, n = progress[1], progress[2]
-        _keep(W, E, det, at, rows, raw, log_det)
+        _keep(W, E, var, at, rows, raw, log_var)
         taken[n] = e
         _note(carried, R_nb, E, offered[e, 0], theta, states[n])
         progress[0], progress[1], progress[2] = k + 1, at + r, n + 1

@@ -276,7 +276,7 @@ class WhiteningFilter:
         """
         made = self.kernel.whiten(self.carried, z, reading(kinds), white)
         y = made.W[:, :, 0] - made.W[:, :, 1 : self._m1] @ theta
-        out: Array = np.minimum(made.log_det + (y * y).sum(axis=1), ANYTHING[kinds])
+        out: Array = np.minimum(made.log_var.sum(axis=1) + (y * y).sum(axis=1), ANYTHING[kinds])
         return out
 
     def expected_velocity(

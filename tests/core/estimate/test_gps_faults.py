@@ -34,9 +34,10 @@ def told(o):
 
 
 LENGTH_S = {"copter": 300.0, "plane": 240.0}
-# With a third of it spoilt, half of such planes contradict themselves too much to be called
-# calibrated (seeds 15, 17, 18 and 19 of 12 to 19 do not): their errors are within their sigmas too.
-SEED = {"copter": 12, "plane": 17}
+# With a third of it spoilt, almost half of such flights contradict themselves too much to be called
+# calibrated (of seeds 12 to 19 four copters and three planes do not): their errors are within their
+# sigmas, too.
+SEED = {"copter": 16, "plane": 17}
 
 
 @pytest.fixture(scope="module", params=LENGTH_S)

@@ -19,7 +19,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter import kernel
 from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.kernel import NUMPY, Process
-from onboard.core.filter.noise import NoiseLevels, stencil
+from onboard.core.filter.noise import NoiseLevels, neighbours
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
@@ -145,7 +145,7 @@ def test_an_update_is_that_of_the_textbook(who, seed, bank, m, kinds):
     assert_close(made.E, E[0])
     W = made.W[:, :, : m + 1]
     assert_close(np.swapaxes(W, -1, -2) @ W, np.swapaxes(E, -1, -2) @ np.linalg.solve(S, E), 1e-9)
-    assert_close(made.log_det, np.linalg.slogdet(S)[1])
+    assert_close(made.log_var.sum(axis=1), np.linalg.slogdet(S)[1])
     if gram is not None:
         assert_close(
             gram, [np.trace(np.linalg.solve(S[0], H @ P[0, 1 + i] @ H.T)) for i in range(3)], 1e-9
@@ -194,7 +194,7 @@ def relative(N):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bank", [(NoiseLevels(),), stencil(NoiseLevels())], ids=["one", "bank"])
+@pytest.mark.parametrize("bank", [(NoiseLevels(),), neighbours(NoiseLevels())], ids=["one", "bank"])
 @pytest.mark.usefixtures("_preference_kept")
 def test_a_flight_gives_the_same_sums_either_way(engine, bank):
     def sums():
@@ -349,6 +349,30 @@ def test_what_members_change_is_that_of_filters_of_their_own(engine):
         return made, np.concatenate([x.y - x.h @ engine.model.prior for x in traces])
 
     together, first = whitened(bank)
-    alone = np.array([whitened((levels,))[1] - first for levels in bank])
+    alone = [whitened((levels,)) for levels in bank]
+    moved = np.array([y - first for _, y in alone])
+    # Half of the logarithm of the variances, which innovations on their own do not show: the sum
+    # of all of them has to be what the likelihood has it to be.
+    scales = np.diag(together.trades - moved @ moved.T)
     assert together.trades[1, 1] > 1.0
-    np.testing.assert_allclose(together.trades, alone @ alone.T, rtol=1e-9, atol=1e-9)
+    assert scales[0] == 0.0
+    shift = [(made.sums.log_det[0] - together.sums.log_det[0]) / 2.0 for made, _ in alone]
+    assert np.all(scales[1:] > np.square(shift[1:]) / together.sums.rows)  # Cauchy and Schwarz
+    np.testing.assert_allclose(
+        together.sums.log_det, [made.sums.log_det[0] for made, _ in alone], rtol=1e-9
+    )
+
+
+@pytest.mark.usefixtures("_preference_kept")
+def test_information_of_levels_is_the_curvature_of_their_likelihood(engine):
+    """Fisher's, near the top: the expected curvature, which the flight's own scatters about."""
+    engine.refine()
+    found, names = engine.noise, ("velocity", "height", "height_walk")
+    wide = [found.scaled(n, by) for n in names for by in (np.exp(-0.1), np.exp(0.1))]
+    near = [found.scaled(n, np.exp(0.01)) for n in names]
+    made = Pass(engine.model, engine.point, (found, *wide, *near))
+    for batch in engine.batches:
+        through(made, batch, 10.0)
+    likely = np.array(made.log_likelihoods())
+    curve = (2.0 * likely[0] - likely[1:7:2] - likely[2:7:2]) / 0.1**2
+    np.testing.assert_allclose(np.diag(made.trades)[7:] / 0.01**2, curve, rtol=0.1)

@@ -5,49 +5,47 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.limits import LIMITS, LONGEST_STEP, USUAL_SIGMA
 from onboard.core.filter.noise import (
     ESTIMATED,
+    USUAL,
     NoiseLevels,
-    distance,
-    line_search,
-    stencil,
+    between,
+    log_prior,
+    neighbours,
 )
-from onboard.core.filter.noise_step import bounded, newton_step
+from onboard.core.filter.noise_step import bounded, scoring_step
 
 CENTRE = NoiseLevels()
+STIFF = 1e4
+"""Of the likelihoods: what is known beforehand counts next to nothing beside it."""
 
 
-def parabola(top):
-    """A log-likelihood that is quadratic in every log-level, highest at ``top``."""
-
-    def of(levels):
-        logs = [np.log(getattr(levels, n) / getattr(top, n)) for n in ESTIMATED]
-        return 1234.5 - 7.0 * float(np.square(logs).sum())
-
-    return of
+def logs(levels, names=ESTIMATED):
+    return np.log([getattr(levels, n) for n in names])
 
 
-def changes(levels):
-    """What levels do to innovations that each of them scales by itself."""
-    return np.array([np.log(getattr(levels, n)) for n in ESTIMATED])
+def apart(a, b):
+    """Largest absolute log ratio of any level."""
+    names = [f.name for f in fields(NoiseLevels)]
+    return float(np.abs(logs(a, names) - logs(b, names)).max())
 
 
-def products(members, change=changes):
-    moved = np.array([change(m) - change(members[0]) for m in members])
-    return moved @ moved.T
+def each(top):
+    """Every level by itself: what changes a flight's innovations by how much, from ``top``."""
+    return lambda levels: np.sqrt(STIFF) * (logs(levels) - logs(top))
 
 
-def step(levels, likelihood, change=changes):
-    members = stencil(levels)
-    return newton_step(levels, [likelihood(m) for m in members], products(members, change))
+def step(levels, change):
+    """One step, of the log-likelihood whose innovations ``change`` moves."""
+    moved = np.array([change(m) - change(levels) for m in neighbours(levels)])
+    height = [-0.5 * float(np.square(change(m)).sum()) for m in (levels, *neighbours(levels))]
+    return scoring_step(levels, np.array(height[1:]) - height[0], moved @ moved.T)
 
 
-def climbed(start, likelihood, searches=6, change=changes):
-    levels = start
-    for _ in range(searches):
-        members = line_search(levels, step(levels, likelihood, change).levels)
-        levels = members[int(np.argmax([likelihood(m) for m in members]))]
+def climbed(levels, change, steps=8):
+    for _ in range(steps):
+        levels = step(levels, change).levels
     return levels
 
 
@@ -56,79 +54,80 @@ def climbed(start, likelihood, searches=6, change=changes):
 def test_the_top_is_found_wherever_it_lies_between_the_limits(name, share):
     low, high = LIMITS[name]
     top = replace(CENTRE, **{name: low * (high / low) ** share})
-    assert distance(climbed(CENTRE, parabola(top)), top) < 0.01
+    assert apart(climbed(CENTRE, each(top)), top) < 0.01
 
 
 @pytest.mark.parametrize("name", ESTIMATED)
 @pytest.mark.parametrize("end", [0, 1])
 def test_from_a_limit_it_comes_back_to_a_top_just_inside(name, end):
-    """At a limit one side cannot be tried: the other has to tell where the top is."""
     limit = LIMITS[name][end]
     start = replace(CENTRE, **{name: limit})
     top = replace(CENTRE, **{name: limit * (1.3, 1 / 1.3)[end]})
-    assert distance(step(start, parabola(top)).levels, top) < 0.01
+    assert apart(step(start, each(top)).levels, top) < 0.01
 
 
 @pytest.mark.parametrize("beyond", [0.1, 10.0])
 def test_a_top_beyond_the_limits_ends_at_the_limit(beyond):
     top = replace(CENTRE, velocity=LIMITS["velocity"][beyond > 1.0] * beyond)
-    found = climbed(CENTRE, parabola(top))
+    found = climbed(CENTRE, each(top))
     assert found.velocity == pytest.approx(LIMITS["velocity"][beyond > 1.0])
 
 
-def test_a_star_has_three_different_values_of_every_level_inside_its_limits():
+def test_neighbours_differ_in_one_level_inside_its_limits():
     for edge in (0, 1):
         centre = replace(CENTRE, **{n: LIMITS[n][edge] for n in ESTIMATED})
-        members = stencil(centre)
-        for i, name in enumerate(ESTIMATED):
-            values = [getattr(m, name) for m in (centre, *members[1 + 2 * i : 3 + 2 * i])]
-            assert len(set(values)) == 3
-            assert all(LIMITS[name][0] <= v <= LIMITS[name][1] for v in values)
-            others = [n for n in ESTIMATED if n != name]
-            assert all(getattr(members[1 + 2 * i], n) == getattr(centre, n) for n in others)
+        for name, one in zip(ESTIMATED, neighbours(centre), strict=True):
+            assert 0.005 < apart(one, centre) < 0.02
+            assert LIMITS[name][0] <= getattr(one, name) <= LIMITS[name][1]
+            assert replace(one, **{name: getattr(centre, name)}) == centre
 
 
-def test_a_flat_likelihood_moves_nothing():
-    still = step(CENTRE, lambda _: 5.0)
-    assert still.levels == CENTRE
+def test_a_flight_that_says_nothing_leaves_levels_where_they_usually_are():
+    """A decade is a sigma of what is known beforehand."""
+    off = replace(USUAL, velocity=USUAL.velocity * 3.0, jitter=USUAL.jitter * 10.0)
+    found = step(off, lambda _: np.zeros(1))
+    slowed = USUAL.jitter * 10.0 * float(np.exp(-LONGEST_STEP))
+    assert apart(found.levels, replace(USUAL, jitter=slowed)) < 1e-6
+    assert log_prior(USUAL) - log_prior(off) == pytest.approx(
+        0.5 * ((np.log(3.0) / USUAL_SIGMA) ** 2 + 1.0)
+    )
+    still = step(USUAL, lambda _: np.zeros(1))
+    assert still.levels == USUAL
     assert still.gain == 0.0
 
 
-def test_a_line_leads_from_the_centre_to_the_target():
+def test_a_weak_flight_and_what_is_known_beforehand_meet_in_proportion():
+    top = replace(USUAL, velocity=USUAL.velocity * 2.0)
+    weak = 3.0 / USUAL_SIGMA**2
+    found = step(USUAL, lambda levels: np.sqrt(weak) * (logs(levels) - logs(top))).levels
+    assert np.log(found.velocity / USUAL.velocity) == pytest.approx(0.75 * np.log(2.0), rel=1e-3)
+
+
+def test_no_step_is_longer_than_what_slopes_tell():
+    far = replace(CENTRE, velocity=CENTRE.velocity * 30.0)
+    assert apart(step(CENTRE, each(far)).levels, CENTRE) == pytest.approx(LONGEST_STEP)
+
+
+def test_a_way_leads_from_one_end_to_the_other():
     target = replace(CENTRE, velocity=0.4, tilt_walk=1e-3)
-    members = line_search(CENTRE, target)
-    assert members[0] == CENTRE
-    assert distance(members[-1], target) < 1e-12
-    steps = [distance(members[0], m) for m in members]
-    assert steps == sorted(steps)
+    first, middle, last = between(CENTRE, target, (0.0, 0.5, 1.0))
+    assert first == CENTRE
+    assert apart(last, target) < 1e-12
+    assert middle.velocity == pytest.approx(np.sqrt(CENTRE.velocity * 0.4))
     assert {f.name for f in fields(NoiseLevels)} == set(LIMITS)
 
 
-def ridge(levels):
-    """A narrow ridge across two levels: each by itself asks for a step that is too long."""
-    a, b = np.log(levels.force_walk / 0.05), np.log(levels.velocity_colour / 0.1)
-    return -50.0 * (a + b) ** 2 - 0.5 * (a - b) ** 2
-
-
-def changes_on_the_ridge(levels):
-    a, b = np.log(levels.force_walk), np.log(levels.velocity_colour)
-    return np.array([10.0 * (a + b), a - b])
-
-
 def test_levels_that_trade_with_each_other_are_found_in_one_step():
-    """Curvatures alone overshoot; with what two levels change alike it is Newton's own step."""
-    found = step(CENTRE, ridge, changes_on_the_ridge)
-    assert ridge(found.levels) > -1e-3 * abs(ridge(CENTRE))
-    assert found.gain == pytest.approx(ridge(found.levels) - ridge(CENTRE), rel=1e-3)
+    """Slopes alone overshoot on a narrow ridge; with what two levels change alike nothing does."""
 
+    def ridge(levels):
+        a, b = np.log(levels.force_walk / 0.05), np.log(levels.velocity_colour / 0.1)
+        return np.array([100.0 * (a + b), 10.0 * (a - b)])
 
-def test_levels_whose_trade_is_not_known_climb_all_the_same():
-    levels, heights = CENTRE, [ridge(CENTRE)]
-    for _ in range(8):
-        levels = climbed(levels, ridge, searches=1)
-        heights.append(ridge(levels))
-    assert heights == sorted(heights)
-    assert heights[-1] > -1.0
+    found = step(CENTRE, ridge)
+    left, there = np.square(ridge(found.levels)).sum(), np.square(ridge(CENTRE)).sum()
+    assert left < 1e-4 * there
+    assert found.gain == pytest.approx((there - left) / 2.0, rel=1e-2)
 
 
 def test_a_bounded_step_leaves_nothing_to_gain():
