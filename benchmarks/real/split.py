@@ -97,7 +97,10 @@ FLIGHTS = (
 )
 """All of them.  A flight never moves from choosing or judging to another part."""
 
-LOOKS: tuple[str, ...] = ("lower ends of noise levels: as they were, or those of data sheets",)
+LOOKS: tuple[str, ...] = (
+    "lower ends of noise levels: as they were, or those of data sheets",
+    "the search for noise levels: a stencil a factor of two wide, or Fisher's scoring",
+)
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
     "2026-11-23",

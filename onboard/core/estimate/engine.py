@@ -9,7 +9,7 @@ the sums as it was taken.
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
@@ -30,7 +30,7 @@ from onboard.core.estimate.solution import Solution, solve, total
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
-from onboard.core.filter.traces import EpochState, PassResult
+from onboard.core.filter.traces import PassResult, StateLog
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -101,7 +101,7 @@ class Engine:
         self.refused: Counter[str] = Counter()
         self.refused_untuned: Counter[str] = Counter()
         """What the gates refused with the levels from which those that hold were found."""
-        self.states: deque[EpochState] = deque(maxlen=MOST_STATES)
+        self.states = StateLog(MOST_STATES)
         self.trusted_s = 0.0
         self.left_brisk_s = 0.0
         """Of :attr:`brisk_s` what has left the buffer."""
@@ -205,7 +205,8 @@ class Engine:
             self._observer.take(result)
         self.blocks.append(result.block)
         self.refused.update(result.refused)
-        self.states.extend(result.states)
+        if result.states:
+            self.states.add(np.concatenate(result.states))
         self._solution = None
 
     def _age(self) -> None:

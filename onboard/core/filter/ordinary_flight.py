@@ -26,7 +26,7 @@ from onboard.core.filter.limits import (
 )
 from onboard.core.filter.prepared import Prepared
 from onboard.core.filter.readings import Index
-from onboard.core.filter.traces import EpochState, EpochTrace
+from onboard.core.filter.traces import EpochTrace
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -69,21 +69,20 @@ class Gone(NamedTuple):
     log_var: Array
     states: Array
 
-    def noted(self, ready: Epochs, bias_b: Array) -> list[EpochState]:
+    def noted(self, ready: Epochs, bias_b: Array) -> Array:
         """The filter's state after each of the epochs ``ready`` that had a velocity.
+
+        As :func:`~onboard.core.filter.traces.state_row` has it, (k, STATE_NUMBERS).
 
         Args:
             ready: of the segment.
             bias_b: (3,) gyroscope bias, body axes, rad/s.
         """
-        kept = self.states.copy()
-        return [
-            EpochState(t, state[:3], state[3:12].reshape(3, 3), state[12:], bias_b)
-            for t, v, state in zip(
-                ready.t[self.epochs].tolist(), self.velocities.tolist(), kept, strict=True
-            )
-            if v
-        ]
+        some = self.velocities > 0
+        bias = np.broadcast_to(bias_b, (int(some.sum()), 3))
+        t = ready.t[self.epochs[some], None]
+        out: Array = np.concatenate((t, self.states[some], bias), axis=1)
+        return out
 
     def traces(self, ready: Epochs, *, whole: bool) -> list[EpochTrace]:
         """What each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""

@@ -14,7 +14,7 @@ from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
-from onboard.core.filter.traces import EpochState, EpochTrace, PassResult
+from onboard.core.filter.traces import EpochState, EpochTrace, PassResult, state_row
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -206,7 +206,7 @@ class Pass:
         self._compare(made.y, made.h, made.log_var)
         self._note(made, result)
         if made.velocities and self.keep_states:
-            result.states.append(self._state(made))
+            result.states.append(state_row(self._state(made)))
         self._estimate(sums)
 
     def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
@@ -222,7 +222,7 @@ class Pass:
         if self.keep_traces:
             result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
         if self.keep_states:
-            result.states += gone.noted(ready.epochs, self.bias_b)
+            result.states.append(gone.noted(ready.epochs, self.bias_b))
         self._estimate(sums, len(gone.epochs))
 
     def _compare(self, y: Array, h: Array, log_var: Array) -> None:

@@ -13,11 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.limits import (
-    MOST_PREPARED_BYTES,
-    MOST_PREPARED_LIVE_BYTES,
-    NEAR_BIAS_RAD_S,
-)
+from onboard.core.filter.limits import MOST_PREPARED_BYTES, NEAR_BIAS_RAD_S
 from onboard.core.filter.prepared import Prepared
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -82,7 +78,7 @@ class Preparations:
 
     def __init__(self, most_bytes: int | None = None) -> None:
         """Take how much may be kept; None: what the program can spare."""
-        spare = MOST_PREPARED_BYTES if preferred() else MOST_PREPARED_LIVE_BYTES
+        spare = MOST_PREPARED_BYTES if preferred() else 0
         self._room = spare if most_bytes is None else most_bytes
         self._kept: dict[tuple[int, ...], Kept] = {}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +31,52 @@ class EpochState:
     R_nb: Array
     v_n: Array
     bias_b: Array
+
+
+class StateLog:
+    """States after many epochs, the latest.
+
+    Rows of numbers: as objects they are five times as large, and there are thousands of them in
+    every copy of a flight.
+    """
+
+    __slots__ = ("_most", "_parts")
+
+    def __init__(self, most: int) -> None:
+        """Take how many are kept at the least once there are as many."""
+        self._most = most
+        self._parts: deque[Array] = deque()
+
+    def add(self, rows: Array) -> None:
+        """Take the :func:`state_row` of n epochs, (n, STATE_NUMBERS)."""
+        if not len(rows):
+            return
+        self._parts.append(rows)
+        kept = len(self)
+        while kept - len(self._parts[0]) >= self._most:
+            kept -= len(self._parts.popleft())
+
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._parts.clear()
+
+    def __len__(self) -> int:
+        return sum(map(len, self._parts))
+
+    def __iter__(self) -> Iterator[EpochState]:
+        for rows in self._parts:
+            for row in rows:
+                yield EpochState(
+                    float(row[0]), row[1:4], row[4:13].reshape(3, 3), row[13:16], row[16:]
+                )
+
+
+STATE_NUMBERS = 19
+
+
+def state_row(state: EpochState) -> Array:
+    """(1, STATE_NUMBERS) the numbers of a state, in the order of its fields."""
+    return np.hstack((state.t, state.innovation, state.R_nb.ravel(), state.v_n, state.bias_b))[None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +116,14 @@ class PassResult:
 
     Attributes:
         block: its sums.
-        states: after every epoch whose velocity was taken.
+        states: (n, STATE_NUMBERS) each, after every epoch whose velocity was taken.
         traces: of every epoch, if the pass keeps them.
         refused: how many measurements the gates refused, by name.
         epochs: how many fixes were gone through.
     """
 
     block: Block
-    states: list[EpochState] = field(default_factory=list)
+    states: list[Array] = field(default_factory=list)
     traces: list[EpochTrace] = field(default_factory=list)
     refused: dict[str, int] = field(default_factory=dict)
     epochs: int = 0

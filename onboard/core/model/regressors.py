@@ -188,8 +188,7 @@ class Model:
     def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:
         """Evaluate every family on one segment."""
         m, epochs = self.size, len(around.now.t)
-        pushing: list[tuple[slice, Array]] = []
-        turning: list[tuple[slice, Array]] = []
+        force1, force2, turn = (np.zeros((len(intervals.duration), 3, m)) for _ in range(3))
         direct = {key: np.zeros((epochs, 3, m)) for key in ("vb", "vn", "pb", "pn", "ab", "an")}
         along = np.zeros((epochs, m))
         for family in self.families:
@@ -198,10 +197,10 @@ class Model:
                 continue
             a = family.acceleration(intervals.signals)
             if a is not None:
-                pushing.append((s, a))
+                force1[..., s], force2[..., s] = intervals.integrals(a)
             w = family.rate(intervals.signals)
             if w is not None:
-                turning.append((s, w))
+                turn[..., s] = intervals.integrals(w)[0]
             for key, d in (
                 ("v", family.velocity(around)),
                 ("p", family.position(around)),
@@ -213,8 +212,6 @@ class Model:
                     direct[key + "n"][..., s] = d.ned
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        force1, force2 = _integrals(intervals, pushing, m)
-        turn, _ = _integrals(intervals, turning, m)
         return SegmentRegressors(
             force1,
             force2,
@@ -227,16 +224,3 @@ class Model:
             direct["ab"],
             direct["an"],
         )
-
-
-def _integrals(
-    intervals: Intervals, some: Sequence[tuple[slice, Array]], m: int
-) -> tuple[Array, Array]:
-    """Both integrals (K, 3, m) of the columns that there are; most unknowns have none."""
-    K = len(intervals.duration)
-    one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
-    if some:
-        places = np.concatenate([np.arange(s.start, s.stop) for s, _ in some])
-        both = intervals.integrals(np.concatenate([x for _, x in some], axis=-1))
-        one[..., places], two[..., places] = both
-    return one, two
