@@ -7,7 +7,8 @@ from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import through
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.filter.limits import MOST_PREPARED_LIVE_BYTES
+from onboard.core.filter import preparations
+from onboard.core.filter.limits import MOST_PREPARED_BYTES
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -50,7 +51,7 @@ def assert_same_sums(one, two, tolerance):
 
 
 def test_a_pass_with_what_another_has_made_ready_gives_the_same_sums(batches, model):
-    ready = Preparations()
+    ready = Preparations(MOST_PREPARED_BYTES)
     first = passed(model, batches, NoiseLevels(), ready)
     assert len(ready) == len(batches)
     again = passed(model, batches, NoiseLevels(), ready)
@@ -62,7 +63,7 @@ def test_a_pass_with_what_another_has_made_ready_gives_the_same_sums(batches, mo
 
 
 def test_other_noise_and_so_another_bias_of_the_gyroscope_change_next_to_nothing(batches, model):
-    ready = Preparations()
+    ready = Preparations(MOST_PREPARED_BYTES)
     before = passed(model, batches, NoiseLevels(), ready)
     again = passed(model, batches, LOUDER, ready)
     fresh = passed(model, batches, LOUDER)
@@ -75,7 +76,7 @@ def test_other_noise_and_so_another_bias_of_the_gyroscope_change_next_to_nothing
 
 
 def test_what_has_no_room_is_made_anew(batches, model):
-    whole = Preparations()
+    whole = Preparations(MOST_PREPARED_BYTES)
     fresh = passed(model, batches, NoiseLevels(), whole)
     size = sum(kept.size for kept in whole._kept.values())
     most = size // 2
@@ -87,10 +88,18 @@ def test_what_has_no_room_is_made_anew(batches, model):
     assert_same_sums(fresh.sums, again.sums, 1e-12)
 
 
-def test_five_minutes_with_every_effect_are_less_than_what_may_be_kept(batches, model):
-    ready = Preparations()
+def test_twenty_minutes_with_every_effect_are_less_than_what_may_be_kept(batches, model):
+    ready = Preparations(MOST_PREPARED_BYTES)
     passed(model, batches, NoiseLevels(), ready)
     kept = list(ready._kept.values())
     fixes = sum(len(k.ready.epochs) for k in kept)
     per_unknown = sum(k.ready.size for k in kept) / fixes / (model.size + 1)
-    assert per_unknown * 60 * 300 * 5 < MOST_PREPARED_LIVE_BYTES
+    assert per_unknown * 60 * 1200 * 5 < MOST_PREPARED_BYTES
+
+
+@pytest.mark.parametrize("over_recordings", [False, True])
+def test_beside_an_autopilot_nothing_is_kept(batches, model, monkeypatch, over_recordings):
+    monkeypatch.setattr(preparations, "preferred", lambda: over_recordings)
+    ready = Preparations()
+    passed(model, batches, NoiseLevels(), ready)
+    assert bool(len(ready)) is over_recordings
