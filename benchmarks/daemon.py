@@ -38,6 +38,8 @@ from onboard.mavlink.dialect import Message, mavlink
 RATES = {"RAW_IMU": 200.0, "ATTITUDE": 50.0, "GPS_RAW_INT": 10.0}
 LIVE_S = 90.0
 WARM_UP_S = 20.0
+LANDING_S = 40.0
+"""Of a simulated flight: what is measured live ends before; what a landing costs is the day's."""
 DAY_H = 1.0
 FLIGHT_S = 300.0
 """From one flight to the next."""
@@ -166,7 +168,7 @@ def live(seconds: float, speed: float = 1.0) -> tuple[float, float, dict[str, An
             env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         )
         flight = str(Path(folder) / "flight.tlog")
-        in_a_process(record, flight, speed * (seconds + WARM_UP_S + 10.0), RATES).join()
+        in_a_process(record, flight, speed * (seconds + WARM_UP_S) + LANDING_S, RATES).join()
         autopilot = in_a_process(play, port, flight, speed)
         try:
             for line in daemon.stderr or ():

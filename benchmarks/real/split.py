@@ -110,6 +110,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-23-5",
     "2026-11-24",
     "2026-11-24-2",
+    "2026-11-25",
 )
 """Releases that have been judged."""
 
