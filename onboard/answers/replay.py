@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -264,7 +265,8 @@ class Vehicle:
     """Counts the samples and sees to it that the accelerometers stay the same ones."""
 
     def __init__(self) -> None:
-        self.counts: dict[str, int] = {}
+        self._samples: Counter[int] = Counter()
+        self._fixes = 0
         self.standing_s = 0.0
         """Time on the ground, s."""
         self._parameters: dict[str, float] = {}
@@ -277,9 +279,9 @@ class Vehicle:
             RecordingError: it is of another vehicle.
         """
         if isinstance(sample, ImuSample):
-            self._count(f"imu {sample.imu}")
+            self._samples[sample.imu] += 1
         elif isinstance(sample, GpsFix):
-            self._count("gps")
+            self._fixes += 1
         elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
             self._parameters[sample.name] = sample.value
             if sample.name in DEVICE_IDS and sample.value:
@@ -297,13 +299,19 @@ class Vehicle:
             )
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Samples by stream."""
+        counts = {f"imu {imu}": n for imu, n in self._samples.items()}
+        return counts | {"gps": self._fixes} if self._fixes else counts
+
+    @property
     def imus(self) -> tuple[int, ...]:
         """Accelerometers that sent samples."""
-        return tuple(sorted(int(name[4:]) for name in self.counts if name.startswith("imu ")))
+        return tuple(sorted(self._samples))
 
     def silence(self, imu: int) -> str:
         """Why an accelerometer has no answer."""
-        samples = f"accelerometer {imu}: {self.counts[f'imu {imu}']} samples"
+        samples = f"accelerometer {imu}: {self._samples[imu]} samples"
         if self.standing_s > 0.0:
             return (
                 f"{samples}, none of them in the air with trusted GPS; "
@@ -331,6 +339,3 @@ class Vehicle:
     def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
         x, y, z = (self._parameters.get(name, default) for name in names)
         return x, y, z
-
-    def _count(self, name: str) -> None:
-        self.counts[name] = self.counts.get(name, 0) + 1

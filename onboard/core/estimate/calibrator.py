@@ -20,7 +20,7 @@ from onboard.core.estimate.events import Advanced, Event, FlightEnded, Restarted
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.stream_clock import StreamClock
-from onboard.core.gps.distrust import Distrust, WindowClosed
+from onboard.core.gps.distrust import Distrust, WindowClosed, WindowEvent
 from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
@@ -238,7 +238,7 @@ class Calibrator:
         self._clock.hear(sample.t)
         self._assembly.streams.imu(sample, self.parameters)
         # A receiver that fell silent says nothing more: only the passing of time shows it.
-        return events + self._judged(sample)
+        return events + self._counted(self._trust.pass_time(sample.t))
 
     def _attitude(self, sample: AttitudeSample) -> None:
         if self._clock.is_ahead(sample.t):
@@ -248,7 +248,9 @@ class Calibrator:
 
     def _judged(self, sample: Sample) -> tuple[Event, ...]:
         """What the trust window says; outages are counted, for no fix is there to be refused."""
-        events = self._trust.feed(sample)
+        return self._counted(self._trust.feed(sample))
+
+    def _counted(self, events: tuple[WindowEvent, ...]) -> tuple[WindowEvent, ...]:
         for event in events:
             if isinstance(event, WindowClosed) and event.reason is Distrust.GPS_GAP:
                 self._counts[event.reason.value] += 1

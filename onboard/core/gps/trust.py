@@ -126,7 +126,7 @@ class TrustWindow:
             return ()  # a time that is none cannot be put in order: nothing may rest on it
         match sample:
             case ImuSample() | AttitudeSample():
-                return self._tick(sample.t)
+                return self.pass_time(sample.t)
             case GpsFix():
                 return self._fix(sample)
             case EkfHealth():
@@ -159,8 +159,8 @@ class TrustWindow:
             self._last_fix if self._last_fix is not None else 0.0, Distrust.END_OF_DATA
         )
 
-    def _tick(self, t: float) -> tuple[WindowEvent, ...]:
-        """Time has passed: without a fix for too long, the window closes."""
+    def pass_time(self, t: float) -> tuple[WindowEvent, ...]:
+        """Time (s, finite) has passed: without a fix for too long, the window closes."""
         self._now = max(self._now, t)
         if self._phase is not Phase.OPEN or self._last_fix is None:
             return ()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,33 +16,46 @@ from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.limits import BEFORE_NEXT_S, HIGHRES_S
 from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
 from onboard.core.maths.accelerometer import SixParameters
-from onboard.core.maths.arrays import Array, Vector3
+from onboard.core.maths.arrays import Array
 
 
-def untruncated(vector: Vector3, step: float) -> Vector3:
+def untruncated(x: Array, step: float) -> Array:
     """Middles of the intervals that integer truncation toward zero maps to these values.
 
     ``|x|`` in [k, k + 1) steps is sent as k; zero stands for -1 ... 1 and stays zero.
     """
-    if step == 0.0:
-        return vector
-    half = 0.5 * step
-    x, y, z = vector
-    return (
-        x + half if x > 0.0 else x - half if x < 0.0 else x,
-        y + half if y > 0.0 else y - half if y < 0.0 else y,
-        z + half if z > 0.0 else z - half if z < 0.0 else z,
-    )
+    out: Array = x + np.sign(x) * (0.5 * step)
+    return out
+
+
+class _Manner(NamedTuple):
+    """How samples were made of what was measured: resolutions, parameters and board orientation."""
+
+    w_step: float
+    f_step: float
+    six: SixParameters
+    R_bs: Array | None
+
+    def undone(self, rows: Array) -> Array:
+        """Rate, force and temperature (n, 7) with the force raw, and nothing truncated."""
+        w, f = untruncated(rows[:, :3], self.w_step), untruncated(rows[:, 3:6], self.f_step)
+        if self.R_bs is not None:
+            f = f @ self.R_bs
+        raw = f / np.array(self.six.scale) + np.array(self.six.offset)
+        return np.concatenate((w, raw, rows[:, 6:]), axis=1)
 
 
 class ImuTrack:
     """Raw inertial samples of one IMU."""
 
-    __slots__ = ("_arrays", "_rows", "_t", "highres_t", "mismatched", "refused")
+    __slots__ = ("_arrays", "_manners", "_rows", "_t", "highres_t", "mismatched", "refused")
 
     def __init__(self) -> None:
         self._t: list[float] = []
         self._rows: list[tuple[float, ...]] = []
+        """Rate, force and temperature as reported."""
+        self._manners: list[tuple[int, _Manner]] = []
+        """From which row on they were made in which manner: it changes once a flight, if at all."""
         self._arrays: tuple[Array, Array] | None = None
         self.highres_t = -np.inf
         self.mismatched = 0
@@ -56,7 +70,7 @@ class ImuTrack:
         return len(self._t)
 
     def add(self, sample: ImuSample, six: SixParameters, R_bs: Array | None) -> bool:
-        """Undo truncation and parameters, keep the sample; False if it was refused.
+        """Keep the sample, of which truncation and parameters are undone; False if it was refused.
 
         Args:
             sample: as reported.
@@ -74,26 +88,33 @@ class ImuTrack:
         if sample.w_b is None:
             self.refused["imu_without_gyro"] += 1
             return False
-        p, q, r = untruncated(sample.w_b, sample.w_step)
-        x, y, z = untruncated(sample.f_b, sample.f_step)
-        if R_bs is not None:
-            x, y, z = (R_bs.T @ np.array((x, y, z))).tolist()
-        s, o = six.scale, six.offset
-        x, y, z = x / s[0] + o[0], y / s[1] + o[1], z / s[2] + o[2]
-        if not math.isfinite(p + q + r + x + y + z):
+        row = (*sample.w_b, *sample.f_b)
+        if not math.isfinite(sum(row)):
             self.refused["imu_not_finite"] += 1
             return False
         celsius = np.nan if sample.temperature is None else sample.temperature
+        manner = self._manners[-1][1] if self._manners else None
+        if (
+            manner is None
+            or (manner.six is not six and manner.six != six)
+            or manner.R_bs is not R_bs
+            or manner.w_step != sample.w_step
+            or manner.f_step != sample.f_step
+        ):
+            self._manners.append((len(self._t), _Manner(sample.w_step, sample.f_step, six, R_bs)))
         self._arrays = None
         self._t.append(t)
-        self._rows.append((p, q, r, x, y, z, celsius))
+        self._rows.append((*row, celsius))
         return True
 
     def arrays(self) -> tuple[Array, Array]:
         """``t`` (n,) and rows (n, 7): rate, raw, temperature; of all who ask the same ones."""
         if self._arrays is None:
-            n = len(self._t)
-            self._arrays = np.array(self._t), np.array(self._rows).reshape(n, 7)
+            rows = np.array(self._rows).reshape(len(self._t), 7)
+            for k, (first, manner) in enumerate(self._manners):
+                last = self._manners[k + 1][0] if k + 1 < len(self._manners) else len(rows)
+                rows[first:last] = manner.undone(rows[first:last])
+            self._arrays = np.array(self._t), rows
             for array in self._arrays:
                 array.flags.writeable = False
         return self._arrays
@@ -102,6 +123,10 @@ class ImuTrack:
         """Forget what is older than ``t``."""
         i = int(np.searchsorted(self._t, t))
         del self._t[:i], self._rows[:i]
+        manners = [(max(first - i, 0), manner) for first, manner in self._manners]
+        # Of those that begin with the first row that is left, the last is in force there.
+        over = sum(first == 0 for first, _ in manners) - 1
+        self._manners = manners[max(over, 0) :]
         self._arrays = None
 
 

@@ -247,8 +247,8 @@ def exact(sample):
     """Truncation undone, so that other parameters may be applied without another truncation."""
     if not isinstance(sample, ImuSample):
         return sample
-    f = untruncated(sample.f_b, sample.f_step)
-    return dataclasses.replace(sample, f_b=f, f_step=0.0)
+    f = untruncated(np.array(sample.f_b), sample.f_step)
+    return dataclasses.replace(sample, f_b=tuple(f.tolist()), f_step=0.0)
 
 
 @pytest.mark.slow
