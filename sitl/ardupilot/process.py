@@ -21,6 +21,8 @@ FRAMES = {"plane": "plane", "copter": "+"}
 FIRST_PORT = 5760
 PORTS_OF_ONE = (0, 2, 3)
 """Serial ports 0, 1 and 2 listen on these offsets from 5760 + 10 per instance."""
+TAKEN = "Address already in use"
+"""What a binary says of a port that somebody else listens on."""
 AIRFRAME = "airframe.json"
 INSTANCES = range(20, 90)
 PATIENCE = 30.0
@@ -102,6 +104,11 @@ class ArdupilotProcess:
         if self._airframe is not None:
             (folder / AIRFRAME).write_text(json.dumps(dict(self._airframe)))
             model = f"{model}:{AIRFRAME}"  # read relative to where it is started
+        while not await self._listens(folder, model, defaults):
+            pass  # another one was quicker to take the ports: others are free
+
+    async def _listens(self, folder: Path, model: str, defaults: Path) -> bool:
+        """Start it on ports that are free; False if somebody else took them at the same moment."""
         self._instance = _free_instance()
         with (folder / "output.txt").open("wb") as output:
             self._process = await asyncio.create_subprocess_exec(
@@ -117,10 +124,13 @@ class ArdupilotProcess:
         # It opens serial 0 first and waits for a client there: the line says so.
         while "SERIAL0 on TCP port" not in self.output():
             if self._process.returncode is not None:
+                if TAKEN in self.output():
+                    return False
                 raise SitlError(f"{self._binary.name} ended at once: {self.output()[-300:]}")
             if asyncio.get_running_loop().time() > deadline:
                 raise SitlError(f"{self._binary.name} does not listen: {self.output()[-300:]}")
             await asyncio.sleep(0.1)
+        return True
 
     def output(self) -> str:
         """What it has printed."""
