@@ -75,16 +75,18 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
 def _felt(
     engine: Engine, testable: Sequence[Effect], t0: float, batches: Sequence[Batch]
 ) -> Examination:
-    """A flight examined with the force that its samples let one expect.
+    """A flight examined with the force that its samples let one expect, or as it was sampled.
 
-    How much of them is noise, its velocity says: so it is asked for the noise levels twice.
+    What may be noise in the samples may be real, too: the flight is taken as its velocity is
+    likelier.
     """
-    made = Examination(engine, testable, t0=t0, batches=batches)
+    sampled = Examination(engine, testable, t0=t0, batches=batches).with_noise()
     density = spectrum(batches)
     if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
-        return made.with_noise()
-    felt = expected(batches, density, made.tuned().noise.force_walk)
-    return Examination(engine, testable, t0=t0, batches=felt, start=made).with_noise()
+        return sampled
+    expecting = expected(batches, density)
+    felt = Examination(engine, testable, t0=t0, batches=expecting, start=sampled).with_noise()
+    return max(sampled, felt, key=lambda made: made.log_likelihood)
 
 
 def since_reboot(batches: Sequence[Batch]) -> list[Batch]:

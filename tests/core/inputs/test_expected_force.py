@@ -43,9 +43,9 @@ def batches(raw, pieces=8, gap=()):
     return out
 
 
-def of_noise(flight, walk=np.inf):
-    """What is expected of samples whose velocity walks so."""
-    return expected(flight, spectrum(flight), walk)
+def of_noise(flight):
+    """What is expected of the force given the samples."""
+    return expected(flight, spectrum(flight))
 
 
 def felt(made):
@@ -109,12 +109,3 @@ def test_white_noise_is_found_a_little_smaller_than_it_is():
     samples = manoeuvre() + sigma * np.random.default_rng(6).normal(size=(len(T), 3))
     share = white(spectrum(batches(samples))) / (sigma**2 * STEP)
     assert np.all((share > 0.75) & (share < 1.0))
-
-
-def test_a_shake_that_the_velocity_agrees_with_is_left_in():
-    """It looks like noise, but its velocity does not walk: turbulence, not a sensor's error."""
-    samples = manoeuvre() + 0.4 * np.random.default_rng(7).normal(size=(len(T), 3))
-    flight = batches(samples)
-    got = felt(of_noise(flight, walk=0.2 * 0.4 * np.sqrt(STEP)))
-    assert np.std(got - samples) < 0.25 * np.std(felt(of_noise(flight)) - samples)
-    np.testing.assert_allclose(felt(of_noise(flight, walk=0.0)), samples, atol=1e-9)
