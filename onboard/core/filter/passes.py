@@ -70,8 +70,8 @@ class Pass:
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
         self.trades = np.zeros((len(bank), len(bank)))
-        """(B, B) products of what each member changes the whitened innovations by, from member 0's:
-        levels that change them alike trade with each other."""
+        """(B, B) products of what each member changes the whitened innovations, and half of the
+        logarithm of their variance, by from member 0's: Fisher's information of small changes."""
         self.bias_b = np.zeros(3)
         self._preparations = preparations
         self._running = False
@@ -226,7 +226,7 @@ class Pass:
         self._estimate(sums, len(gone.epochs))
 
     def _compare(self, y: Array, h: Array, log_var: Array) -> None:
-        """Add to :attr:`trades` what innovations ``y`` (B, r), with regressors, show of it."""
+        """Add to :attr:`trades` what innovations (B, r), with log variances (B, r), show of it."""
         if len(y) == 1:
             return
         e, s = y - h @ self.theta, log_var / 2.0
