@@ -33,6 +33,10 @@ class EpochState:
     bias_b: Array
 
 
+STATE_NUMBERS = 1 + 3 + 9 + 3 + 3
+"""Of the fields of :class:`EpochState`, in their order."""
+
+
 class StateLog:
     """States after many epochs, the latest.
 
@@ -69,9 +73,6 @@ class StateLog:
                 yield EpochState(
                     float(row[0]), row[1:4], row[4:13].reshape(3, 3), row[13:16], row[16:]
                 )
-
-
-STATE_NUMBERS = 19
 
 
 def state_row(state: EpochState) -> Array:
