@@ -42,6 +42,7 @@ class Fit:
         vehicle: whose.
         imu: accelerometer.
         status: of the calibration, ``failed`` if there is none; then all below is empty.
+        moved: whether the flight went anywhere: a hover excites nothing.
         verdict: of the diagnosis.
         effects: names that were said.
         in_force: (6,) scale and offset with which it was recorded.
@@ -69,6 +70,7 @@ class Fit:
     vehicle: str
     imu: int
     status: str
+    moved: bool
     verdict: str
     effects: tuple[str, ...]
     in_force: Array
@@ -147,6 +149,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         vehicle=flight.vehicle,
         imu=imu,
         status=c.status.value,
+        moved=engine.moving,
         verdict=diagnosis.verdict.value,
         effects=tuple(e.name for e in diagnosis.effects),
         in_force=six.as_vector(),
@@ -226,6 +229,7 @@ def _failed(flight: RealFlight, imu: int, why: str) -> Fit:
         flight.vehicle,
         imu,
         "failed",
+        False,  # noqa: FBT003 - a field
         why,
         (),
         six,

@@ -50,8 +50,8 @@ def run(made: Sequence[Fit]) -> list[Share]:
     """The criteria over all accelerometers that could be fitted."""
     good = [f for f in made if not f.failed]
 
-    def share(what: str, holds: Callable[[Fit], bool]) -> Share:
-        return Share(what, sum(holds(f) for f in good), len(good))
+    def share(what: str, holds: Callable[[Fit], bool], of: Sequence[Fit] = good) -> Share:
+        return Share(what, sum(holds(f) for f in of), len(of))
 
     return [
         share(
@@ -60,10 +60,19 @@ def run(made: Sequence[Fit]) -> list[Share]:
         ),
         share("a noise level at a limit", lambda f: bool(f.at_limit)),
         share(
+            "a noise level at its upper limit",
+            lambda f: any(name.endswith("+") for name in f.at_limit),
+        ),
+        share(
             f"variance inflation below {SANE_INFLATION:g}", lambda f: f.inflation < SANE_INFLATION
         ),
         share(f"averaging span clipped at {LONGEST_WINDOW_S:g} s", lambda f: f.clipped),
         share("calibrated", lambda f: f.status == "calibrated"),
+        share(
+            "calibrated, of those that moved",
+            lambda f: f.status == "calibrated",
+            [f for f in good if f.moved],
+        ),
         share("verdict insufficient", lambda f: f.verdict == "insufficient"),
     ]
 

@@ -33,6 +33,7 @@ def fit(estimate: np.ndarray, covariance: np.ndarray, *, flight: str = "a", imu:
         "v",
         imu,
         "calibrated",
+        True,
         "clean",
         (),
         PRIOR,
