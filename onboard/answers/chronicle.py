@@ -29,6 +29,7 @@ from onboard.core.estimate.events import Event, Restarted
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.inputs.stretches import Stretch
 from onboard.core.maths.accelerometer import parameters_of
 
 Array = NDArray[np.float64]
@@ -136,6 +137,14 @@ class Chronicle:
             self._fix(sample)
         elif isinstance(sample, ParameterValue) and sample.name in OF_ACCELEROMETER:
             self._hold(OF_ACCELEROMETER[sample.name])
+        return events
+
+    def feed_together(self, stretch: Stretch) -> tuple[Event, ...] | None:
+        """Pass samples on at once; None if they are to be fed one by one."""
+        events = None if self._piece is None else self.calibrator.feed_together(stretch)
+        if events is not None:
+            for run in stretch.imus:
+                self._tick(run.ends)
         return events
 
     def restart(self) -> tuple[Event, ...]:

@@ -24,6 +24,7 @@ from onboard.core.estimate.merged_record import merged_calibration, unknown_six
 from onboard.core.estimate.observability import Observability
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.inputs.samples import Sample
+from onboard.core.inputs.stretches import Stretch
 from onboard.core.maths.accelerometer import SixParameters
 
 
@@ -79,6 +80,10 @@ class Flights:
     def feed(self, sample: Sample) -> object:
         """Take a sample."""
         return self._flights[-1].feed(sample)
+
+    def feed_together(self, stretch: Stretch) -> object | None:
+        """Take samples at once; None if they are to be fed one by one."""
+        return self._flights[-1].feed_together(stretch)
 
     def finish(self) -> object:
         """There are no more recordings."""

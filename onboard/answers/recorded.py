@@ -25,6 +25,7 @@ from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.segments import Batch
+from onboard.core.inputs.stretches import Stretch
 from onboard.core.maths.compiling import prefer_compiled
 
 PAUSE_S = 10.0
@@ -81,6 +82,15 @@ class Recorded:
                 sample = replace(sample, t=t + self._shift)
             self._newest = max(self._newest, t + self._shift)
         return self._reader.feed(sample)
+
+    def feed_together(self, stretch: Stretch) -> object | None:
+        """Take samples at once; None if they are to be fed one by one."""
+        if self._begins or self._shift:
+            return None
+        taken = self._reader.feed_together(stretch)
+        if taken is not None:
+            self._newest = max(self._newest, stretch.latest)
+        return taken
 
     def finish(self) -> object:
         """There are no more recordings."""

@@ -9,6 +9,7 @@ a stream and of its recording are the same numbers.
 from __future__ import annotations
 
 import copy
+import math
 from collections import Counter
 from collections.abc import Collection
 from typing import Final
@@ -39,6 +40,7 @@ from onboard.core.inputs.samples import (
     Vibration,
 )
 from onboard.core.inputs.segments import Batch
+from onboard.core.inputs.stretches import Stretch
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 
 OF_ACCELEROMETER: Final = {name: imu for imu in range(1, 6) for name in parameter_names(imu).six}
@@ -133,6 +135,32 @@ class Calibrator:
             case _:
                 return self._judged(sample)
         return ()
+
+    def feed_together(self, stretch: Stretch) -> tuple[Event, ...] | None:
+        """Take samples at once, as :meth:`feed` would take them one by one.
+
+        Returns:
+            What came of it; None if nothing was taken, because one of them is to be looked at by
+            itself (late, of another boot, ...): then feed its samples.
+        """
+        newest, streams = self._clock.newest, self._assembly.streams
+        runs, (attitude, first, last) = stretch.imus, stretch.attitude
+        if (
+            newest == -math.inf
+            or any(self._clock.went_back(run.begins) for run in runs)
+            or (first < last and self._clock.is_ahead(attitude.t.item(last - 1)))
+            or not streams.continued_by(stretch)
+        ):
+            return None
+        streams.extend(stretch, self.parameters)
+        for sample in stretch.aside:
+            self.feed(sample)
+        if not runs:
+            return ()
+        t = max(run.ends for run in runs)
+        self._clock.hear(t)
+        # Whichever of them shows that a receiver fell silent, what follows from it is the same.
+        return self._counted(self._trust.pass_time(t))
 
     def restart(self, reason: str = "another recording") -> tuple[Event, ...]:
         """The clock begins anew: forget the inertial states, keep the sums."""

@@ -16,6 +16,7 @@ from onboard.core.inputs.samples import (
     Throttle,
     Vibration,
 )
+from onboard.core.inputs.stretches import Stretch
 from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
 from onboard.core.maths.arrays import Array
 
@@ -46,11 +47,38 @@ class Streams:
         track = self.imus.get(sample.imu)
         if track is None:
             track = self.imus[sample.imu] = ImuTrack()
+        self.over_mavlink = sample.source is not ImuSource.LOG
+        track.add(sample, parameters.six(sample.imu), self._turned(parameters))
+
+    def continued_by(self, stretch: Stretch) -> bool:
+        """Whether inertial samples and attitudes are newer than all here, and none is refused."""
+        for run in stretch.imus:
+            track = self.imus.get(run.columns.imu)
+            if track is not None and not track.continues(run):
+                return False
+        columns, first, last = stretch.attitude
+        return first == last or columns.t.item(first) > self.recorded.last
+
+    def extend(self, stretch: Stretch, parameters: ParametersInForce) -> None:
+        """Take the inertial samples and the attitudes of a plain stretch that continues this."""
+        R_bs = self._turned(parameters)
+        for run in stretch.imus:
+            imu = run.columns.imu
+            track = self.imus.get(imu)
+            if track is None:
+                track = self.imus[imu] = ImuTrack()
+            self.over_mavlink = run.columns.source is not ImuSource.LOG
+            track.extend(run, parameters.six(imu), R_bs)
+        columns, first, last = stretch.attitude
+        if first < last:
+            self.recorded.extend(columns.t[first:last], columns.angles[first:last])
+
+    def _turned(self, parameters: ParametersInForce) -> Array | None:
+        """The board's orientation in force, the same matrix while it stays the same."""
         orientation = parameters.values.get("AHRS_ORIENTATION", 0.0)
         if orientation != self._R_bs[0]:
             self._R_bs = (orientation, parameters.R_bs)
-        self.over_mavlink = sample.source is not ImuSource.LOG
-        track.add(sample, parameters.six(sample.imu), self._R_bs[1])
+        return self._R_bs[1]
 
     def attitude(self, sample: AttitudeSample) -> None:
         """Take a recorded attitude."""
