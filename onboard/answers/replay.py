@@ -20,8 +20,8 @@ from onboard.answers.recorded import unanswered
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage
+from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.inputs.stretches import Piece, Stretch
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import RecordingError, UsageError
@@ -56,8 +56,8 @@ class Reader(Protocol):
 class Gatherer(Protocol):
     """A reader that can take many samples at once."""
 
-    def feed_together(self, stretch: Stretch) -> object | None:
-        """Take samples; None, and nothing is taken, if they are to be fed one by one."""
+    def feed_block(self, block: Block) -> object | None:
+        """Take samples; None, and none is taken, if they are to be fed one by one."""
 
 
 class Estimator(Reader, Protocol):
@@ -238,11 +238,11 @@ def read(
         told = fed
         for piece in recording.samples() if gatherer is None else recording.pieces():
             vehicle.check(piece, recording)
-            if not isinstance(piece, Stretch):
+            if not isinstance(piece, Block):
                 reader.feed(piece)
                 fed += 1
             else:
-                if gatherer is None or gatherer.feed_together(piece) is None:
+                if gatherer is None or gatherer.feed_block(piece) is None:
                     for sample in piece.samples():
                         reader.feed(sample)
                 fed += len(piece)
@@ -296,9 +296,11 @@ class Vehicle:
         Raises:
             RecordingError: it is of another vehicle.
         """
-        if isinstance(sample, Stretch):
-            for columns, first, last in sample.imus:
-                self._samples[columns.imu] += last - first
+        if isinstance(sample, Block):
+            for columns in sample.imus:
+                self._samples[columns.imu] += len(columns.t)
+            for other in sample.others:
+                self.check(other, recording)
         elif isinstance(sample, ImuSample):
             self._samples[sample.imu] += 1
         elif isinstance(sample, GpsFix):

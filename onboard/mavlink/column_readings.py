@@ -15,8 +15,8 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import AttitudeColumns, ImuColumns, Places
 from onboard.core.inputs.samples import ImuSource
-from onboard.core.inputs.stretches import AttitudeColumns, ImuColumns, Places
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS
 from onboard.mavlink.readings import (

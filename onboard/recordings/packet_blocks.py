@@ -14,8 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import AttitudeColumns, Block, ImuColumns
 from onboard.core.inputs.samples import Sample
-from onboard.core.inputs.stretches import ASIDE, AttitudeColumns, Block, ImuColumns
 from onboard.mavlink.bootclock import STAMPED
 from onboard.mavlink.column_readings import (
     ATTITUDE,
@@ -73,22 +73,21 @@ class PacketBlocks:
         stamps[alone] = -np.inf
         newest = np.maximum.accumulate(stamps)
         clock, decode = self._decoder.clock, self._decoder.decode
-        kept: tuple[list[Sample], list[int]] = [], []
-        events: tuple[list[Sample], list[int]] = [], []
+        others: list[Sample] = []
+        places: list[int] = []
         messages = self._unpack(self._data, at[alone])
         heard = zip(messages, alone.tolist(), newest[alone].tolist(), strict=True)
         for message, place, t in heard:
             if t > -math.inf:
                 clock.advance(t)
             if message is not None:
-                for sample in decode(message):
-                    samples, places = kept if isinstance(sample, ASIDE) else events
-                    samples.append(sample)
-                    places.append(place)
+                samples = decode(message)
+                others += samples
+                places += [place] * len(samples)
         if newest[-1] > -math.inf:
             clock.advance(newest.item(-1))
         imus = sorted(columns.imus, key=lambda c: c.places.item(0))
-        return Block(tuple(imus), columns.attitude, *kept, *events)
+        return Block(tuple(imus), columns.attitude, others, places)
 
 
 class _Columns:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import Sample
-from onboard.core.inputs.stretches import Piece
+from onboard.core.inputs.blocks import Piece
 
 LONGEST_GAP_S = 3600.0
 """A step of the clock longer than this is a damaged time stamp, not a pause."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import ParameterValue, Sample
-from onboard.core.inputs.stretches import Piece
+from onboard.core.inputs.blocks import Piece
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message, mavlink, message_ids
@@ -247,9 +247,11 @@ def _pieces(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Piece]:
         at = vehicle.offsets[start : start + BLOCK]
         with no_collection():
             block = blocks(at)
-            pieces = _decoded(unpack(octets, at), decoder) if block is None else block.pieces()
+            samples = _decoded(unpack(octets, at), decoder) if block is None else ()
         _let_go(data)
-        yield from pieces
+        if block is not None:
+            yield block
+        yield from samples
 
 
 def _let_go(data: Bytes) -> None:

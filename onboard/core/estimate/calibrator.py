@@ -11,13 +11,14 @@ from __future__ import annotations
 import copy
 import math
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Final
 
 from onboard.core.estimate.calibration_record import calibration_of
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.engines import Engines
 from onboard.core.estimate.events import Advanced, Event, FlightEnded, Restarted
+from onboard.core.estimate.limits import AHEAD_OF_IMU_S
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.stream_clock import StreamClock
@@ -25,6 +26,7 @@ from onboard.core.gps.distrust import Distrust, WindowClosed, WindowEvent
 from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
+from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
@@ -40,7 +42,6 @@ from onboard.core.inputs.samples import (
     Vibration,
 )
 from onboard.core.inputs.segments import Batch
-from onboard.core.inputs.stretches import Stretch
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 
 OF_ACCELEROMETER: Final = {name: imu for imu in range(1, 6) for name in parameter_names(imu).six}
@@ -136,30 +137,50 @@ class Calibrator:
                 return self._judged(sample)
         return ()
 
-    def feed_together(self, stretch: Stretch) -> tuple[Event, ...] | None:
-        """Take samples at once, as :meth:`feed` would take them one by one.
+    def feed_block(self, block: Block) -> tuple[Event, ...] | None:
+        """Take many samples at once, with what comes of it when they are fed one by one.
 
-        Returns:
-            What came of it; None if nothing was taken, because one of them is to be looked at by
-            itself (late, of another boot, ...): then feed its samples.
+        None, and nothing is taken, where they have to be (:meth:`admits`).
         """
-        newest, streams = self._clock.newest, self._assembly.streams
-        runs, (attitude, first, last) = stretch.imus, stretch.attitude
-        if (
-            newest == -math.inf
-            or any(self._clock.went_back(run.begins) for run in runs)
-            or (first < last and self._clock.is_ahead(attitude.t.item(last - 1)))
-            or not streams.continued_by(stretch)
-        ):
+        if not self.admits(block):
             return None
-        streams.extend(stretch, self.parameters)
-        for sample in stretch.aside:
-            self.feed(sample)
-        if not runs:
-            return ()
-        t = max(run.ends for run in runs)
+        return tuple(event for _, _, events in self.go_through(block) for event in events)
+
+    def admits(self, block: Block) -> bool:
+        """Whether no sample of a block would be refused, nor begin another boot."""
+        newest = self._clock.newest
+        return (
+            newest > -math.inf
+            and block.is_plain
+            and not self._clock.went_back(block.first_imu)
+            and block.attitude_ahead(newest) <= AHEAD_OF_IMU_S
+            and self._assembly.streams.continued_by(block)
+        )
+
+    def go_through(
+        self, block: Block
+    ) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
+        """Take a block that is admitted, to the end.
+
+        Yields:
+            each sample that is neither inertial nor an attitude (None: the end of the block), the
+            latest time of the inertial ones since the one before it (-inf: there is none), and what
+            came of them and of it.
+        """
+        streams, feed, heard = self._assembly.streams, self.feed, block.heard()
+        streams.begin(block, self.parameters)
+        for sample, place, t in zip(block.others, block.places, heard, strict=False):
+            events = self._passed(t) if t > -math.inf else ()
+            streams.reach(place)
+            yield sample, t, events + feed(sample)
+        streams.end()
+        t = heard[-1]
+        yield None, t, self._passed(t) if t > -math.inf else ()
+
+    def _passed(self, t: float) -> tuple[Event, ...]:
+        """Inertial samples have come, the latest of them with this time, s."""
         self._clock.hear(t)
-        # Whichever of them shows that a receiver fell silent, what follows from it is the same.
+        # A receiver that fell silent says nothing more: only the passing of time shows it.
         return self._counted(self._trust.pass_time(t))
 
     def restart(self, reason: str = "another recording") -> tuple[Event, ...]:
@@ -247,6 +268,7 @@ class Calibrator:
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Take a report; what was taken for raw before the calibration was known, was not raw."""
+        self._assembly.streams.settle()
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)
@@ -263,10 +285,8 @@ class Calibrator:
         if self._clock.went_back(sample.t):
             self._counts["reboots"] += 1
             events = self.restart("reboot")
-        self._clock.hear(sample.t)
         self._assembly.streams.imu(sample, self.parameters)
-        # A receiver that fell silent says nothing more: only the passing of time shows it.
-        return events + self._counted(self._trust.pass_time(sample.t))
+        return events + self._passed(sample.t)
 
     def _attitude(self, sample: AttitudeSample) -> None:
         if self._clock.is_ahead(sample.t):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
+from onboard.core.inputs.blocks import AttitudeColumns, Block, ImuColumns
 from onboard.core.inputs.limits import SILENT_S, SLOW_KEPT_S
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import (
@@ -16,9 +19,28 @@ from onboard.core.inputs.samples import (
     Throttle,
     Vibration,
 )
-from onboard.core.inputs.stretches import Stretch
 from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
 from onboard.core.maths.arrays import Array
+
+
+class _Passing:
+    """A block that is being gone through: how much of it has come, and is in the tracks."""
+
+    __slots__ = ("_block", "_taken", "parameters", "reached")
+
+    def __init__(self, block: Block, parameters: ParametersInForce) -> None:
+        self.parameters = parameters
+        self.reached = 0
+        self._block = block
+        self._taken = [0] * (len(block.imus) + 1)
+
+    def due(self) -> Iterator[tuple[ImuColumns | AttitudeColumns, slice]]:
+        """Columns and rows of them that have come since the last time."""
+        for k, columns in enumerate((*self._block.imus, self._block.attitude)):
+            first, last = self._taken[k], int(np.searchsorted(columns.places, self.reached))
+            if first < last:
+                self._taken[k] = last
+                yield columns, slice(first, last)
 
 
 class Streams:
@@ -32,7 +54,15 @@ class Streams:
         over_mavlink: whether inertial samples came by MAVLink, not from a log.
     """
 
-    __slots__ = ("_R_bs", "fixes", "imus", "over_mavlink", "recorded", "slow")
+    __slots__ = (
+        "_R_bs",
+        "_passing",
+        "fixes",
+        "imus",
+        "over_mavlink",
+        "recorded",
+        "slow",
+    )
 
     def __init__(self) -> None:
         self.imus: dict[int, ImuTrack] = {}
@@ -41,6 +71,7 @@ class Streams:
         self.fixes = FixTrack()
         self.over_mavlink = False
         self._R_bs: tuple[float, Array | None] = (0.0, None)
+        self._passing: _Passing | None = None
 
     def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
         """Take an inertial sample, raw by the parameters in force now."""
@@ -50,28 +81,44 @@ class Streams:
         self.over_mavlink = sample.source is not ImuSource.LOG
         track.add(sample, parameters.six(sample.imu), self._turned(parameters))
 
-    def continued_by(self, stretch: Stretch) -> bool:
-        """Whether inertial samples and attitudes are newer than all here, and none is refused."""
-        for run in stretch.imus:
-            track = self.imus.get(run.columns.imu)
-            if track is not None and not track.continues(run):
-                return False
-        columns, first, last = stretch.attitude
-        return first == last or columns.t.item(first) > self.recorded.last
+    def continued_by(self, block: Block) -> bool:
+        """Whether a plain block has nothing that would be refused for what is here."""
+        tracks = ((self.imus.get(columns.imu), columns) for columns in block.imus)
+        times = block.attitude.t
+        return all(track is None or track.continued_by(columns) for track, columns in tracks) and (
+            not len(times) or times.item(0) > self.recorded.last
+        )
 
-    def extend(self, stretch: Stretch, parameters: ParametersInForce) -> None:
-        """Take the inertial samples and the attitudes of a plain stretch that continues this."""
+    def begin(self, block: Block, parameters: ParametersInForce) -> None:
+        """Begin to take the inertial samples and attitudes of a plain block that continues this."""
+        self._passing = _Passing(block, parameters)
+
+    def reach(self, place: int) -> None:
+        """What stands before a place of the block has come: :meth:`settle` before it is used."""
+        if self._passing is not None:
+            self._passing.reached = place
+
+    def settle(self) -> None:
+        """Put what has come in the tracks, raw by the parameters in force since the last time."""
+        if self._passing is None:
+            return
+        parameters = self._passing.parameters
         R_bs = self._turned(parameters)
-        for run in stretch.imus:
-            imu = run.columns.imu
-            track = self.imus.get(imu)
+        for columns, rows in self._passing.due():
+            if isinstance(columns, AttitudeColumns):
+                self.recorded.extend(columns.t[rows], columns.angles[rows])
+                continue
+            track = self.imus.get(columns.imu)
             if track is None:
-                track = self.imus[imu] = ImuTrack()
-            self.over_mavlink = run.columns.source is not ImuSource.LOG
-            track.extend(run, parameters.six(imu), R_bs)
-        columns, first, last = stretch.attitude
-        if first < last:
-            self.recorded.extend(columns.t[first:last], columns.angles[first:last])
+                track = self.imus[columns.imu] = ImuTrack()
+            self.over_mavlink = columns.source is not ImuSource.LOG
+            track.extend(columns, rows, parameters.six(columns.imu), R_bs)
+
+    def end(self) -> None:
+        """All of the block has come."""
+        self.reach(sys.maxsize)
+        self.settle()
+        self._passing = None
 
     def _turned(self, parameters: ParametersInForce) -> Array | None:
         """The board's orientation in force, the same matrix while it stays the same."""
@@ -128,6 +175,7 @@ class Streams:
 
     def forget_imu(self, imu: int) -> None:
         """Forget what waits of one accelerometer, but not what was refused of it."""
+        self.settle()
         if imu in self.imus:
             refused = self.imus[imu].refused
             self.imus[imu] = ImuTrack()

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import ImuColumns
 from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.limits import BEFORE_NEXT_S, HIGHRES_S
 from onboard.core.inputs.rows import Rows
 from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
-from onboard.core.inputs.stretches import ImuRun
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
 
@@ -99,19 +99,21 @@ class ImuTrack:
         rows.add(t, (*row, celsius))
         return True
 
-    def continues(self, run: ImuRun) -> bool:
-        """Whether samples are newer than all that are here, and none is to be refused."""
-        begins = run.begins
-        coarse = run.columns.source is ImuSource.RAW_IMU and begins - self.highres_t < HIGHRES_S
+    def continued_by(self, columns: ImuColumns) -> bool:
+        """Whether plain samples are newer than all that are here, and none is to be refused."""
+        begins = columns.t.item(0)
+        coarse = columns.source is ImuSource.RAW_IMU and begins - self.highres_t < HIGHRES_S
         return begins > self._rows.last and not coarse
 
-    def extend(self, run: ImuRun, six: SixParameters, R_bs: Array | None) -> None:
-        """Keep samples that continue the track, and are plain, as if added one by one."""
-        columns, first, last = run
+    def extend(
+        self, columns: ImuColumns, rows: slice, six: SixParameters, R_bs: Array | None
+    ) -> None:
+        """Keep some samples (at least one) of columns that continue this, as if added by :meth:`add`."""
+        t = columns.t[rows]
         if columns.source is ImuSource.HIGHRES_IMU:
-            self.highres_t = run.ends
+            self.highres_t = t.item(-1)
         self._made(columns.w_step, columns.f_step, six, R_bs)
-        self._rows.extend(columns.t[first:last], columns.rows[first:last])
+        self._rows.extend(t, columns.rows[rows])
 
     def _made(self, w_step: float, f_step: float, six: SixParameters, R_bs: Array | None) -> None:
         """Something is added that was made in this manner."""
