@@ -155,6 +155,15 @@ class Calibrator:
             and not self._clock.went_back(block.first_imu)
             and block.attitude_ahead(newest) <= AHEAD_OF_IMU_S
             and self._assembly.streams.continued_by(block)
+            and not (block.coarse and self._may_forget(block))
+        )
+
+    def _may_forget(self, block: Block) -> bool:
+        """Whether an accelerometer may be begun anew: that HIGHRES_IMU came, is forgotten, too."""
+        receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
+        known = {self._trust.receiver} - {None}
+        return len(receivers | known) > 1 or any(
+            isinstance(s, ParameterValue) and s.name in OF_ACCELEROMETER for s in block.others
         )
 
     def go_through(

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S
+from onboard.core.inputs.limits import HIGHRES_S
 from onboard.core.inputs.range_checks import attitudes_possible, imu_possible
 from onboard.core.inputs.samples import AttitudeSample, ImuSample, ImuSource, Sample
 from onboard.core.maths.arrays import Array
@@ -112,6 +113,10 @@ class Block:
     attitude: AttitudeColumns
     others: list[Sample]
     places: list[int]
+    kept: tuple[ImuColumns, ...] = field(init=False, repr=False)
+    """Of the inertial samples, without those of RAW_IMU where the finer HIGHRES_IMU is beside it."""
+    coarse: tuple[tuple[ImuColumns, ImuColumns], ...] = field(init=False, repr=False)
+    """Each of those, and the finer ones."""
     _imu_places: Places = field(init=False, repr=False)
     _imu_t: Array = field(init=False, repr=False)
     """Inertial samples of all accelerometers in the order of arrival."""
@@ -120,6 +125,10 @@ class Block:
         places = np.concatenate([np.zeros(0, np.int64), *(c.places for c in self.imus)])
         t = np.concatenate([np.zeros(0), *(c.t for c in self.imus)])
         order = np.argsort(places)
+        fine = {c.imu: c for c in self.imus if c.source is ImuSource.HIGHRES_IMU}
+        raw = [c for c in self.imus if c.source is ImuSource.RAW_IMU and c.imu in fine]
+        object.__setattr__(self, "kept", tuple(c for c in self.imus if c not in raw))
+        object.__setattr__(self, "coarse", tuple((c, fine[c.imu]) for c in raw))
         object.__setattr__(self, "_imu_places", places[order])
         object.__setattr__(self, "_imu_t", t[order])
 
@@ -129,11 +138,12 @@ class Block:
     @property
     def is_plain(self) -> bool:
         """Whether nothing in it is to be refused, or to begin a boot, for what is before it here."""
-        numbers = {columns.imu for columns in self.imus}
+        numbers = {columns.imu for columns in self.kept}
         back = self._imu_t < self._newest(-math.inf)[:-1] - LONGEST_DELAY_S
         return (
-            len(numbers) == len(self.imus)  # of two sources of one accelerometer one is preferred
+            len(numbers) == len(self.kept)  # two sources of one accelerometer refuse each other's
             and all(columns.is_plain for columns in self.imus)
+            and all(_covers(fine, raw) for raw, fine in self.coarse)
             and self.attitude.is_plain
             and not back.any()
         )
@@ -193,6 +203,13 @@ Piece: TypeAlias = Sample | Block
 def _increase(t: Array) -> bool:
     """Whether times (n,) increase; not if one of several is no number."""
     return bool(np.all(t[1:] > t[:-1]))
+
+
+def _covers(fine: ImuColumns, raw: ImuColumns) -> bool:
+    """Whether each of the coarser samples, from the first of the finer on, follows one closely."""
+    before = np.searchsorted(fine.places, raw.places) - 1
+    its = before >= 0
+    return bool(np.all(raw.t[its] - fine.t[before[its]] < HIGHRES_S))
 
 
 def _place(placed: Placed) -> int:

@@ -32,11 +32,11 @@ class _Passing:
         self.parameters = parameters
         self.reached = 0
         self._block = block
-        self._taken = [0] * (len(block.imus) + 1)
+        self._taken = [0] * (len(block.kept) + 1)
 
     def due(self) -> Iterator[tuple[ImuColumns | AttitudeColumns, slice]]:
         """Columns and rows of them that have come since the last time."""
-        for k, columns in enumerate((*self._block.imus, self._block.attitude)):
+        for k, columns in enumerate((*self._block.kept, self._block.attitude)):
             first, last = self._taken[k], int(np.searchsorted(columns.places, self.reached))
             if first < last:
                 self._taken[k] = last
@@ -83,11 +83,20 @@ class Streams:
 
     def continued_by(self, block: Block) -> bool:
         """Whether a plain block has nothing that would be refused for what is here."""
-        tracks = ((self.imus.get(columns.imu), columns) for columns in block.imus)
         times = block.attitude.t
-        return all(track is None or track.continued_by(columns) for track, columns in tracks) and (
-            not len(times) or times.item(0) > self.recorded.last
-        )
+        if len(times) and not times.item(0) > self.recorded.last:
+            return False
+        for columns in block.kept:
+            track = self.imus.get(columns.imu)
+            if track is not None and not track.continued_by(columns):
+                return False
+        for raw, fine in block.coarse:
+            # What comes before the first of the finer ones here must follow one of before.
+            first = int(np.searchsorted(raw.places, fine.places[0]))
+            track = self.imus.get(raw.imu)
+            if first and (track is None or not track.covers(raw.t.item(first - 1))):
+                return False
+        return True
 
     def begin(self, block: Block, parameters: ParametersInForce) -> None:
         """Begin to take the inertial samples and attitudes of a plain block that continues this."""

@@ -81,7 +81,7 @@ class ImuTrack:
         t = sample.t
         if sample.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t
-        elif sample.source is ImuSource.RAW_IMU and t - self.highres_t < HIGHRES_S:
+        elif sample.source is ImuSource.RAW_IMU and self.covers(t):
             return False
         rows = self._rows
         if not t > rows.last:
@@ -99,10 +99,14 @@ class ImuTrack:
         rows.add(t, (*row, celsius))
         return True
 
+    def covers(self, t: float) -> bool:
+        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that RAW_IMU is not taken."""
+        return t - self.highres_t < HIGHRES_S
+
     def continued_by(self, columns: ImuColumns) -> bool:
         """Whether plain samples are newer than all that are here, and none is to be refused."""
         begins = columns.t.item(0)
-        coarse = columns.source is ImuSource.RAW_IMU and begins - self.highres_t < HIGHRES_S
+        coarse = columns.source is ImuSource.RAW_IMU and self.covers(begins)
         return begins > self._rows.last and not coarse
 
     def extend(
