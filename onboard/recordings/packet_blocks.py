@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.blocks import AttitudeColumns, Block, ImuColumns
+from onboard.core.inputs.blocks import NO_ATTITUDE, Block, ImuColumns
 from onboard.core.inputs.samples import Sample
 from onboard.mavlink.bootclock import STAMPED
 from onboard.mavlink.column_readings import (
@@ -32,7 +32,6 @@ from onboard.recordings.packets import Unpacker
 Floats: TypeAlias = NDArray[np.float64]
 
 STAMPS = message_ids(STAMPED)
-NO_ATTITUDE = AttitudeColumns(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3)))
 
 
 class PacketBlocks:

@@ -98,6 +98,9 @@ class AttitudeColumns:
             yield place, AttitudeSample(t, roll, pitch, yaw)
 
 
+NO_ATTITUDE = AttitudeColumns(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
     """Samples that came one after the other.
