@@ -80,7 +80,10 @@ def told(x: object) -> object:
 
 
 def known(recorded: Recorded) -> dict[str, object]:
-    """Everything that was made of what was fed: tracks, counters, trust, flight, what is drawn."""
+    """Everything that was made of what was fed: tracks, counters, trust, flight, what is drawn.
+
+    Not the numbers: of the same flight they are the same.
+    """
     calibrator, drawn = recorded.calibrator, recorded.chronicle
     streams, trust = calibrator._assembly.streams, calibrator._trust
     tracks = {
@@ -101,7 +104,6 @@ def known(recorded: Recorded) -> dict[str, object]:
             "heard": (trust._now, trust._last_heard, trust._last_fix),
             "parameters": calibrator.parameters.values,
             "flown": {imu: list(batches) for imu, batches in calibrator.flown.items()},
-            "numbers": [calibrator.calibration(imu) for imu in calibrator.imus],
             "drawn": None
             if drawn is None
             else (
