@@ -46,7 +46,9 @@ def samples_in_order(batches: Batches, context: Context) -> tuple[list[Sample], 
 
 def block_of(batches: Batches, context: Context) -> Block:
     """The same samples as a block."""
-    imus = [c for rows, batch in batches if batch.form.name in IMU_NAMES for c in _imus(rows, batch)]
+    imus = [
+        c for rows, batch in batches if batch.form.name in IMU_NAMES for c in _imus(rows, batch)
+    ]
     attitudes = [(rows, batch) for rows, batch in batches if batch.form.name == ATTITUDE_NAME]
     in_columns = {*IMU_NAMES}
     attitude = NO_ATTITUDE

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.blocks import Piece
+from onboard.core.inputs.samples import Sample
 
 LONGEST_GAP_S = 3600.0
 """A step of the clock longer than this is a damaged time stamp, not a pause."""

@@ -43,7 +43,9 @@ def saved(folder: Path, data: object) -> Path:
 def singly(path: Path) -> list[Sample]:
     """Samples of pieces, those of blocks one by one."""
     pieces = open_recording(path).pieces()
-    return [s for piece in pieces for s in (piece.samples() if isinstance(piece, Block) else (piece,))]
+    return [
+        s for piece in pieces for s in (piece.samples() if isinstance(piece, Block) else (piece,))
+    ]
 
 
 def in_blocks(path: Path) -> int:
@@ -99,7 +101,9 @@ def test_what_is_many_goes_in_blocks(tmp_path):
     assert in_blocks(path) > 0.9 * len(singly(path))
 
 
-def at(k: int, *messages: Callable[[float], object]) -> Callable[[TelemetryWriter, int, float], None]:
+def at(
+    k: int, *messages: Callable[[float], object]
+) -> Callable[[TelemetryWriter, int, float], None]:
     """Add messages once."""
 
     def change(log: TelemetryWriter, now: int, t: float) -> None:
@@ -119,33 +123,64 @@ def attitude(t: float, roll: float = 0.1) -> object:
 
 
 UNIX_US = 1_700_000_000_000_000
+
+
+def us(t: float) -> int:
+    return round(t * 1e6)
+
+
+def parameter(name: bytes, value: float) -> object:
+    return lambda t: mavlink.MAVLink_param_value_message(name, value, 9, 1, 0)
+
+
+def highres_imu(x: float, fields: int) -> object:
+    return lambda t: mavlink.MAVLink_highres_imu_message(
+        us(t), x, 2, 3, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, fields
+    )
+
+
+def fix_at(t_us: int) -> object:
+    return lambda t: mavlink.MAVLink_gps_raw_int_message(
+        t_us, 3, 450005400, 80000000, 500000, 80, 100, 1000, 0, 12
+    )
+
+
+def raw(t_us: int, number: int = 0) -> object:
+    return mavlink.MAVLink_raw_imu_message(t_us, *(9,) * 6, 0, 0, 0, number)
+
+
+def absent(log: TelemetryWriter, k: int, t: float) -> None:
+    log.add(mavlink.MAVLink_scaled_imu3_message(round(t * 1e3), *(0,) * 9))
+
+
+def others(log: TelemetryWriter, k: int, t: float) -> None:
+    for system, component in ((2, 1), (1, 100), (255, 190)):
+        log.add(scaled(t, 7, 7, 7, 7, 7, k), system=system, component=component)
+
+
 CHANGES = {
     "a stray stamp": at(300, lambda t: scaled(5.0)),
     "two stray stamps": at(300, lambda t: scaled(5.0), lambda t: scaled(5.02)),
-    "a stray vibration": at(300, lambda t: mavlink.MAVLink_vibration_message(5_000_000, 0, 0, 0, 0, 0, 0)),
+    "a stray vibration": at(
+        300, lambda t: mavlink.MAVLink_vibration_message(us(5.0), 0, 0, 0, 0, 0, 0)
+    ),
     "late": at(300, lambda t: scaled(t - 1.0), lambda t: attitude(t - 2.0)),
     "ahead": at(300, lambda t: attitude(t + 7.0)),
-    "Unix time": at(300, lambda t: mavlink.MAVLink_raw_imu_message(UNIX_US, *(1,) * 6, 0, 0, 0)),
-    "absent": lambda log, k, t: log.add(mavlink.MAVLink_scaled_imu3_message(round(t * 1e3), *(0,) * 9)),
-    "another number": at(300, lambda t: mavlink.MAVLink_raw_imu_message(round(t * 1e6), *(9,) * 6, 0, 0, 0, 2)),
+    "Unix time": at(300, lambda t: raw(UNIX_US)),
+    "absent": absent,
+    "another number": at(300, lambda t: raw(us(t), 2)),
     "no angle": at(300, lambda t: attitude(t, math.nan)),
     "zero angles": at(300, lambda t: attitude(t, 0.0)),
-    "no force": at(300, lambda t: mavlink.MAVLink_highres_imu_message(
-        round(t * 1e6), math.nan, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFFFF)),
-    "force not told": at(300, lambda t: mavlink.MAVLink_highres_imu_message(
-        round(t * 1e6), 1, 2, 3, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0x38)),
-    "rate not told": at(300, lambda t: mavlink.MAVLink_highres_imu_message(
-        round(t * 1e6), 1, 2, 3, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0x07)),
-    "parameter": at(300, lambda t: mavlink.MAVLink_param_value_message(b"INS_ACCSCAL_X", 1.05, 9, 1, 0)),
-    "board": at(300, lambda t: mavlink.MAVLink_param_value_message(b"AHRS_ORIENTATION", 2.0, 9, 1, 0)),
+    "no force": at(300, highres_imu(math.nan, 0xFFFF)),
+    "force not told": at(300, highres_imu(1.0, 0x38)),
+    "rate not told": at(300, highres_imu(1.0, 0x07)),
+    "parameter": at(300, parameter(b"INS_ACCSCAL_X", 1.05)),
+    "board": at(300, parameter(b"AHRS_ORIENTATION", 2.0)),
     "disarmed": at(300, lambda t: heartbeat(armed=False)),
-    "others": lambda log, k, t: [log.add(scaled(t, 7, 7, 7, 7, 7, k), system=s, component=c)
-                                 for s, c in ((2, 1), (1, 100), (255, 190))],
-    "fix without a time": at(300, lambda t: mavlink.MAVLink_gps_raw_int_message(
-        0, 3, 450005400, 80000000, 500000, 80, 100, 1000, 0, 12)),
-    "fix in Unix time": at(300, lambda t: mavlink.MAVLink_gps_raw_int_message(
-        UNIX_US, 3, 450005400, 80000000, 500000, 80, 100, 1000, 0, 12)),
-}  # fmt: skip
+    "others": others,
+    "fix without a time": at(300, fix_at(0)),
+    "fix in Unix time": at(300, fix_at(UNIX_US)),
+}
 CLOCKS = {
     "reboot": lambda t: t if t < 36.0 else t - 30.0,
     "forward": lambda t: t if t < 36.0 else t + 100.0,

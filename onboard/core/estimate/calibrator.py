@@ -166,9 +166,7 @@ class Calibrator:
             isinstance(s, ParameterValue) and s.name in OF_ACCELEROMETER for s in block.others
         )
 
-    def go_through(
-        self, block: Block
-    ) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
+    def go_through(self, block: Block) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
         """Take a block that is admitted, to the end.
 
         Yields:

@@ -1,11 +1,11 @@
-"""Many samples of a recording at once: inertial ones and attitudes as columns, the others as they are.
+"""Many samples of a recording at once: inertial ones and attitudes as columns, others as they are.
 
-Nearly all of a recording is inertial samples and attitudes, of which each is only put behind the one
-before.  What else is done depends on the order in which the other samples come among them: a fix
-hands flight on, a parameter changes what forces mean, a state ends a flight.  A :class:`Block` keeps
+Nearly all of a recording is inertial samples and attitudes, of which each is only put behind the
+one before.  What else is done depends on where the other samples stand among them: a fix hands
+flight on, a parameter changes what forces mean, a state ends a flight.  A :class:`Block` keeps
 that order by places, so that whoever takes it finds the same as if it were fed one by one; if
-anything in it is out of the ordinary (late, repeated, of another boot, impossible), it is to be fed
-one by one.
+anything in it is out of the ordinary (late, repeated, of another boot, impossible), it is to be
+fed one by one.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Block:
     others: list[Sample]
     places: list[int]
     kept: tuple[ImuColumns, ...] = field(init=False, repr=False)
-    """Of the inertial samples, without those of RAW_IMU where the finer HIGHRES_IMU is beside it."""
+    """Inertial samples without those of RAW_IMU where the finer HIGHRES_IMU is beside it."""
     coarse: tuple[tuple[ImuColumns, ImuColumns], ...] = field(init=False, repr=False)
     """Each of those, and the finer ones."""
     _imu_places: Places = field(init=False, repr=False)
@@ -140,7 +140,7 @@ class Block:
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing in it is to be refused, or to begin a boot, for what is before it here."""
+        """Whether nothing is to be refused, or to begin a boot, for what is in the block itself."""
         numbers = {columns.imu for columns in self.kept}
         back = self._imu_t < self._newest(-math.inf)[:-1] - LONGEST_DELAY_S
         return (
@@ -188,8 +188,9 @@ class Block:
     def samples(self) -> Iterator[Sample]:
         """One by one, in the order of arrival."""
         every: list[Placed] = list(zip(self.places, self.others, strict=True))
-        for columns in (*self.imus, self.attitude):
+        for columns in self.imus:
             every += columns.samples()
+        every += self.attitude.samples()
         every.sort(key=_place)
         return (sample for _, sample in every)
 

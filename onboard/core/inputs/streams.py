@@ -36,7 +36,9 @@ class _Passing:
 
     def due(self) -> Iterator[tuple[ImuColumns | AttitudeColumns, slice]]:
         """Columns and rows of them that have come since the last time."""
-        for k, columns in enumerate((*self._block.kept, self._block.attitude)):
+        streams: tuple[ImuColumns | AttitudeColumns, ...]
+        streams = (*self._block.kept, self._block.attitude)
+        for k, columns in enumerate(streams):
             first, last = self._taken[k], int(np.searchsorted(columns.places, self.reached))
             if first < last:
                 self._taken[k] = last

@@ -112,7 +112,7 @@ class ImuTrack:
     def extend(
         self, columns: ImuColumns, rows: slice, six: SixParameters, R_bs: Array | None
     ) -> None:
-        """Keep some samples (at least one) of columns that continue this, as if added by :meth:`add`."""
+        """Keep samples (at least one) of columns that continue this, as :meth:`add` would."""
         t = columns.t[rows]
         if columns.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t.item(-1)

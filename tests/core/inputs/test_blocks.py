@@ -101,7 +101,9 @@ def without(samples: list[Sample], at: int, kinds: type, seconds: float) -> list
     ]
 
 
-def highres(samples: list[Sample], at: int, *, every: int = 1, seconds: float = 6.0) -> list[Sample]:
+def highres(
+    samples: list[Sample], at: int, *, every: int = 1, seconds: float = 6.0
+) -> list[Sample]:
     """The finer stream beside the coarser one, at the same times, for a while."""
     out, begin, count = samples[:at], time_at(samples, at), 0
     for s in samples[at:]:
