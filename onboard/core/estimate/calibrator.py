@@ -162,9 +162,8 @@ class Calibrator:
         """Whether an accelerometer may be begun anew: that HIGHRES_IMU came, is forgotten, too."""
         receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
         known = {self._trust.receiver} - {None}
-        return len(receivers | known) > 1 or any(
-            isinstance(s, ParameterValue) and s.name in OF_ACCELEROMETER for s in block.others
-        )
+        told = any(isinstance(s, ParameterValue) for s in block.others)
+        return told or len(receivers | known) > 1
 
     def go_through(self, block: Block) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
         """Take a block that is admitted, to the end.

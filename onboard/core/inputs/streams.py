@@ -56,15 +56,7 @@ class Streams:
         over_mavlink: whether inertial samples came by MAVLink, not from a log.
     """
 
-    __slots__ = (
-        "_R_bs",
-        "_passing",
-        "fixes",
-        "imus",
-        "over_mavlink",
-        "recorded",
-        "slow",
-    )
+    __slots__ = ("_R_bs", "_passing", "fixes", "imus", "over_mavlink", "recorded", "slow")
 
     def __init__(self) -> None:
         self.imus: dict[int, ImuTrack] = {}
@@ -114,7 +106,6 @@ class Streams:
         if self._passing is None:
             return
         parameters = self._passing.parameters
-        R_bs = self._turned(parameters)
         for columns, rows in self._passing.due():
             if isinstance(columns, AttitudeColumns):
                 self.recorded.extend(columns.t[rows], columns.angles[rows])
@@ -123,6 +114,7 @@ class Streams:
             if track is None:
                 track = self.imus[columns.imu] = ImuTrack()
             self.over_mavlink = columns.source is not ImuSource.LOG
+            R_bs = self._turned(parameters)
             track.extend(columns, rows, parameters.six(columns.imu), R_bs)
 
     def end(self) -> None:

@@ -162,6 +162,9 @@ CHANGES = {
     "no number": lambda s, k: inserted(s, k, ParameterValue("INS_ACCSCAL_X", NAN)),
     "all six": lambda s, k: inserted(s, k, *(ParameterValue(n, x) for n, x in SIX.items())),
     "orientation": lambda s, k: inserted(s, k, ParameterValue("AHRS_ORIENTATION", 2.0)),
+    "to and fro": lambda s, k: inserted(
+        s, k, *(ParameterValue("AHRS_ORIENTATION", x) for x in (2.0, 4.0, 0.0, 6.0, 0.0))
+    ),
     "filter": lambda s, k: inserted(s, k, ParameterValue("INS_ACCEL_FILTER", 10.0)),
     "disarmed": lambda s, k: inserted(s, k, VehicleState(time_at(s, k), armed=False)),
     "landed": lambda s, k: inserted(s, k, VehicleState(time_at(s, k), landed=True)),
