@@ -161,6 +161,7 @@ def others(log: TelemetryWriter, k: int, t: float) -> None:
 CHANGES = {
     "a stray stamp": at(300, lambda t: scaled(5.0)),
     "two stray stamps": at(300, lambda t: scaled(5.0), lambda t: scaled(5.02)),
+    "one stray stamp, and another": lambda log, k, t: k in (200, 300) and log.add(scaled(5.0)),
     "a stray vibration": at(
         300, lambda t: mavlink.MAVLink_vibration_message(us(5.0), 0, 0, 0, 0, 0, 0)
     ),

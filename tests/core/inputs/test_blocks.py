@@ -140,6 +140,7 @@ CHANGES = {
     "zero attitude": lambda s, k: one_changed(s, k, AttitudeSample, roll=0.0, pitch=0.0, yaw=0.0),
     "attitude ahead": lambda s, k: one_changed(s, k, AttitudeSample, t=time_at(s, k) + 5.5),
     "attitude a bit ahead": lambda s, k: one_changed(s, k, AttitudeSample, t=time_at(s, k) + 4.5),
+    "attitudes ahead": lambda s, k: later(s, k, 5.5, AttitudeSample),
     "late attitude": lambda s, k: one_changed(s, k, AttitudeSample, t=time_at(s, k) - 1.0),
     "fix of another clock": lambda s, k: one_changed(s, k, GpsFix, t=1e5),
     "late fix": lambda s, k: one_changed(s, k, GpsFix, t=time_at(s, k) - 3.0),
@@ -227,6 +228,46 @@ def test_whatever_comes_together(changes, size):
 def test_what_happens_often_goes_together(change):
     taken = assert_same(CHANGES[change](FLIGHT, len(FLIGHT) // 2), 250)
     assert taken > 0.75 * len(FLIGHT)
+
+
+def lagging(t: float) -> ImuSample:
+    return ImuSample(t, 3, (0.0, 0.0, -9.8), (0.0, 0.0, 0.1))
+
+
+def test_one_that_lags_begins_a_boot():
+    """Against what came before the block, and within it."""
+    for at in (3000, 3007):
+        assert_same(inserted(FLIGHT, at, lagging(time_at(FLIGHT, at) - 3.5)), 300)
+
+
+def test_another_receiver_begins_an_accelerometer_anew():
+    """That of before was given up; what had come until then is forgotten with the rest."""
+    long = [
+        replace(s, receiver=2) if isinstance(s, GpsFix) and s.t > 30.0 else s for s in flight(100.0)
+    ]
+    assert assert_same(long, 500) > 0.9 * len(long)
+    assert assert_same(highres(long, len(long) * 2 // 3, seconds=30.0), 500) > 0.5 * len(long)
+
+
+def test_a_gap_is_seen_by_what_comes_after_the_fix():
+    """An older inertial sample behind a late fix says less than the newest one before it."""
+    newest = FLIGHT[-1].t + 2.51
+    late = replace(fix(newest - 2.505), v_n=10.0)
+    ending = [
+        ImuSample(newest, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.1)),
+        late,
+        ImuSample(newest - 0.02, 2, (0.0, 0.0, -9.8), (0.0, 0.0, 0.1)),
+    ]
+    size = len(FLIGHT) // 4 + 3
+    alone, together = Recorded(), Recorded()
+    for sample in FLIGHT + ending:
+        alone.feed(sample)
+    for piece in in_blocks(FLIGHT + ending, size):
+        if together.feed_block(piece) is None:
+            for sample in piece.samples():
+                together.feed(sample)
+    assert alone.calibrator.trust.is_open
+    assert not differing(alone, together)
 
 
 def test_what_is_learned_at_once_is_the_same():
