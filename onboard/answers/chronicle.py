@@ -28,6 +28,7 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.events import Event, Restarted
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
+from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import parameters_of
 
@@ -132,11 +133,20 @@ class Chronicle:
             self._begin_anew()
         if isinstance(sample, ImuSample):
             self._tick(sample.t)
-        elif isinstance(sample, GpsFix):
-            self._fix(sample)
-        elif isinstance(sample, ParameterValue) and sample.name in OF_ACCELEROMETER:
-            self._hold(OF_ACCELEROMETER[sample.name])
+        else:
+            self._note(sample)
         return events
+
+    def feed_block(self, block: Block) -> tuple[Event, ...] | None:
+        """Pass many samples on at once; None, and none was, if they are to be fed one by one."""
+        if self._piece is None or not self.calibrator.admits(block):
+            return None
+        every: list[Event] = []
+        for sample, t, events in self.calibrator.go_through(block):
+            every += events
+            self._tick(t)
+            self._note(sample)
+        return tuple(every)
 
     def restart(self) -> tuple[Event, ...]:
         """Another recording of the same vehicle begins."""
@@ -195,6 +205,12 @@ class Chronicle:
             self._piece = _Piece(t, t, drawn)
         elif t > self._piece.last:
             self._piece.last = t
+
+    def _note(self, sample: Sample | None) -> None:
+        if isinstance(sample, GpsFix):
+            self._fix(sample)
+        elif isinstance(sample, ParameterValue) and sample.name in OF_ACCELEROMETER:
+            self._hold(OF_ACCELEROMETER[sample.name])
 
     def _begin_anew(self) -> None:
         if self._piece is not None:

@@ -23,6 +23,7 @@ from onboard.core.estimate.merged_flights import Prior, Reconciled, merged, reco
 from onboard.core.estimate.merged_record import merged_calibration, unknown_six
 from onboard.core.estimate.observability import Observability
 from onboard.core.estimate.result import Calibration, Status
+from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.samples import Sample
 from onboard.core.maths.accelerometer import SixParameters
 
@@ -79,6 +80,10 @@ class Flights:
     def feed(self, sample: Sample) -> object:
         """Take a sample."""
         return self._flights[-1].feed(sample)
+
+    def feed_block(self, block: Block) -> object | None:
+        """Take many samples at once; None, and none is taken, if they are to be fed one by one."""
+        return self._flights[-1].feed_block(block)
 
     def finish(self) -> object:
         """There are no more recordings."""

@@ -23,6 +23,7 @@ from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.samples import Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.compiling import prefer_compiled
@@ -81,6 +82,15 @@ class Recorded:
                 sample = replace(sample, t=t + self._shift)
             self._newest = max(self._newest, t + self._shift)
         return self._reader.feed(sample)
+
+    def feed_block(self, block: Block) -> object | None:
+        """Take many samples at once; None, and none is taken, if they are to be fed one by one."""
+        if self._begins or self._shift:
+            return None
+        taken = self._reader.feed_block(block)
+        if taken is not None:
+            self._newest = max(self._newest, block.latest)
+        return taken
 
     def finish(self) -> object:
         """There are no more recordings."""

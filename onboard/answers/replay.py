@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import msgspec
 import numpy as np
@@ -20,6 +20,7 @@ from onboard.answers.recorded import unanswered
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage
+from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
@@ -49,6 +50,14 @@ class Reader(Protocol):
     @property
     def standing_s(self) -> float:
         """Time on the ground, which teaches nothing, s."""
+
+
+@runtime_checkable
+class Gatherer(Protocol):
+    """A reader that can take many samples at once."""
+
+    def feed_block(self, block: Block) -> object | None:
+        """Take samples; None, and none is taken, if they are to be fed one by one."""
 
 
 class Estimator(Reader, Protocol):
@@ -221,15 +230,24 @@ def read(
     _refuse_mixture(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
     vehicle = Vehicle()
+    gatherer = reader if isinstance(reader, Gatherer) else None
     fed = 0
     for recording in recordings:
         if recording is not recordings[0]:
             reader.restart()
-        for sample in recording.samples():
-            vehicle.check(sample, recording)
-            reader.feed(sample)
-            fed += 1
-            if progress is not None and fed % PROGRESS_EVERY == 0:
+        told = fed
+        for piece in recording.samples() if gatherer is None else recording.pieces():
+            vehicle.check(piece, recording)
+            if not isinstance(piece, Block):
+                reader.feed(piece)
+                fed += 1
+            else:
+                if gatherer is None or gatherer.feed_block(piece) is None:
+                    for sample in piece.samples():
+                        reader.feed(sample)
+                fed += len(piece)
+            if progress is not None and fed >= told + PROGRESS_EVERY:
+                told = fed
                 progress(min(1.0, fed / total))
     reader.finish()
     vehicle.standing_s = reader.standing_s
@@ -272,13 +290,18 @@ class Vehicle:
         self._parameters: dict[str, float] = {}
         self._device: dict[int, tuple[np.float32, Recording]] = {}
 
-    def check(self, sample: Sample, recording: Recording) -> None:
-        """Take a sample.
+    def check(self, sample: Piece, recording: Recording) -> None:
+        """Take a sample, or many.
 
         Raises:
             RecordingError: it is of another vehicle.
         """
-        if isinstance(sample, ImuSample):
+        if isinstance(sample, Block):
+            for columns in sample.imus:
+                self._samples[columns.imu] += len(columns.t)
+            for other in sample.others:
+                self.check(other, recording)
+        elif isinstance(sample, ImuSample):
             self._samples[sample.imu] += 1
         elif isinstance(sample, GpsFix):
             self._fixes += 1

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
@@ -71,6 +74,23 @@ class BootClock:
         elif number == _SYSTEM_TIME:
             self._pair(message.time_unix_usec, message.time_boot_ms)
         return self.reboots != before
+
+    def only_advances(self, stamps: NDArray[np.float64]) -> bool:
+        """Whether boot times (n,), s, do nothing but go on, in their order of arrival.
+
+        No reboot, no stray stamp that might become one, and no wrap anywhere near: then each is
+        converted as it stands, and the time is the largest of those that were heard.
+        """
+        latest = -np.inf if self.latest is None else self.latest
+        newest = np.maximum.accumulate(np.append(latest, stamps))
+        back = stamps < newest[:-1] - LONGEST_DELAY_S
+        return bool(newest[-1] < WRAP_S - limits.NEAR_WRAP_S and not back.any())
+
+    def advance(self, t: float) -> None:
+        """Stamps of which :meth:`only_advances` holds have come, of which ``t`` is the largest."""
+        if self.latest is None or t >= self.latest:
+            self.latest = t
+            self._suspect = None
 
     def seconds_ms(self, time_boot_ms: int) -> float:
         """Seconds since boot from a 32-bit ``time_boot_ms``; continues across the wrap."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
 from onboard.recordings.bulk import no_collection
+from onboard.recordings.dataflash_columns import block_of, samples_in_order
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_formats import parse_format
 from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
@@ -25,6 +26,8 @@ from onboard.recordings.dataflash_records import (
 )
 from onboard.recordings.dataflash_walk import FMT_LENGTH, MAGIC
 from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
+
+Integers = NDArray[np.int64]
 
 BLOCK = 4096
 """Records converted at a time: bounds the memory, whatever the length of the log [cost]."""
@@ -71,6 +74,9 @@ def open_dataflash(path: Path) -> Recording:
     def read() -> Iterator[Sample]:
         return _samples(index, usable, context)
 
+    def gather() -> Iterator[Piece]:
+        return _blocks(index, usable, context)
+
     return Recording(
         path=path,
         kind="dataflash",
@@ -79,6 +85,7 @@ def open_dataflash(path: Path) -> Recording:
         counts=index.counts(),
         read=read,
         damage=damage,
+        gather=gather,
     )
 
 
@@ -108,29 +115,23 @@ def _times(index: DataflashIndex, slots: list[int]) -> Floats:
     return t
 
 
-def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Sample]:
+def _batches(
+    index: DataflashIndex, usable: frozenset[int], context: Context
+) -> Iterator[list[tuple[Integers, Batch]]]:
+    """Records block by block, of each format together."""
     keep = np.isin(index.slots, list(usable))
     offsets, slots = index.offsets[keep], index.slots[keep]
-
-    def blocks() -> Iterator[Iterator[Sample]]:
-        last = context.first_time
-        for start in range(0, len(offsets), BLOCK):
-            block = offsets[start : start + BLOCK], slots[start : start + BLOCK]
-            with no_collection():
-                samples, last = _convert_block(index, block, context, last)
-            yield samples
-
-    return chain.from_iterable(blocks())
+    last = context.first_time
+    for start in range(0, len(offsets), BLOCK):
+        block = slice(start, start + BLOCK)
+        batches, last = _batches_of(index, offsets[block], slots[block], last)
+        yield batches
 
 
-def _convert_block(
-    index: DataflashIndex,
-    block: tuple[NDArray[np.int64], NDArray[np.uint16]],
-    context: Context,
-    last: float,
-) -> tuple[Iterator[Sample], float]:
-    """Samples of a block in the order of their records, and the time of its last record."""
-    offsets, slots = block
+def _batches_of(
+    index: DataflashIndex, offsets: Integers, slots: NDArray[np.uint16], last: float
+) -> tuple[list[tuple[Integers, Batch]], float]:
+    """Records of a block by their format, and the time of its last record."""
     groups = [(slot, np.flatnonzero(slots == slot)) for slot in np.unique(slots).tolist()]
     records = {slot: index.gather(slot, offsets[rows]) for slot, rows in groups}
     t = np.full(len(offsets) + 1, np.nan)
@@ -142,14 +143,19 @@ def _convert_block(
     # A record without a time of its own takes that of the one before it.
     known = np.where(np.isfinite(t), np.arange(len(t)), 0)
     t = t[np.maximum.accumulate(known)]
-    samples: list[Sample | None] = []
-    places = []
-    for slot, rows in groups:
-        form = index.formats[slot]
-        batch = Batch(form, records[slot], t[rows + 1])
-        for convert in CONVERTERS[form.name]:
-            with np.errstate(all="ignore"):  # damaged bytes make any number
-                samples.extend(convert(batch, context))
-            places.append(rows)
-    order = np.argsort(np.concatenate(places), kind="stable").tolist()
-    return filter(None, map(samples.__getitem__, order)), float(t[-1])
+    batches = [(rows, Batch(index.formats[s], records[s], t[rows + 1])) for s, rows in groups]
+    return batches, float(t[-1])
+
+
+def _samples(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Sample]:
+    for batches in _batches(index, usable, context):
+        with no_collection():
+            samples, _ = samples_in_order(batches, context)
+        yield from samples
+
+
+def _blocks(index: DataflashIndex, usable: frozenset[int], context: Context) -> Iterator[Piece]:
+    for batches in _batches(index, usable, context):
+        with no_collection(), np.errstate(all="ignore"):  # damaged bytes make any number
+            block = block_of(batches, context)
+        yield block

@@ -8,10 +8,11 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import (
     AirData,
@@ -38,6 +39,8 @@ from onboard.recordings.dataflash_context import (
     receiver_of,
 )
 from onboard.recordings.dataflash_formats import Format, Records
+
+Integers = NDArray[np.int64]
 
 SECONDS_PER_WEEK = 604800.0
 MOST_IMUS = 5
@@ -84,11 +87,6 @@ Converted = Iterable[Sample | None]
 Converter = Callable[[Batch, Context], Converted]
 
 
-def _rows(columns: Sequence[Floats]) -> list[tuple[float, ...]]:
-    """Columns (n,) as n tuples."""
-    return list(zip(*(column.tolist() for column in columns), strict=True))
-
-
 def record_times(form: Format, records: Records) -> Floats | None:
     """(n,) boot time of records, s; None where the layout has no time of its own."""
     if form.has("TimeUS"):
@@ -98,28 +96,54 @@ def record_times(form: Format, records: Records) -> Floats | None:
     return form.numbers(records, "TimeMS") / 1e3 if form.has("TimeMS") else None
 
 
+def imu_numbers(batch: Batch) -> Integers:
+    """(n,) numbers of the accelerometers of IMU records, from 1."""
+    first = int(batch.form.name[3:] or 1)
+    told = np.minimum(np.array(batch.integers("I")), MOST_IMUS)  # damaged bytes make any number
+    numbers: Integers = told.astype(np.int64) + first
+    return numbers
+
+
+def imu_rows(batch: Batch) -> tuple[Floats, NDArray[np.bool_]]:
+    """Rate, force and temperature (n, 7) of IMU records, and whether they are measurements (n,).
+
+    The temperature is NaN where the record has none.
+    """
+    form, records = batch.form, batch.records
+    names = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
+    measured = np.column_stack([form.numbers(records, name) for name in names])
+    named = next((c for c in ("T", "Temp") if form.has(c)), None)
+    heat = form.numbers(records, named) if named else np.zeros(len(records))
+    # A temperature of exactly 0 is that of a sensor without a thermometer.
+    celsius = np.where(heat == 0.0, np.nan, heat)
+    # Not a measurement: the sensor was not there yet, or there is none such.
+    there = np.any(measured != 0.0, axis=1) & (imu_numbers(batch) <= MOST_IMUS)
+    return np.column_stack((measured, celsius)), there
+
+
 def imu(batch: Batch, _context: Context) -> Converted:
     """IMU (with or without instance), IMU2, IMU3."""
-    first = int(batch.form.name[3:] or 1)
-    numbers = [i + first for i in batch.integers("I")]
-    gyro = [batch.form.numbers(batch.records, c) for c in ("GyrX", "GyrY", "GyrZ")]
-    force = [batch.form.numbers(batch.records, c) for c in ("AccX", "AccY", "AccZ")]
-    named = next((c for c in ("T", "Temp") if batch.form.has(c)), None)
-    # A temperature of exactly 0 is that of a sensor without a thermometer.
-    heat = [x or None for x in batch.floats(named)[0]] if named else [None] * len(numbers)
+    rows, there = imu_rows(batch)
+    p, q, r, x, y, z, celsius = rows.T.tolist()
+    force, rate = list(zip(x, y, z, strict=True)), list(zip(p, q, r, strict=True))
+    heat = [None if math.isnan(degrees) else degrees for degrees in celsius]
+    numbers = imu_numbers(batch).tolist()
     samples: list[Sample | None] = []
-    samples += samples_of(ImuSample, batch.t.tolist(), numbers, _rows(force), _rows(gyro), heat)
-    # Not a measurement: the sensor was not there yet, or there is none such.
-    blank = ~np.any([x != 0.0 for x in (*force, *gyro)], axis=0) | (np.array(numbers) > MOST_IMUS)
-    for k in np.flatnonzero(blank).tolist():
+    samples += samples_of(ImuSample, batch.t.tolist(), numbers, force, rate, heat)
+    for k in np.flatnonzero(~there).tolist():
         samples[k] = None
     return samples
 
 
+def attitude_angles(batch: Batch) -> Floats:
+    """Roll, pitch and yaw (n, 3) of ATT records, rad."""
+    columns = (batch.form.numbers(batch.records, c) for c in ("Roll", "Pitch", "Yaw"))
+    return np.radians(np.column_stack(tuple(columns)))
+
+
 def attitude(batch: Batch, _context: Context) -> Converted:
     """ATT."""
-    angles = [np.radians(batch.form.numbers(batch.records, c)) for c in ("Roll", "Pitch", "Yaw")]
-    return samples_of(AttitudeSample, batch.t.tolist(), *(a.tolist() for a in angles))
+    return samples_of(AttitudeSample, batch.t.tolist(), *attitude_angles(batch).T.tolist())
 
 
 def gps(batch: Batch, context: Context) -> Converted:
@@ -344,10 +368,11 @@ FIRMWARE = {
     "Blimp": "airship",
 }
 IMU_NAMES = ("IMU", "IMU2", "IMU3")
+ATTITUDE_NAME = "ATT"
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     **dict.fromkeys(IMU_NAMES, (imu,)),
     **dict.fromkeys(GPS_NAMES, (gps,)),
-    "ATT": (attitude,),
+    ATTITUDE_NAME: (attitude,),
     "VIBE": (vibration,),
     "CTUN": (throttle,),
     "RCOU": (motors, outputs),
@@ -366,7 +391,7 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
 NEEDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(IMU_NAMES, ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")),
     **dict.fromkeys(GPS_NAMES, ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")),
-    "ATT": ("Roll", "Pitch", "Yaw"),
+    ATTITUDE_NAME: ("Roll", "Pitch", "Yaw"),
     "VIBE": ("VibeX", "VibeY", "VibeZ"),
     "ARSP": ("Airspeed",),
     "XKF2": ("VWN", "VWE"),

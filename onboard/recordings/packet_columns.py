@@ -176,6 +176,19 @@ def _tables() -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     return one, first >> 8 ^ one[(first ^ words >> 8) & 0xFF]
 
 
+@cache
+def layout_of(kind: int) -> np.dtype[np.void]:
+    """Type of the payload of a message by its number."""
+    return layout(mavlink.mavlink_map[kind])
+
+
+def records(kind: int, data: Octets, head: Headers) -> NDArray[np.void]:
+    """(n,) payloads of messages of one kind, with fields by their names."""
+    form = layout_of(kind)
+    # The sender leaves out zeros at the end, and may know more fields than we do.
+    return payloads(data, head, form.itemsize).view(form)[:, 0]
+
+
 def layout(message: Message) -> np.dtype[np.void]:
     """Type of a message's payload, of its class in the dialect: text where it has characters."""
     letters = message.native_format.decode("ascii").lstrip("<")

@@ -8,7 +8,7 @@ import numpy as np
 
 from onboard.mavlink.dialect import Message, mavlink
 from onboard.recordings.bulk import filled
-from onboard.recordings.packet_columns import Headers, Integers, Octets, headers, layout, payloads
+from onboard.recordings.packet_columns import Headers, Integers, Octets, headers, records
 
 
 class Packet:
@@ -37,7 +37,7 @@ class Unpacker:
 
     def __init__(self) -> None:
         self._one = mavlink.MAVLink(None)
-        self._kinds: dict[int, tuple[type[Packet], np.dtype[np.void]]] = {}
+        self._kinds: dict[int, type[Packet]] = {}
 
     def __call__(self, data: Octets, at: Integers) -> list[Message | None]:
         """The messages of packets at places (n,); None where a payload cannot be unpacked."""
@@ -67,15 +67,14 @@ class Unpacker:
 
     def _plain(self, kind: int, data: Octets, head: Headers) -> list[Any]:
         """Packets of one kind that has nothing but numbers."""
-        if kind not in self._kinds:
+        made = self._kinds.get(kind)
+        if made is None:
             message = mavlink.mavlink_map[kind]
             names = tuple(message.ordered_fieldnames)
             made = type(message.msgname, (Packet,), {"__slots__": names, "KIND": kind})
-            self._kinds[kind] = made, layout(message)
-        made, form = self._kinds[kind]
-        # The sender leaves out zeros at the end, and may know more fields than we do.
-        records = payloads(data, head, form.itemsize).view(form)[:, 0]
-        columns = {name: records[name].tolist() for name in form.names or ()}
+            self._kinds[kind] = made
+        fields = records(kind, data, head)
+        columns = {name: fields[name].tolist() for name in fields.dtype.names or ()}
         columns["_system"] = head.system.tolist()
         columns["_component"] = head.component.tolist()
         return filled(made, columns)

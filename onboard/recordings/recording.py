@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import Sample
 
 LONGEST_GAP_S = 3600.0
@@ -25,6 +26,8 @@ class Recording:
     file; ``damage`` says in plain words what was skipped and ``notes`` what was chosen;
     ``airborne``: whether all of it is flight, so that no ground is to be looked for; ``derived``:
     whether its force is the slope of its velocity, so that it has no accelerometer to calibrate.
+    ``read`` gives samples one by one; ``gather`` the same ones with as many together as can be,
+    where the reader can do that, in a fraction of the time.
     """
 
     path: Path
@@ -37,10 +40,15 @@ class Recording:
     notes: tuple[str, ...] = ()
     airborne: bool = False
     derived: bool = False
+    gather: Callable[[], Iterator[Piece]] | None = field(default=None, repr=False)
 
     def samples(self) -> Iterator[Sample]:
         """Every sample in the order of the file; each call starts from the beginning."""
         return self.read()
+
+    def pieces(self) -> Iterator[Piece]:
+        """The same, with samples together between those that they must not reach over."""
+        return self.read() if self.gather is None else self.gather()
 
 
 def elapsed_s(t: NDArray[np.float64]) -> float:

@@ -16,12 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
-from onboard.mavlink.dialect import mavlink, message_ids
+from onboard.mavlink.dialect import Message, mavlink, message_ids
 from onboard.mavlink.framing import next_valid
 from onboard.recordings.bulk import no_collection
+from onboard.recordings.packet_blocks import PacketBlocks
 from onboard.recordings.packet_columns import (
     STAMP_LENGTH,
     Headers,
@@ -105,7 +107,10 @@ def open_tlog(path: Path) -> Recording:
     vehicle = vehicles[source]
 
     def read() -> Iterator[Sample]:
-        return _samples(data, source, vehicle)
+        return chain(_told_late(data, source, vehicle), _samples(data, source, vehicle))
+
+    def gather() -> Iterator[Piece]:
+        return chain(_told_late(data, source, vehicle), _pieces(data, source, vehicle))
 
     return Recording(
         path=path,
@@ -116,6 +121,7 @@ def open_tlog(path: Path) -> Recording:
         read=read,
         damage=damage,
         notes=notes,
+        gather=gather,
     )
 
 
@@ -192,12 +198,10 @@ def _choose(
     return ranked[0], tuple(notes)
 
 
-def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]:
+def _decoder(source: Source, vehicle: _Vehicle) -> Decoder:
     # As on a live link, nothing is taken before the autopilot's first heartbeat, if there is one.
     system, component = source
-    decoder = Decoder(system, component if vehicle.autopilot is None else None)
-    blocks = _decoded(data, vehicle.offsets, decoder)
-    return chain(_told_late(data, source, vehicle), chain.from_iterable(blocks))
+    return Decoder(system, component if vehicle.autopilot is None else None)
 
 
 def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
@@ -218,16 +222,36 @@ def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Param
             yield ParameterValue(name, seen.pop())
 
 
-def _decoded(data: Bytes, offsets: Integers, decoder: Decoder) -> Iterator[list[Sample]]:
-    """Samples of packets, block by block."""
-    unpack = Unpacker()
+def _decoded(messages: list[Message | None], decoder: Decoder) -> list[Sample]:
+    return [s for m in messages if m is not None for s in decoder.decode(m)]
+
+
+def _samples(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Sample]:
+    """Samples of packets one by one, decoded block by block."""
+    decoder, unpack = _decoder(source, vehicle), Unpacker()
     octets = np.frombuffer(data, np.uint8)
-    for start in range(0, len(offsets), BLOCK):
+    for start in range(0, len(vehicle.offsets), BLOCK):
         with no_collection():
-            messages = unpack(octets, offsets[start : start + BLOCK])
-            samples = [s for m in messages if m is not None for s in decoder.decode(m)]
+            at = vehicle.offsets[start : start + BLOCK]
+            samples = _decoded(unpack(octets, at), decoder)
         _let_go(data)
-        yield samples
+        yield from samples
+
+
+def _pieces(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Piece]:
+    """The same with what is many in columns."""
+    decoder, unpack = _decoder(source, vehicle), Unpacker()
+    octets = np.frombuffer(data, np.uint8)
+    blocks = PacketBlocks(octets, decoder, unpack)
+    for start in range(0, len(vehicle.offsets), BLOCK):
+        at = vehicle.offsets[start : start + BLOCK]
+        with no_collection():
+            block = blocks(at)
+            samples = _decoded(unpack(octets, at), decoder) if block is None else ()
+        _let_go(data)
+        if block is not None:
+            yield block
+        yield from samples
 
 
 def _let_go(data: Bytes) -> None:

@@ -9,14 +9,16 @@ a stream and of its recording are the same numbers.
 from __future__ import annotations
 
 import copy
+import math
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Final
 
 from onboard.core.estimate.calibration_record import calibration_of
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.engines import Engines
 from onboard.core.estimate.events import Advanced, Event, FlightEnded, Restarted
+from onboard.core.estimate.limits import AHEAD_OF_IMU_S
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.stream_clock import StreamClock
@@ -24,6 +26,7 @@ from onboard.core.gps.distrust import Distrust, WindowClosed, WindowEvent
 from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
+from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
@@ -134,6 +137,58 @@ class Calibrator:
                 return self._judged(sample)
         return ()
 
+    def feed_block(self, block: Block) -> tuple[Event, ...] | None:
+        """Take many samples at once, with what comes of it when they are fed one by one.
+
+        None, and nothing is taken, where they have to be (:meth:`admits`).
+        """
+        if not self.admits(block):
+            return None
+        return tuple(event for _, _, events in self.go_through(block) for event in events)
+
+    def admits(self, block: Block) -> bool:
+        """Whether no sample of a block would be refused, nor begin another boot."""
+        newest = self._clock.newest
+        return (
+            newest > -math.inf
+            and block.is_plain
+            and not self._clock.went_back(block.first_imu)
+            and block.attitude_ahead(newest) <= AHEAD_OF_IMU_S
+            and self._assembly.streams.continued_by(block)
+            and not (block.coarse and self._may_forget(block))
+        )
+
+    def _may_forget(self, block: Block) -> bool:
+        """Whether an accelerometer may be begun anew: that HIGHRES_IMU came, is forgotten, too."""
+        receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
+        known = {self._trust.receiver} - {None}
+        told = any(isinstance(s, ParameterValue) for s in block.others)
+        return told or len(receivers | known) > 1
+
+    def go_through(self, block: Block) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
+        """Take a block that is admitted, to the end.
+
+        Yields:
+            each sample that is neither inertial nor an attitude (None: the end of the block), the
+            latest time of the inertial ones since the one before it (-inf: there is none), and what
+            came of them and of it.
+        """
+        streams, feed, heard = self._assembly.streams, self.feed, block.heard()
+        streams.begin(block, self.parameters)
+        for sample, place, t in zip(block.others, block.places, heard, strict=False):
+            events = self._passed(t) if t > -math.inf else ()
+            streams.reach(place)
+            yield sample, t, events + feed(sample)
+        streams.end()
+        t = heard[-1]
+        yield None, t, self._passed(t) if t > -math.inf else ()
+
+    def _passed(self, t: float) -> tuple[Event, ...]:
+        """Inertial samples have come, the latest of them with this time, s."""
+        self._clock.hear(t)
+        # A receiver that fell silent says nothing more: only the passing of time shows it.
+        return self._counted(self._trust.pass_time(t))
+
     def restart(self, reason: str = "another recording") -> tuple[Event, ...]:
         """The clock begins anew: forget the inertial states, keep the sums."""
         events = self._advance(everything=True)
@@ -219,6 +274,7 @@ class Calibrator:
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Take a report; what was taken for raw before the calibration was known, was not raw."""
+        self._assembly.streams.settle()
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)
@@ -235,10 +291,8 @@ class Calibrator:
         if self._clock.went_back(sample.t):
             self._counts["reboots"] += 1
             events = self.restart("reboot")
-        self._clock.hear(sample.t)
         self._assembly.streams.imu(sample, self.parameters)
-        # A receiver that fell silent says nothing more: only the passing of time shows it.
-        return events + self._counted(self._trust.pass_time(sample.t))
+        return events + self._passed(sample.t)
 
     def _attitude(self, sample: AttitudeSample) -> None:
         if self._clock.is_ahead(sample.t):

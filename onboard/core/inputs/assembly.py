@@ -86,11 +86,13 @@ class Assembly:
             grounded: whether the vehicle stands (then nothing is handed out); None: nobody says,
                 the motion decides.
         """
-        live, waiting = self.streams.live, self.streams.fixes
-        ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
-        if len(waiting) < 2:
-            return {}
+        waiting = self.streams.fixes
         least = LEAST_WAITING_S if everything else self._settings.batch_s
+        if len(waiting) < 2 or waiting.last - waiting.first < least:
+            return {}
+        self.streams.settle()
+        live = self.streams.live
+        ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
         if min(ready, waiting.last) - waiting.first < least:
             return {}
         taken, trusted, t = waiting.take(ready)

@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.maths.arrays import Array
 
 LONGEST_UPTIME_S = 1e9
 MOST_FORCE = 1000.0
@@ -69,6 +72,33 @@ def impossible(sample: Sample) -> str | None:
     elif not _is_time(sample.t):
         return "impossible"
     return None
+
+
+def imu_possible(imu: int, t: Array, rows: Array) -> bool:
+    """Whether :func:`impossible` has nothing against any of many inertial samples.
+
+    Args:
+        imu: number of the accelerometer.
+        t: (n,) s.
+        rows: (n, 6) rate, rad/s, and force, m/s^2.
+    """
+    return (
+        imu in ACCELEROMETERS
+        and _all_below(LONGEST_UPTIME_S, t[:, None])
+        and _all_below(MOST_RATE, rows[:, :3])
+        and _all_below(MOST_FORCE, rows[:, 3:])
+    )
+
+
+def attitudes_possible(t: Array, angles: Array) -> bool:
+    """The same of attitudes: times (n,), s; roll, pitch and yaw (n, 3), rad."""
+    return _all_below(LONGEST_UPTIME_S, t[:, None]) and _all_below(MOST_ANGLE, angles)
+
+
+def _all_below(most: float, x: Array) -> bool:
+    """Whether rows of ``x`` (n, d) are shorter than ``most``."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.all((x * x).sum(axis=1) < most * most))
 
 
 def _is_time(t: float) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
+from onboard.core.inputs.blocks import AttitudeColumns, Block, ImuColumns
 from onboard.core.inputs.limits import SILENT_S, SLOW_KEPT_S
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import (
@@ -20,6 +23,28 @@ from onboard.core.inputs.tracks import FixTrack, ImuTrack, SlowTrack
 from onboard.core.maths.arrays import Array
 
 
+class _Passing:
+    """A block that is being gone through: how much of it has come, and is in the tracks."""
+
+    __slots__ = ("_block", "_taken", "parameters", "reached")
+
+    def __init__(self, block: Block, parameters: ParametersInForce) -> None:
+        self.parameters = parameters
+        self.reached = 0
+        self._block = block
+        self._taken = [0] * (len(block.kept) + 1)
+
+    def due(self) -> Iterator[tuple[ImuColumns | AttitudeColumns, slice]]:
+        """Columns and rows of them that have come since the last time."""
+        streams: tuple[ImuColumns | AttitudeColumns, ...]
+        streams = (*self._block.kept, self._block.attitude)
+        for k, columns in enumerate(streams):
+            first, last = self._taken[k], int(np.searchsorted(columns.places, self.reached))
+            if first < last:
+                self._taken[k] = last
+                yield columns, slice(first, last)
+
+
 class Streams:
     """Tracks of all streams.
 
@@ -31,7 +56,7 @@ class Streams:
         over_mavlink: whether inertial samples came by MAVLink, not from a log.
     """
 
-    __slots__ = ("_R_bs", "fixes", "imus", "over_mavlink", "recorded", "slow")
+    __slots__ = ("_R_bs", "_passing", "fixes", "imus", "over_mavlink", "recorded", "slow")
 
     def __init__(self) -> None:
         self.imus: dict[int, ImuTrack] = {}
@@ -40,17 +65,70 @@ class Streams:
         self.fixes = FixTrack()
         self.over_mavlink = False
         self._R_bs: tuple[float, Array | None] = (0.0, None)
+        self._passing: _Passing | None = None
 
     def imu(self, sample: ImuSample, parameters: ParametersInForce) -> None:
         """Take an inertial sample, raw by the parameters in force now."""
         track = self.imus.get(sample.imu)
         if track is None:
             track = self.imus[sample.imu] = ImuTrack()
+        self.over_mavlink = sample.source is not ImuSource.LOG
+        track.add(sample, parameters.six(sample.imu), self._turned(parameters))
+
+    def continued_by(self, block: Block) -> bool:
+        """Whether a plain block has nothing that would be refused for what is here."""
+        times = block.attitude.t
+        if len(times) and not times.item(0) > self.recorded.last:
+            return False
+        for columns in block.kept:
+            track = self.imus.get(columns.imu)
+            if track is not None and not track.continued_by(columns):
+                return False
+        for raw, fine in block.coarse:
+            # What comes before the first of the finer ones here must follow one of before.
+            first = int(np.searchsorted(raw.places, fine.places[0]))
+            track = self.imus.get(raw.imu)
+            if first and (track is None or not track.covers(raw.t.item(first - 1))):
+                return False
+        return True
+
+    def begin(self, block: Block, parameters: ParametersInForce) -> None:
+        """Begin to take the inertial samples and attitudes of a plain block that continues this."""
+        self._passing = _Passing(block, parameters)
+
+    def reach(self, place: int) -> None:
+        """What stands before a place of the block has come: :meth:`settle` before it is used."""
+        if self._passing is not None:
+            self._passing.reached = place
+
+    def settle(self) -> None:
+        """Put what has come in the tracks, raw by the parameters in force since the last time."""
+        if self._passing is None:
+            return
+        parameters = self._passing.parameters
+        for columns, rows in self._passing.due():
+            if isinstance(columns, AttitudeColumns):
+                self.recorded.extend(columns.t[rows], columns.angles[rows])
+                continue
+            track = self.imus.get(columns.imu)
+            if track is None:
+                track = self.imus[columns.imu] = ImuTrack()
+            self.over_mavlink = columns.source is not ImuSource.LOG
+            R_bs = self._turned(parameters)
+            track.extend(columns, rows, parameters.six(columns.imu), R_bs)
+
+    def end(self) -> None:
+        """All of the block has come."""
+        self.reach(sys.maxsize)
+        self.settle()
+        self._passing = None
+
+    def _turned(self, parameters: ParametersInForce) -> Array | None:
+        """The board's orientation in force, the same matrix while it stays the same."""
         orientation = parameters.values.get("AHRS_ORIENTATION", 0.0)
         if orientation != self._R_bs[0]:
             self._R_bs = (orientation, parameters.R_bs)
-        self.over_mavlink = sample.source is not ImuSource.LOG
-        track.add(sample, parameters.six(sample.imu), self._R_bs[1])
+        return self._R_bs[1]
 
     def attitude(self, sample: AttitudeSample) -> None:
         """Take a recorded attitude."""
@@ -100,6 +178,7 @@ class Streams:
 
     def forget_imu(self, imu: int) -> None:
         """Forget what waits of one accelerometer, but not what was refused of it."""
+        self.settle()
         if imu in self.imus:
             refused = self.imus[imu].refused
             self.imus[imu] = ImuTrack()

@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.blocks import ImuColumns
 from onboard.core.inputs.even_times import even_times
 from onboard.core.inputs.limits import BEFORE_NEXT_S, HIGHRES_S
+from onboard.core.inputs.rows import Rows
 from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
@@ -48,11 +50,10 @@ class _Manner(NamedTuple):
 class ImuTrack:
     """Raw inertial samples of one IMU."""
 
-    __slots__ = ("_arrays", "_manners", "_rows", "_t", "highres_t", "mismatched", "refused")
+    __slots__ = ("_arrays", "_manners", "_rows", "highres_t", "mismatched", "refused")
 
     def __init__(self) -> None:
-        self._t: list[float] = []
-        self._rows: list[tuple[float, ...]] = []
+        self._rows = Rows()
         """Rate, force and temperature as reported."""
         self._manners: list[tuple[int, _Manner]] = []
         """From which row on they were made in which manner: it changes once a flight, if at all."""
@@ -64,10 +65,10 @@ class ImuTrack:
     @property
     def last(self) -> float:
         """Time of the newest sample; -inf if there is none."""
-        return self._t[-1] if self._t else -np.inf
+        return self._rows.last
 
     def __len__(self) -> int:
-        return len(self._t)
+        return len(self._rows)
 
     def add(self, sample: ImuSample, six: SixParameters, R_bs: Array | None) -> bool:
         """Keep the sample, of which truncation and parameters are undone; False if it was refused.
@@ -80,10 +81,11 @@ class ImuTrack:
         t = sample.t
         if sample.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t
-        elif sample.source is ImuSource.RAW_IMU and t - self.highres_t < HIGHRES_S:
+        elif sample.source is ImuSource.RAW_IMU and self.covers(t):
             return False
-        if not t > self.last:
-            self.refused["imu_late" if t < self.last else "imu_repeated"] += 1
+        rows = self._rows
+        if not t > rows.last:
+            self.refused["imu_late" if t < rows.last else "imu_repeated"] += 1
             return False
         if sample.w_b is None:
             self.refused["imu_without_gyro"] += 1
@@ -93,36 +95,60 @@ class ImuTrack:
             self.refused["imu_not_finite"] += 1
             return False
         celsius = np.nan if sample.temperature is None else sample.temperature
+        self._made(sample.w_step, sample.f_step, six, R_bs)
+        rows.add(t, (*row, celsius))
+        return True
+
+    def covers(self, t: float) -> bool:
+        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that RAW_IMU is not taken."""
+        return t - self.highres_t < HIGHRES_S
+
+    def continued_by(self, columns: ImuColumns) -> bool:
+        """Whether plain samples are newer than all that are here, and none is to be refused."""
+        begins = columns.t.item(0)
+        coarse = columns.source is ImuSource.RAW_IMU and self.covers(begins)
+        return begins > self._rows.last and not coarse
+
+    def extend(
+        self, columns: ImuColumns, rows: slice, six: SixParameters, R_bs: Array | None
+    ) -> None:
+        """Keep samples (at least one) of columns that continue this, as :meth:`add` would."""
+        t = columns.t[rows]
+        if columns.source is ImuSource.HIGHRES_IMU:
+            self.highres_t = t.item(-1)
+        self._made(columns.w_step, columns.f_step, six, R_bs)
+        self._rows.extend(t, columns.rows[rows])
+
+    def _made(self, w_step: float, f_step: float, six: SixParameters, R_bs: Array | None) -> None:
+        """Something is added that was made in this manner."""
+        self._arrays = None
         manner = self._manners[-1][1] if self._manners else None
         if (
             manner is None
             or (manner.six is not six and manner.six != six)
             or manner.R_bs is not R_bs
-            or manner.w_step != sample.w_step
-            or manner.f_step != sample.f_step
+            or manner.w_step != w_step
+            or manner.f_step != f_step
         ):
-            self._manners.append((len(self._t), _Manner(sample.w_step, sample.f_step, six, R_bs)))
-        self._arrays = None
-        self._t.append(t)
-        self._rows.append((*row, celsius))
-        return True
+            self._manners.append((len(self._rows), _Manner(w_step, f_step, six, R_bs)))
 
     def arrays(self) -> tuple[Array, Array]:
         """``t`` (n,) and rows (n, 7): rate, raw, temperature; of all who ask the same ones."""
         if self._arrays is None:
-            rows = np.array(self._rows).reshape(len(self._t), 7)
+            t, rows = self._rows.arrays()
+            t, rows = t.copy(), rows.reshape(len(t), 7).copy()
             for k, (first, manner) in enumerate(self._manners):
                 last = self._manners[k + 1][0] if k + 1 < len(self._manners) else len(rows)
                 rows[first:last] = manner.undone(rows[first:last])
-            self._arrays = np.array(self._t), rows
+            self._arrays = t, rows
             for array in self._arrays:
                 array.flags.writeable = False
         return self._arrays
 
     def drop_before(self, t: float) -> None:
         """Forget what is older than ``t``."""
-        i = int(np.searchsorted(self._t, t))
-        del self._t[:i], self._rows[:i]
+        i = int(np.searchsorted(self._rows.arrays()[0], t))
+        self._rows.drop(i)
         manners = [(max(first - i, 0), manner) for first, manner in self._manners]
         # Of those that begin with the first row that is left, the last is in force there.
         over = sum(first == 0 for first, _ in manners) - 1
@@ -133,41 +159,44 @@ class ImuTrack:
 class SlowTrack:
     """A slow signal, scalar or vector: times and values."""
 
-    __slots__ = ("_t", "_x")
+    __slots__ = ("_rows",)
 
     def __init__(self) -> None:
-        self._t: list[float] = []
-        self._x: list[tuple[float, ...]] = []
+        self._rows = Rows()
 
     def __len__(self) -> int:
-        return len(self._t)
+        return len(self._rows)
 
     @property
     def first(self) -> float:
         """Time of the oldest value; inf if there is none."""
-        return self._t[0] if self._t else np.inf
+        return self._rows.first
 
     @property
     def last(self) -> float:
         """Time of the newest value; -inf if there is none."""
-        return self._t[-1] if self._t else -np.inf
+        return self._rows.last
 
     def add(self, t: float, x: tuple[float, ...]) -> bool:
         """Keep a value unless it is late or not finite."""
-        if (self._t and not t > self._t[-1]) or not math.isfinite(t + sum(x)):
+        if not t > self._rows.last or not math.isfinite(t + sum(x)):
             return False
-        self._t.append(t)
-        self._x.append(x)
+        self._rows.add(t, x)
         return True
+
+    def extend(self, t: Array, x: Array) -> None:
+        """Keep values (n, d) at increasing times (n,) that are newer, all of them finite."""
+        self._rows.extend(t, x)
 
     def arrays(self) -> tuple[Array, Array]:
         """Times (n,) and values (n, d)."""
-        return np.array(self._t), np.array(self._x)
+        t, x = self._rows.arrays()
+        return t.copy(), x.copy()
 
     def drop_before(self, t: float) -> None:
         """Forget what is older than ``t``, but keep the last two values."""
-        i = min(int(np.searchsorted(self._t, t)), max(len(self._t) - 2, 0))
-        del self._t[:i], self._x[:i]
+        i = int(np.searchsorted(self._rows.arrays()[0], t))
+        self._rows.drop(min(i, max(len(self._rows) - 2, 0)))
 
 
 class FixTrack:
