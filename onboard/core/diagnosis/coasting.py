@@ -8,7 +8,7 @@ agrees: it is taken out in proportion to time, as the bridge between two known e
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,7 +26,7 @@ from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELOCITY
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import EpochTrace, Traces
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.maths.arrays import Array
@@ -100,7 +100,7 @@ def _within(t: float, spans: Sequence[Array]) -> bool:
     return any(a - 1e-3 <= t <= b + 1e-3 for a, b in spans)
 
 
-def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[EpochTrace]]:
+def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], Traces]:
     """Refused fixes compared, and all epochs, by a filter that coasts for any time."""
     solution = full.found()
     made = Pass(
@@ -113,7 +113,7 @@ def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[
         covariance=solution.covariance,
     )
     made.filter = asking = AskingFilter(full.model.size, levels, made.uses)
-    traces: list[EpochTrace] = []
+    traces = Traces(sum(len(b.fixes) for b in full.batches), full.model.size)
     for batch in full.batches:
         if batch.fresh:
             made.restart()
@@ -132,7 +132,7 @@ def _groups(asked: Sequence[Asked]) -> Iterator[list[Asked]]:
 
 
 def _bridged(
-    group: Sequence[Asked], traces: Sequence[EpochTrace], theta: Array
+    group: Sequence[Asked], traces: Iterable[EpochTrace], theta: Array
 ) -> tuple[Array, Array, bool]:
     """Innovations (n, 2) and covariances (n, 2, 2) less the drift that the end shows, if it does.
 
@@ -162,7 +162,7 @@ def _chi2(y: Array, S: Array) -> float:
 
 
 def _with_before(
-    group: Sequence[Asked], traces: Sequence[EpochTrace], theta: Array
+    group: Sequence[Asked], traces: Iterable[EpochTrace], theta: Array
 ) -> tuple[Array, Array]:
     """Times (n,) and innovations (n, 2) of a group and of the seconds right before it."""
     first = group[0].t

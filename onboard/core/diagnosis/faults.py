@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -29,7 +29,7 @@ ONSET = FEWEST_FIXES // 2 + 1
 
 
 def fault_effect(
-    traces: Sequence[EpochTrace],
+    traces: Iterable[EpochTrace],
     theta: Array,
     batches: Sequence[Batch],
     t0: float,
@@ -137,7 +137,7 @@ class _Spell:
     lost: bool = False
 
 
-def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
+def _runs(traces: Iterable[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
     """Times of refused velocities, those together that no gap's length of good ones parts.
 
     Nor does a run go on when the filter has taken the error for a velocity and is off by another.

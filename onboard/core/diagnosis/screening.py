@@ -23,7 +23,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine, through
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces, residual
 from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -113,7 +113,7 @@ def false_fixes(
 
 def _asked_again(
     full: Examination, levels: NoiseLevels, known: Sequence[Contradiction], *, again: bool
-) -> list[EpochTrace]:
+) -> Traces:
     """Epochs of a pass whose gates judge every fix; ``again`` also those refused in flight.
 
     Not those that are ``known`` to be false: a filter would take them for true in the end.
@@ -128,7 +128,7 @@ def _asked_again(
         theta=solution.theta,
         covariance=solution.covariance,
     )
-    traces: list[EpochTrace] = []
+    traces = Traces(sum(len(b.fixes) for b in full.batches), full.model.size)
     for batch in full.batches:
         asked = batch
         if again:
@@ -169,14 +169,11 @@ def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
     Returns:
         Noise levels; the error (m/s) that no honest fix has; whether any is far off.
     """
-    steps = [
-        (x.innovation - x.columns @ theta)[:2]
-        for x in full.traces
-        if x.velocities and len(x.innovation)
-    ]
-    if not steps:
+    traces = full.traces
+    seen = traces.velocities > 0
+    if not seen.any():
         return full.noise, FAULT_M_S, False
-    off = np.abs(np.concatenate(steps))
+    off = np.abs(residual(traces.innovation, traces.columns, theta)[seen, :2])
     usual = 1.4826 * float(np.median(off))
     noise, floor = full.noise, NoiseLevels()
     levels = replace(
