@@ -133,9 +133,10 @@ class Pass:
         sums = self._go_through(made.segment, ready, result)
         self._take_bias_out()
         self.sums += sums
-        result.block.sums = block = sums.member(0)
+        block = sums.member(0)
         if self.filter.noise_gram is not None:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
+        result.block = Block(ready.start, ready.end, block)
         return result
 
     def _made_ready(self, source: Source) -> Kept:
