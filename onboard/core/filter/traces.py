@@ -179,6 +179,14 @@ class Traces:
         self.refused |= {first + i: names for i, names in others.refused.items()}
         self.refused_by |= {first + i: by for i, by in others.refused_by.items()}
 
+    def at(self, theta: Array) -> Traces:
+        """The same with innovations at ``theta`` (m,), their regressors left out."""
+        out, n = Traces(len(self)), len(self)
+        out._t[:], out._velocities[:], out._count = self.t, self.velocities, n
+        out._innovation[:] = residual(self.innovation, self.columns, theta)
+        out.refused, out.refused_by = dict(self.refused), dict(self.refused_by)
+        return out
+
     def _next(self, count: int) -> slice:
         """Places of the next epochs; where room is short there is made twice as much."""
         first, self._count = self._count, self._count + count
