@@ -16,13 +16,14 @@ from benchmarks.real.whiteness import Whiteness, whiteness
 from onboard.answers.recorded import Recorded
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
-from onboard.core.estimate.dead_reckoning import Interval, intervals
+from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.model.linearisation import Linearisation
 from onboard.recordings.opening import open_recording
 
 Array = NDArray[np.float64]
@@ -31,6 +32,9 @@ MOVING_M_S = 0.5
 """Faster than this a vehicle is in the air: a receiver at rest wanders slower."""
 AT_LIMIT = 0.01
 """A level is at a limit within this share of it."""
+
+
+NO_CHAIN = intervals((), Linearisation())
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +95,7 @@ class Fit:
     refused: dict[str, int]
     white: tuple[Whiteness, ...]
     batches: tuple[Batch, ...] = ()
-    chain: tuple[Interval, ...] = ()
+    chain: Chain = NO_CHAIN
     states: tuple[EpochState, ...] = ()
     beside: Beside = NOTHING
 
@@ -170,7 +174,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         refused=dict(engine.refused),
         white=whiteness(engine.whitened(), solution.theta),
         batches=tuple(engine.batches),
-        chain=tuple(intervals([(b.segment, b.fixes) for b in engine.batches], engine.point)),
+        chain=intervals([(b.segment, b.fixes) for b in engine.batches], engine.point),
         states=tuple(engine.states),
         beside=beside(engine, MOVING_M_S, flight.ends_s),
     )

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from array import array
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,6 @@ from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sampl
 from onboard.core.maths.accelerometer import parameters_of
 
 Array = NDArray[np.float64]
-Item = TypeVar("Item")
 
 MOST_POINTS = 60
 """Of a course: each is a solution of its own."""
@@ -122,7 +121,7 @@ class Chronicle:
         self._engines: dict[int, Engine] = {}
         self._held: dict[int, list[tuple[float, Array]]] = {}
         self._spans: list[Span] = []
-        self._speed: list[tuple[float, float]] = []
+        self._speed = (array("d"), array("d"))
 
     # What goes by
 
@@ -179,7 +178,8 @@ class Chronicle:
     @property
     def speed(self) -> Curve:
         """Speed over ground that GPS reported, m/s."""
-        return Curve(np.array([t for t, _ in self._speed]), np.array([v for _, v in self._speed]))
+        t, v = self._speed
+        return Curve(np.array(t), np.array(v))
 
     def figures(self, imu: int) -> Figures:
         """The figures of one accelerometer; empty curves where nothing was learned."""
@@ -243,8 +243,10 @@ class Chronicle:
             self._spans[-1] = Span(last.start, now, reason)
         else:
             self._spans.append(Span(last.end, now, reason))
-        if not self._speed or now - self._speed[-1][0] >= SPEED_S:
-            self._speed.append((now, float(np.hypot(fix.v_n, fix.v_e))))
+        times, speeds = self._speed
+        if not times or now - times[-1] >= SPEED_S:
+            times.append(now)
+            speeds.append(float(np.hypot(fix.v_n, fix.v_e)))
 
     def _course(self, imu: int, engine: Engine) -> Course:
         """Solutions of the sums up to some of the blocks, the last of all of them."""
@@ -293,11 +295,11 @@ class Chronicle:
         sixes = (held.as_linear(), solution.theta[:6])
         chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
         states = list(engine.states)
-        known = {id(piece): run for piece, run in self._runs(states, [s.t for s in states])}
+        known = {id(piece): run for piece, run in self._runs([s.t for s in states])}
         times, errors = [np.zeros(0)], [np.zeros((2, 0))]
-        for piece, run in self._runs(chain, [x.start for x in chain]):
+        for piece, run in self._runs(chain.start.tolist()):
             if of_run := known.get(id(piece)):
-                got = free_errors(run, of_run, sixes, horizon_s=FREE_S)
+                got = free_errors(chain[run], states[of_run], sixes, horizon_s=FREE_S)
                 times.append(piece.time(got.t))
                 errors.append(got.error)
         t, both = np.concatenate(times), np.concatenate(errors, axis=1)
@@ -306,17 +308,21 @@ class Chronicle:
     def _innovation(self, engine: Engine) -> Curve:
         states = list(engine.states)
         times, lengths = [np.zeros(0)], [np.zeros(0)]
-        for piece, run in self._runs(states, [s.t for s in states]):
-            times.append(piece.time(np.array([s.t for s in run])))
-            residual = np.nan_to_num(np.array([s.innovation for s in run]))
+        for piece, run in self._runs([s.t for s in states]):
+            times.append(piece.time(np.array([s.t for s in states[run]])))
+            residual = np.nan_to_num(np.array([s.innovation for s in states[run]]))
             lengths.append(np.linalg.norm(residual, axis=1))
         return Curve(np.concatenate(times), np.concatenate(lengths))
 
-    def _runs(self, items: list[Item], times: list[float]) -> list[tuple[_Piece, list[Item]]]:
-        """What is of one run of the clock each, by its times in order."""
-        pairs = zip(self._places(times), items, strict=True)
-        grouped = itertools.groupby(pairs, key=lambda pair: pair[0])
-        return [(piece, [x for _, x in group]) for piece, group in grouped if piece is not None]
+    def _runs(self, times: list[float]) -> list[tuple[_Piece, slice]]:
+        """Which of these times, in their order, are of one run of the clock each."""
+        out, first = [], 0
+        for piece, group in itertools.groupby(self._places(times), key=lambda placed: placed):
+            last = first + sum(1 for _ in group)
+            if piece is not None:
+                out.append((piece, slice(first, last)))
+            first = last
+        return out
 
     def _places(self, times: list[float]) -> list[_Piece | None]:
         """The run of the clock that each of these times is of, the latest possible, in order."""

@@ -26,7 +26,6 @@ from onboard.recordings.bulk import no_collection
 from onboard.recordings.packet_blocks import PacketBlocks
 from onboard.recordings.packet_columns import (
     STAMP_LENGTH,
-    Headers,
     Integers,
     Octets,
     headers,
@@ -39,6 +38,7 @@ from onboard.recordings.tlog_index import Bytes, TlogIndex, index_tlog
 Source = tuple[int, int]
 """System id, component id."""
 Floats = NDArray[np.float64]
+Words = NDArray[np.int32]
 
 LATE_S = 60.0
 """A parameter that is first reported so long after the inertial samples began was read late, as
@@ -54,6 +54,8 @@ INERTIAL = {
 HEARTBEAT_LENGTH = 9
 BLOCK = 2048
 """Packets decoded at a time: bounds the memory, whatever the length of the log [cost]."""
+TOGETHER = 65536
+"""Packets whose headers are looked at together [cost]."""
 WANTED = message_ids(Decoder.names)
 AUTOPILOTS = {
     mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
@@ -65,25 +67,20 @@ AUTOPILOTS = {
 class _Vehicle:
     """What one source of packets sent: the places of what is wanted.
 
-    ``imu_times`` (s) are by message number, in the order in which the messages came first;
+    ``duration_s`` is that of the clock over the inertial messages of which there are most;
     ``reports`` are the places of parameters, and ``late`` says whether they came late.
     """
 
     autopilot: int | None
     counts: dict[int, int]
     offsets: Integers
-    imu_times: dict[int, Floats]
+    duration_s: float
     reports: Integers
     late: NDArray[np.bool_]
 
     @property
     def imu_messages(self) -> int:
         return sum(n for kind, n in self.counts.items() if kind in INERTIAL)
-
-    @property
-    def duration_s(self) -> float:
-        longest = max(self.imu_times.values(), key=len, default=np.zeros(0))
-        return elapsed_s(longest)
 
 
 def is_tlog(head: bytes) -> bool:
@@ -128,44 +125,59 @@ def open_tlog(path: Path) -> Recording:
 def _vehicles(index: TlogIndex) -> dict[Source, _Vehicle]:
     """The wanted packets by their senders, in the order in which these were heard first."""
     data = np.frombuffer(index.data, np.uint8)
-    head = headers(data, index.offsets)
-    senders = head.system << 8 | head.component
+    kinds, senders = _told(data, index.offsets)
     found, first = np.unique(senders, return_index=True)
     vehicles = {}
     for sender in found[np.argsort(first)].tolist():
-        rows = np.flatnonzero(senders == sender)
-        vehicle = _vehicle(data, index.offsets[rows], head.of(rows))
+        rows = np.flatnonzero(senders == sender) if len(found) > 1 else slice(None)
+        vehicle = _vehicle(data, index.offsets[rows], kinds[rows])
         vehicles[sender >> 8, sender & 0xFF] = vehicle
     return vehicles
 
 
-def _vehicle(data: Octets, offsets: Integers, head: Headers) -> _Vehicle:
+def _told(data: Octets, offsets: Integers) -> tuple[Words, Words]:
+    """Kinds and senders of packets, (n,) each: of many not all of their headers at once."""
+    kinds, senders = np.empty((2, len(offsets)), np.int32)
+    for start in range(0, len(offsets), TOGETHER):
+        some = slice(start, start + TOGETHER)
+        head = headers(data, offsets[some])
+        kinds[some], senders[some] = head.kind, head.system << 8 | head.component
+    return kinds, senders
+
+
+def _times(data: Octets, offsets: Integers, form: str, ticks: float) -> Floats:
+    """(n,) s, of inertial messages whose time is in this form."""
+    out, width = np.empty(len(offsets)), np.dtype(form).itemsize
+    for start in range(0, len(offsets), TOGETHER):
+        some = slice(start, start + TOGETHER)
+        ticked = payloads(data, headers(data, offsets[some]), width).view(form)[:, 0]
+        out[some] = ticked.astype(np.float64) / ticks
+    return out
+
+
+def _vehicle(data: Octets, offsets: Integers, kind_of: Words) -> _Vehicle:
     def rows_of(kind: int) -> Integers:
-        return np.flatnonzero(head.kind == kind)
+        return np.flatnonzero(kind_of == kind)
 
-    def bodies(rows: Integers, width: int) -> Octets:
-        return payloads(data, head.of(rows), width)
-
-    kinds, first, counts = np.unique(head.kind, return_index=True, return_counts=True)
+    kinds, first, counts = np.unique(kind_of, return_index=True, return_counts=True)
     imu_rows, imu_times = {}, {}
     for kind in kinds[np.argsort(first)].tolist():
         if kind in INERTIAL:
-            form, ticks = INERTIAL[kind]
             imu_rows[kind] = rows_of(kind)
-            ticked = bodies(imu_rows[kind], np.dtype(form).itemsize).view(form)[:, 0]
-            imu_times[kind] = ticked.astype(np.float64) / ticks
+            imu_times[kind] = _times(data, offsets[imu_rows[kind]], *INERTIAL[kind])
     reports = rows_of(mavlink.MAVLINK_MSG_ID_PARAM_VALUE)
     late = np.zeros(len(reports), bool)
     for kind, t in imu_times.items():
         last = np.searchsorted(imu_rows[kind], reports) - 1
         late |= (last >= 0) & (t[last] - t[0] > LATE_S)
-    beats = bodies(rows_of(mavlink.MAVLINK_MSG_ID_HEARTBEAT), HEARTBEAT_LENGTH)
+    heartbeats = headers(data, offsets[rows_of(mavlink.MAVLINK_MSG_ID_HEARTBEAT)])
+    beats = payloads(data, heartbeats, HEARTBEAT_LENGTH)
     flying = (beats[:, 4] != mavlink.MAV_TYPE_GCS) & (beats[:, 5] != mavlink.MAV_AUTOPILOT_INVALID)
     return _Vehicle(
         autopilot=int(beats[flying, 5][-1]) if flying.any() else None,
         counts=dict(zip(kinds.tolist(), counts.tolist(), strict=True)),
         offsets=offsets,
-        imu_times=imu_times,
+        duration_s=elapsed_s(max(imu_times.values(), key=len, default=np.zeros(0))),
         reports=offsets[reports],
         late=late,
     )

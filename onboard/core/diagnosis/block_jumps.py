@@ -38,14 +38,14 @@ def stepped(fitter: Fitter, boundary: int) -> Fitter:
     after = [*range(m), *OFFSETS]
     blocks = []
     for i, p in enumerate(fitter.blocks):
-        sums = NormalSums.zeros(m + 3)
-        sums.s, sums.rows, sums.log_det = p.sums.s, p.sums.rows, p.sums.log_det
-        sums.G[:m] = p.sums.G
+        sums, own = NormalSums.zeros(m + 3), p.sums
+        sums.s, sums.rows, sums.log_det = own.s, own.rows, own.log_det
+        sums.G[:m] = own.G
         if i >= boundary:
-            sums.N[:] = p.sums.N[np.ix_(after, after)]
-            sums.b[:] = p.sums.b[after]
+            sums.N[:] = own.N[np.ix_(after, after)]
+            sums.b[:] = own.b[after]
         else:
-            sums.N[:m, :m], sums.b[:m] = p.sums.N, p.sums.b
+            sums.N[:m, :m], sums.b[:m] = own.N, own.b
         blocks.append(Block(p.start, p.end, sums))
     return Fitter(blocks, model, np.concatenate([fitter.absent, np.zeros(3)]))
 

@@ -80,8 +80,8 @@ def _felt(
     What may be noise in the samples may be real, too: the flight is taken as its velocity is
     likelier.
     """
-    sampled = Examination(engine, testable, t0=t0, batches=batches).with_noise()
     density = spectrum(batches)
+    sampled = Examination(engine, testable, t0=t0, batches=batches).with_noise()
     if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
         return sampled
     expecting = expected(batches, density)

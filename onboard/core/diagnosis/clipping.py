@@ -68,21 +68,21 @@ def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
     Even a reading that is the one before every other time stays at its extreme so often with the
     probability of so many heads in a row.
     """
-    raw = np.concatenate([c.segment.raw_s for c in batches])
-    t = np.concatenate([c.segment.t for c in batches])
     best: tuple[int, float, NDArray[np.bool_], int] | None = None
     for j in range(3):
+        read = np.concatenate([c.segment.raw_s[:, j] for c in batches])
         for sign in (1.0, -1.0):
-            x = sign * raw[:, j]
+            x = sign * read
             top = float(x.max())
             at = x >= top - 1e-9
-            runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
-            stayed = 2.0 * np.log(2.0) * (int(at.sum()) - len(runs))
+            begins = int(at[0]) + int(np.count_nonzero(at[1:] & ~at[:-1]))
+            stayed = 2.0 * np.log(2.0) * (int(at.sum()) - begins)
             stuck = stayed >= least() and at.mean() < 0.5
             if stuck and top > LEAST_RAIL and (best is None or at.sum() > best[0]):
                 best = (int(at.sum()), sign * top, at, j)
     if best is None:
         return None
+    t = np.concatenate([c.segment.t for c in batches])
     where = t[best[2]]
     cuts = np.flatnonzero(np.diff(where) > 2.0)
     starts = np.concatenate([[where[0]], where[cuts + 1]])

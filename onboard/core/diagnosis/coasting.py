@@ -8,7 +8,7 @@ agrees: it is taken out in proportion to time, as the bridge between two known e
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -26,7 +26,7 @@ from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELOCITY
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import EpochTrace, Traces
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.maths.arrays import Array
@@ -83,12 +83,11 @@ def contradictions(
     if not doubted:
         return []
     asked, traces = _coasted(full, levels)
-    theta = full.found().theta
     spans = [full.point.true_time(np.array([r.start, r.end])) for r in doubted]
     out = []
     for group in _groups([a for a in asked if _within(a.t, spans)]):
-        flown = _with_before(group, traces, theta)
-        y, S, anchored = _bridged(group, traces, theta)
+        flown = _with_before(group, traces)
+        y, S, anchored = _bridged(group, traces)
         found = _between_steps(flown, levels, anchored=anchored)
         if not found and anchored:
             found = [*_runs([a.t for a in group], y, S, levels.velocity)]
@@ -100,8 +99,8 @@ def _within(t: float, spans: Sequence[Array]) -> bool:
     return any(a - 1e-3 <= t <= b + 1e-3 for a, b in spans)
 
 
-def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[EpochTrace]]:
-    """Refused fixes compared, and all epochs, by a filter that coasts for any time."""
+def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], Traces]:
+    """Refused fixes compared, and all epochs as found, by a filter that coasts for any time."""
     solution = full.found()
     made = Pass(
         full.model,
@@ -113,11 +112,12 @@ def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], list[
         covariance=solution.covariance,
     )
     made.filter = asking = AskingFilter(full.model.size, levels, made.uses)
-    traces: list[EpochTrace] = []
+    traces = Traces(sum(len(b.fixes) for b in full.batches))
     for batch in full.batches:
         if batch.fresh:
             made.restart()
-        traces.extend(made.process(batch.segment, batch.fixes, batch.trusted).traces)
+        result = made.process(batch.segment, batch.fixes, batch.trusted)
+        traces.extend(result.traces.at(solution.theta))
     return asking.asked, traces
 
 
@@ -131,9 +131,7 @@ def _groups(asked: Sequence[Asked]) -> Iterator[list[Asked]]:
             yield list(asked[i:j])
 
 
-def _bridged(
-    group: Sequence[Asked], traces: Sequence[EpochTrace], theta: Array
-) -> tuple[Array, Array, bool]:
+def _bridged(group: Sequence[Asked], traces: Iterable[EpochTrace]) -> tuple[Array, Array, bool]:
     """Innovations (n, 2) and covariances (n, 2, 2) less the drift that the end shows, if it does.
 
     Of a random walk that is known at both ends, a share ``1 - s`` of the variance is left where the
@@ -141,19 +139,19 @@ def _bridged(
     """
     t = np.array([a.t for a in group])
     y, S = np.array([a.innovation for a in group]), np.array([a.spread for a in group])
-    back = next((x for x in traces if x.t > t[-1] and _velocity(x, theta) is not None), None)
+    back = next((x for x in traces if x.t > t[-1] and _velocity(x) is not None), None)
     start = max((x.t for x in traces if x.t < t[0] and x.velocities), default=float(t[0]))
-    end = None if back is None or back.t - t[-1] > LONGEST_FIX_GAP_S else _velocity(back, theta)
+    end = None if back is None or back.t - t[-1] > LONGEST_FIX_GAP_S else _velocity(back)
     if back is None or end is None or _chi2(end, S[-1]) > GATE_VELOCITY:
         return y, S, False
     share = ((t - start) / (back.t - start))[:, None]
     return y - share * end, S * (1.0 - share[..., None]) + S[0] * share[..., None], True
 
 
-def _velocity(x: EpochTrace, theta: Array) -> Array | None:
+def _velocity(x: EpochTrace) -> Array | None:
     """Innovation (2,) of a fix that was to be believed; None without one."""
     if x.velocities:
-        return (x.innovation - x.columns @ theta)[:2]
+        return x.innovation[:2]
     return x.refused_by[:2] if len(x.refused_by) else None
 
 
@@ -161,13 +159,11 @@ def _chi2(y: Array, S: Array) -> float:
     return float(y @ np.linalg.solve(S, y))
 
 
-def _with_before(
-    group: Sequence[Asked], traces: Sequence[EpochTrace], theta: Array
-) -> tuple[Array, Array]:
+def _with_before(group: Sequence[Asked], traces: Iterable[EpochTrace]) -> tuple[Array, Array]:
     """Times (n,) and innovations (n, 2) of a group and of the seconds right before it."""
     first = group[0].t
     near = [x for x in traces if first - 2.0 * LONGEST_FIX_GAP_S <= x.t < first]
-    before = [(x.t, v) for x in near if (v := _velocity(x, theta)) is not None]
+    before = [(x.t, v) for x in near if (v := _velocity(x)) is not None]
     every = [*before, *((a.t, a.innovation) for a in group)]
     return np.array([t for t, _ in every]), np.array([v for _, v in every])
 

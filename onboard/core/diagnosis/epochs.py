@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces, residual
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
 from onboard.core.physics.finding import Imprint
@@ -27,30 +27,26 @@ class Epochs:
 
     t: Array
     innovation: Array
-    columns: Array
+    columns: NDArray[np.floating]
     refused: NDArray[np.bool_]
     block: NDArray[np.intp]
 
     @classmethod
-    def of(cls, traces: Sequence[EpochTrace], blocks: Sequence[Block], size: int) -> Epochs:
-        """Put together traces in the order of the flight; ``size`` is the number of unknowns."""
-        n = len(traces)
-        innovation, columns = np.full((n, 3), np.nan), np.zeros((n, 3, size))
-        block, at, last = np.zeros(n, dtype=np.intp), 0, -np.inf
-        for k, x in enumerate(traces):
-            innovation[k, : x.velocities] = x.innovation
-            columns[k, : x.velocities] = x.columns
+    def of(cls, traces: Traces, blocks: Sequence[Block]) -> Epochs:
+        """Share the numbers of traces that are in the order of the flight."""
+        block, at, last = np.zeros(len(traces), dtype=np.intp), 0, -np.inf
+        for k, t in enumerate(traces.t.tolist()):
             # Several recordings may have the same times: the order decides.
-            later = range(at + (x.t < last), len(blocks))
-            at = next((i for i in later if _inside(blocks[i], x.t)), at)
-            block[k], last = at, x.t
-        refused = np.array(["velocity" in x.refused for x in traces], dtype=bool)
-        return cls(np.array([x.t for x in traces]), innovation, columns, refused, block)
+            later = range(at + (t < last), len(blocks))
+            at = next((i for i in later if _inside(blocks[i], t)), at)
+            block[k], last = at, t
+        refused = np.zeros(len(traces), dtype=bool)
+        refused[[i for i, names in traces.refused.items() if "velocity" in names]] = True
+        return cls(traces.t, traces.innovation, traces.columns, refused, block)
 
     def residual(self, theta: Array) -> Array:
         """(n, 3) what unknowns (m,) leave, m/s."""
-        out: Array = self.innovation - self.columns @ theta
-        return out
+        return residual(self.innovation, self.columns, theta)
 
     def held_out_rms(self, folds: Sequence[tuple[NDArray[np.intp], Array]]) -> float:
         """Velocity residual, m/s, of blocks with the unknowns that the others gave.
@@ -58,7 +54,10 @@ class Epochs:
         Args:
             folds: blocks, and the unknowns (m,) of a fit that has not seen them.
         """
-        left = [self.residual(theta)[np.isin(self.block, members)] for members, theta in folds]
+        left = []
+        for members, theta in folds:
+            mine = np.isin(self.block, members)
+            left.append(residual(self.innovation[mine], self.columns[mine], theta))
         return rms(np.concatenate(left)) if left else float("nan")
 
     def imprint(self, index: Sequence[int], change: Array, theta: Array, t0: float) -> Imprint:

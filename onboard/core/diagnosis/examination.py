@@ -18,7 +18,7 @@ from onboard.core.estimate.engine import Engine, through
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.refused import Refused
-from onboard.core.filter.traces import EpochTrace, PassResult
+from onboard.core.filter.traces import EpochTrace, PassResult, Traces
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -44,6 +44,7 @@ class Examination(Engine):
         point: Linearisation | None = None,
         refused: Refused | None = None,
         carried: Sequence[Family] = (),
+        traced: bool = True,
     ) -> None:
         """Take the flight of ``like``, more families, and where to start.
 
@@ -56,6 +57,7 @@ class Examination(Engine):
             point: another linearisation than that.
             refused: velocities that are refused, and no others; None: what the gates judge.
             carried: nuisances that every examination of a flight like this one has too.
+            traced: whether epochs are kept; else there are only sums.
         """
         inherited = like.carried if isinstance(like, Examination) else ()
         self.carried: tuple[Family, ...] = (*inherited, *carried)
@@ -64,7 +66,7 @@ class Examination(Engine):
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
-        self.traces: list[EpochTrace] = []
+        self.traces = Traces()
         self._refused: Refused | None = None
         super().__init__(
             replace(like.settings, refine=True),
@@ -73,7 +75,7 @@ class Examination(Engine):
             origin.noise,
             uses=Uses(refused=refused),
             more=(*families, *self.carried),
-            observer=self,
+            observer=self if traced else None,
         )
         self._like = like
         self.batches = list(like.batches if batches is None else batches)
@@ -93,7 +95,8 @@ class Examination(Engine):
 
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
-        self.traces, self._refused = [], None
+        room = sum(len(batch.fixes) for batch in self.batches)
+        self.traces, self._refused = Traces(room, self.model.size), None
 
     def take(self, result: PassResult) -> None:
         """Keep the epochs of a batch that has gone through."""
@@ -146,7 +149,7 @@ class Examination(Engine):
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
         offset in flight tilts the recorded attitude too, for as long as the EKF needs to learn it.
         """
-        made = Examination(self, self._own, t0=self.point.skew_from, start=self)
+        made = Examination(self, self._own, t0=self.point.skew_from, start=self, traced=False)
         made.noise = replace(self.noise, attitude=LIMITS["attitude"][1])
         made._seed = self._seed
         made.once()
@@ -170,16 +173,16 @@ class Examination(Engine):
         """Those that the gates have refused in the last pass, or in that of the one it is like."""
         if self._refused is not None:
             return self._refused
-        if not self.traces and isinstance(self._like, Examination):
+        if not len(self.traces) and isinstance(self._like, Examination):
             return self._like.refused_velocities()
-        named = [(x.t, n) for x in self.traces for n in x.refused if n in VELOCITY]
-        stamps = self.point.stamp(np.array([t for t, _ in named]))
+        named = [(i, n) for i, x in self.traces.refused.items() for n in x if n in VELOCITY]
+        stamps = self.point.stamp(self.traces.t[[i for i, _ in named]])
         return Refused(zip(stamps.tolist(), (n for _, n in named), strict=True))
 
     def let_epochs_go(self) -> None:
         """Keep of them only which velocities were refused: of a day's flight they are much."""
         self._refused = self.refused_velocities()
-        self.traces = []
+        self.traces = Traces()
 
     @property
     def absent(self) -> Array:

@@ -44,8 +44,10 @@ def refused_beside_a_jump(
     inside = _stamps(full, full.batches, fault, t0)
     faulty = Refused([*((t, VELOCITY[0]) for t in inside), *full.refused_velocities().items()])
     as_fault = full.beside((), faulty).with_rows()
+    as_fault.let_epochs_go()
     jump = jump_near(full, (), start, reach_of_blocks(full))
     as_jump = full.beside((jump,)).with_rows()
+    as_jump.let_epochs_go()
     if as_jump.log_likelihood - as_fault.log_likelihood <= CLEARLY / 2.0:
         return None
     still, were = _refused(as_jump), _refused(as_fault)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.diagnosis.coasting import Contradiction
 from onboard.core.diagnosis.limits import (
@@ -17,7 +18,7 @@ from onboard.core.diagnosis.limits import (
     SAME,
 )
 from onboard.core.diagnosis.regimes import spans
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -29,8 +30,7 @@ ONSET = FEWEST_FIXES // 2 + 1
 
 
 def fault_effect(
-    traces: Sequence[EpochTrace],
-    theta: Array,
+    traces: Traces,
     batches: Sequence[Batch],
     t0: float,
     least: float,
@@ -41,8 +41,7 @@ def fault_effect(
     """GPS velocities that cannot be true: refused by the innovation gate for a while.
 
     Args:
-        traces: of every epoch.
-        theta: (m,) what their columns are multiplied with.
+        traces: of every epoch, with innovations as the flight was found to be.
         batches: the flight.
         t0: s on the boot clock.
         least: m/s by which no honest receiver is off.
@@ -51,9 +50,8 @@ def fault_effect(
             fault where the inertia, lost itself, cannot tell.
         contradicted: fixes refused in flight that the inertia has contradicted; not in ``traces``.
     """
-    refused = {x.t: x.refused_by[:2] for x in traces if len(x.refused_by)}
-    heard = {x.t: (x.innovation - x.columns @ theta)[:2] for x in traces if x.velocities}
-    seen = {**heard, **refused}
+    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
+    seen = {**_heard_beside(traces), **refused}
     every = [_spell(run, seen, t0, least, coast_s) for run in _runs(traces, refused)]
     spells = [s for s in _paired(every, _jumps(seen, refused, t0)) if not s.lost]
     spells = _with_contradicted(spells, contradicted, t0)
@@ -137,15 +135,40 @@ class _Spell:
     lost: bool = False
 
 
-def _runs(traces: Sequence[EpochTrace], refused: Mapping[float, Array]) -> Iterator[list[float]]:
+def _bad(traces: Traces) -> NDArray[np.bool_]:
+    """(n,) whether the velocity of each epoch was refused."""
+    bad = np.zeros(len(traces), dtype=bool)
+    bad[[i for i, names in traces.refused.items() if "velocity" in names]] = True
+    return bad
+
+
+def _heard_beside(traces: Traces) -> dict[float, Array]:
+    """Innovations (2,) of velocities that were taken next to one that was not, by their times.
+
+    The others, which are nearly all, nobody asks for.
+    """
+    bad = _bad(traces)
+    bad[list(traces.refused_by)] = True
+    judged = np.flatnonzero((traces.velocities > 0) | bad)
+    judged = judged[np.argsort(traces.t[judged], kind="stable")]
+    # Two to either side: times of two flights may be the same.
+    beside = np.flatnonzero(bad[judged])[:, None] + np.arange(-2, 3)
+    near = judged[np.unique(np.clip(beside, 0, len(judged) - 1))]
+    near = near[traces.velocities[near] > 0]
+    return dict(zip(traces.t[near].tolist(), traces.innovation[near, :2], strict=True))
+
+
+def _runs(traces: Traces, refused: Mapping[float, Array]) -> Iterator[list[float]]:
     """Times of refused velocities, those together that no gap's length of good ones parts.
 
     Nor does a run go on when the filter has taken the error for a velocity and is off by another.
     """
-    judged = [x for x in traces if x.velocities or "velocity" in x.refused]
+    bad_ones = _bad(traces)
+    judged = (traces.velocities > 0) | bad_ones
+    times = zip(traces.t[judged].tolist(), bad_ones[judged].tolist(), strict=True)
     run: list[float] = []
     taken = False
-    for t, bad in [*((x.t, "velocity" in x.refused) for x in judged), (np.inf, False)]:
+    for t, bad in [*times, (np.inf, False)]:
         if bad:
             if taken and _another(refused.get(t), refused.get(run[-1])):
                 yield run

@@ -52,7 +52,7 @@ class FinalModel:
         self.engine, self.families, self.origin = engine, list(families), origin
         self.parameters = parameters
         self.clock = fix_clock(parameters, engine.batches)
-        self.epochs = Epochs.of(engine.traces, engine.all_blocks, engine.model.size)
+        self.epochs = Epochs.of(engine.traces, engine.all_blocks)
         self.solution = engine.found()
         self.fitter = Fitter(engine.all_blocks, engine.model, engine.absent)
         self.index = engine.model.index

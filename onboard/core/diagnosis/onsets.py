@@ -16,8 +16,7 @@ from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.diagnosis.stepped import places_of
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.solution import total
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Family, Model
 from onboard.core.physics.effect import Effect

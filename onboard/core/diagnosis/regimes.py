@@ -68,7 +68,8 @@ def located(
     """
     if len(blocks) != len(batches):
         return ()
-    gain = np.array([p.sums.residual(before) - p.sums.residual(after) for p in blocks])
+    every = (p.sums for p in blocks)
+    gain = np.array([sums.residual(before) - sums.residual(after) for sums in every])
     positive = np.clip(gain, 0.0, None)
     whole = float(positive.sum())
     if whole <= 0.0:
@@ -119,9 +120,9 @@ def main_axis(sizes: Array) -> str:
 
 def _axis(block: Block, change: Array, axes: Mapping[int, str]) -> str:
     """Body axis along which the columns in question moved most; empty if they have none."""
-    moved = dict.fromkeys(axes.values(), 0.0)
+    moved, N = dict.fromkeys(axes.values(), 0.0), block.sums.N
     for i, axis in axes.items():
-        moved[axis] += float(change[i] ** 2 * block.sums.N[i, i])
+        moved[axis] += float(change[i] ** 2 * N[i, i])
     return max(moved, key=lambda a: moved[a]) if any(moved.values()) else ""
 
 
@@ -161,7 +162,7 @@ def regime_residuals(
     of_epoch = [np.nansum(v, axis=1) for v in velocities]
     by_block = [np.bincount(epochs.block, x, len(blocks)) for x in (*of_epoch, seen)]
     for block, batch, one, two, count in zip(blocks, batches, *by_block, strict=True):
-        if block.sums.rows == 0:
+        if block.rows == 0:
             continue
         regime, sums = regime_of(batch), block.sums
         s = squares.setdefault(regime, np.zeros(6))

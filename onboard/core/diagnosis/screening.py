@@ -23,7 +23,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine, through
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces, residual
 from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -86,6 +86,7 @@ def false_fixes(
     """
     doubted = doubted_of(calibrator, full)
     levels, least, jumped = _robust(full, full.found().theta)
+    full.let_epochs_go()
     every = (full.refused, full.refused_untuned, like.refused)
     rejected = any(refused["velocity"] for refused in every)
     if not rejected and not jumped and not doubted:
@@ -93,7 +94,6 @@ def false_fixes(
     contradicted = contradictions(full, levels, doubted)
     fault = fault_effect(
         _asked_again(full, levels, contradicted, again=bool(doubted)),
-        full.found().theta,
         full.batches,
         t0,
         least,
@@ -113,10 +113,11 @@ def false_fixes(
 
 def _asked_again(
     full: Examination, levels: NoiseLevels, known: Sequence[Contradiction], *, again: bool
-) -> list[EpochTrace]:
-    """Epochs of a pass whose gates judge every fix; ``again`` also those refused in flight.
+) -> Traces:
+    """Epochs of a pass whose gates judge every fix, their innovations with what was found.
 
-    Not those that are ``known`` to be false: a filter would take them for true in the end.
+    With ``again`` also those refused in flight.  Not those that are ``known`` to be false: a filter
+    would take them for true in the end.
     """
     solution = full.found()
     made = Pass(
@@ -128,14 +129,14 @@ def _asked_again(
         theta=solution.theta,
         covariance=solution.covariance,
     )
-    traces: list[EpochTrace] = []
+    traces = Traces(sum(len(b.fixes) for b in full.batches))
     for batch in full.batches:
         asked = batch
         if again:
             heard = np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
             t = full.point.true_time(batch.fixes.t)
             asked = replace(batch, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
-        traces.extend(through(made, asked, full.settings.coast_s).traces)
+        traces.extend(through(made, asked, full.settings.coast_s).traces.at(solution.theta))
     return traces
 
 
@@ -169,14 +170,11 @@ def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
     Returns:
         Noise levels; the error (m/s) that no honest fix has; whether any is far off.
     """
-    steps = [
-        (x.innovation - x.columns @ theta)[:2]
-        for x in full.traces
-        if x.velocities and len(x.innovation)
-    ]
-    if not steps:
+    traces = full.traces
+    seen = traces.velocities > 0
+    if not seen.any():
         return full.noise, FAULT_M_S, False
-    off = np.abs(np.concatenate(steps))
+    off = np.abs(residual(traces.innovation, traces.columns, theta)[seen, :2])
     usual = 1.4826 * float(np.median(off))
     noise, floor = full.noise, NoiseLevels()
     levels = replace(

@@ -33,7 +33,8 @@ def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
     if not named and not contradicting:
         return list(families)
     terms = products(final.batches, Origin(final.point.skew_from))
-    made = Examination(final, [*families, *terms], t0=final.point.skew_from, start=final)
+    t0 = final.point.skew_from
+    made = Examination(final, [*families, *terms], t0=t0, start=final, traced=False)
     made.once()
     fitter = Fitter(made.all_blocks, made.model, made.absent)
     ours = set(made.indices_of([*families, *terms]))

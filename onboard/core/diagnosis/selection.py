@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
 from onboard.core.estimate.pool import Pool
 from onboard.core.estimate.scatter import Scatter, Stacked
-from onboard.core.estimate.solution import total
 from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model
 

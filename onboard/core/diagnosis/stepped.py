@@ -19,14 +19,13 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.engine import through
-from onboard.core.estimate.solution import total
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Kept, Source
 from onboard.core.filter.prepared import Prepared
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.regressors import Family, Model, Unknown

@@ -11,7 +11,7 @@ gyroscope's drift; it is compared with GPS where GPS is there to tell.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class Drift:
 
 
 def free_drift(
-    chain: Sequence[Interval],
+    chain: Chain,
     states: Sequence[EpochState],
     sixes: Sequence[Array],
     *,
@@ -63,13 +63,12 @@ def free_drift(
     Returns:
         Median over windows per set; None if no window fits.
     """
-    if not chain or not states:
+    if not len(chain) or not states:
         return None
-    start = np.array([x.start for x in chain])
-    end = np.array([x.end for x in chain])
+    start, end = chain.start, chain.end
     ends, squares = [], []
     last = -np.inf
-    span = chain[-1].end - chain[0].start
+    span = float(end[-1] - start[0])
     spacing = max(horizon_s, span / most)
     attitude = {round(state.t, 3): state.R_nb for state in states}
     for state in states:
@@ -116,7 +115,7 @@ class FreeErrors:
 
 
 def free_errors(
-    chain: Sequence[Interval],
+    chain: Chain,
     states: Sequence[EpochState],
     sixes: Sequence[Array],
     *,
@@ -130,8 +129,7 @@ def free_errors(
         sixes: sets to compare, each (6,) scale (1) and beta (m/s^2), sensor axes.
         horizon_s: length of a window.
     """
-    start = np.array([x.start for x in chain])
-    end = np.array([x.end for x in chain])
+    start, end = chain.start, chain.end
     attitude = {round(state.t, 3): state.R_nb for state in states}
     times, errors = [np.zeros(0)], [np.zeros((len(sixes), 0))]
     reached = -np.inf
@@ -159,63 +157,67 @@ def free_errors(
     return FreeErrors(np.concatenate(times), np.concatenate(errors, axis=1))
 
 
-def intervals(pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> list[Interval]:
-    """Integrals between the epochs of batches of flight, each with its fixes, in order of time.
-
-    ``point`` is the linearisation (GPS latency, averaging span).
-    """
-    return [x for segment, fixes in pieces for x in Interval.of_piece(segment, fixes, point)]
-
-
 @dataclass(frozen=True, slots=True)
-class Interval:
-    """Integrals of one interval between epochs, in body axes of its start.
+class Chain:
+    """Integrals of n intervals between epochs, in order of time, in body axes of their starts.
 
     Attributes:
-        start: s, boot clock, latency removed.
-        end: s.
-        turn: (3, 3) body axes at the end to those at the start.
-        by_scale: (3, 3) velocity gained per unit of each scale, m/s.
-        by_offset: (3, 3) velocity gained per unit of each beta, s.
-        velocity: (3,) of GPS at the end, NED, m/s; NaN where there is none.
-        latitude: there, rad.
+        start: (n,) s, boot clock, latency removed.
+        end: (n,) s.
+        turn: (n, 3, 3) body axes at the end to those at the start.
+        by_scale: (n, 3, 3) velocity gained per unit of each scale, m/s.
+        by_offset: (n, 3, 3) velocity gained per unit of each beta, s.
+        velocity: (n, 3) of GPS at the end, NED, m/s; NaN where there is none.
+        latitude: (n,) there, rad.
     """
 
-    start: float
-    end: float
+    start: Array
+    end: Array
     turn: Array
     by_scale: Array
     by_offset: Array
     velocity: Array
-    latitude: float
+    latitude: Array
 
-    @staticmethod
-    def of_piece(segment: Segment, fixes: Fixes, point: Linearisation) -> list[Interval]:
-        """Those of one batch."""
-        t = point.true_time(fixes.t)
-        if len(t) < 2:
-            return []
-        nodes = NodeMaker(segment, np.zeros(3), point.six).intervals(t[:-1], t[1:])
-        by_scale = nodes.integrals(segment.R_bs * nodes.signals.raw_s[..., None, :])[0]
-        eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
-        whole = nodes.integrals(eye)[0]
-        turn = nodes.P[:, -1].copy()  # a view would keep every node's attitude alive
-        return [
-            Interval(
-                float(t[k]),
-                float(t[k + 1]),
-                turn[k],
-                by_scale[k],
-                whole[k] @ segment.R_bs,
-                fixes.v_n[k + 1],
-                float(fixes.latitude[k + 1]),
-            )
-            for k in range(len(t) - 1)
-        ]
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, some: slice) -> Chain:
+        """Some of them in a row."""
+        return Chain(*(getattr(self, f.name)[some] for f in fields(self)))
+
+
+def intervals(pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> Chain:
+    """Integrals between the epochs of batches of flight, each with its fixes, in order of time.
+
+    ``point`` is the linearisation (GPS latency, averaging span).
+    """
+    n = sum(max(len(fixes) - 1, 0) for _, fixes in pieces)
+    out = Chain(*(np.empty((n, *shape)) for shape in ((), (), (3, 3), (3, 3), (3, 3), (3,), ())))
+    first = 0
+    for segment, fixes in pieces:
+        if len(fixes) > 1:
+            made = _of_piece(segment, fixes, point)
+            for f in fields(Chain):
+                getattr(out, f.name)[first : first + len(made)] = getattr(made, f.name)
+            first += len(made)
+    return out
+
+
+def _of_piece(segment: Segment, fixes: Fixes, point: Linearisation) -> Chain:
+    """Those of one batch."""
+    t = point.true_time(fixes.t)
+    nodes = NodeMaker(segment, np.zeros(3), point.six).intervals(t[:-1], t[1:])
+    by_scale = nodes.integrals(segment.R_bs * nodes.signals.raw_s[..., None, :])[0]
+    eye = np.broadcast_to(np.eye(3), (*nodes.signals.t.shape, 3, 3))
+    whole = nodes.integrals(eye)[0]
+    turn = nodes.P[:, -1].copy()  # a view would keep every node's attitude alive
+    by_offset = whole @ segment.R_bs
+    return Chain(t[:-1], t[1:], turn, by_scale, by_offset, fixes.v_n[1:], fixes.latitude[1:])
 
 
 def _drift(
-    chain: Sequence[Interval],
+    chain: Chain,
     state: EpochState,
     sixes: Sequence[Array],
     attitude: Mapping[float, Array],
@@ -231,7 +233,7 @@ def _drift(
 
 
 def _errors(
-    chain: Sequence[Interval],
+    chain: Chain,
     state: EpochState,
     sixes: Sequence[Array],
     attitude: Mapping[float, Array],
@@ -242,29 +244,27 @@ def _errors(
     """
     R = state.R_nb
     sets = np.array(sixes)
-    by_scale, by_offset = (
-        np.array([getattr(x, n) for x in chain]) for n in ("by_scale", "by_offset")
-    )
-    gained = by_scale @ sets[:, :3].T + by_offset @ sets[:, 3:].T
+    gained = chain.by_scale @ sets[:, :3].T + chain.by_offset @ sets[:, 3:].T
     v = np.tile(state.v_n, (len(sets), 1))
     every = np.empty((len(sets), len(chain), 3))
-    for k, x in enumerate(chain):
-        T = x.end - x.start
+    times = zip(chain.start.tolist(), chain.end.tolist(), chain.latitude.tolist(), strict=True)
+    for k, (start, end, latitude) in enumerate(times):
+        T = end - start
         turning = np.zeros(3)
         push = (R @ gained[k]).T
         for i in range(len(sets)):
-            coriolis, turning = carried_and_turning(x.latitude, v[i])
+            coriolis, turning = carried_and_turning(latitude, v[i])
             push[i] += coriolis * T
         push[:, 2] += STANDARD_GRAVITY * T
         v += push
         every[:, k] = v
-        at_end = attitude.get(round(x.end, 3))
+        at_end = attitude.get(round(end, 3))
         if at_end is None:
             # The bias turns the interval's increments by R(-b T) to first order.
-            at_end = turn_by(-turning * T) @ R @ x.turn @ rotation_from_vector(-state.bias_b * T)
+            off = rotation_from_vector(-state.bias_b * T)
+            at_end = turn_by(-turning * T) @ R @ chain.turn[k] @ off
         R = at_end
-    heard = np.array([x.velocity for x in chain])
-    seen = np.isfinite(heard)
-    error: Array = np.where(seen, every - heard, 0.0)
+    seen = np.isfinite(chain.velocity)
+    error: Array = np.where(seen, every - chain.velocity, 0.0)
     error[:, ~seen[:, 0]] = np.nan
     return error

@@ -26,7 +26,7 @@ from onboard.core.estimate.limits import (
 )
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.estimate.solution import Solution, solve, total
+from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -34,7 +34,7 @@ from onboard.core.filter.traces import PassResult, StateLog
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block, Seconds, merged
+from onboard.core.maths.blocks import Block, Seconds, merged, total
 from onboard.core.model.linearisation import MOVING, Linearisation
 from onboard.core.model.regressors import Family, Model
 

@@ -18,7 +18,7 @@ import numpy as np
 from onboard.core.estimate.limits import BLOCKS_TOGETHER, FEWEST_FREEDOM, KNOWN
 from onboard.core.estimate.pool import TINY, Pool
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.blocks import Block, whole
 
 
 class Scatter:
@@ -131,8 +131,8 @@ class Stacked:
     def __init__(self, blocks: Sequence[Block]) -> None:
         """Take blocks with sums of n unknowns."""
         self._blocks = list(blocks)
-        self._b = np.stack([p.sums.b for p in blocks])
-        self._gram = np.stack([p.sums.G for p in blocks])
+        self._b = np.stack([p.b for p in blocks])
+        self._gram = np.stack([p.G for p in blocks])
         self._all = self._stack(slice(None)) if len(blocks) <= BLOCKS_TOGETHER else None
 
     def information(self) -> Iterator[tuple[slice, Array]]:
@@ -152,4 +152,4 @@ class Stacked:
         return out
 
     def _stack(self, part: slice) -> Array:
-        return np.stack([p.sums.N for p in self._blocks[part]])
+        return whole([p.half for p in self._blocks[part]], self._b.shape[1])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.scatter import Scatter
 from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.regressors import Model
 
@@ -49,11 +48,6 @@ class Solution:
     variance_inflation: float
     nis: float
     rows: float
-
-
-def total(blocks: Sequence[Block]) -> NormalSums:
-    """Sum over blocks (at least one)."""
-    return reduce(lambda a, b: a + b, (p.sums for p in blocks))
 
 
 def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:

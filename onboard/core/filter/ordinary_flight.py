@@ -26,7 +26,7 @@ from onboard.core.filter.limits import (
 )
 from onboard.core.filter.prepared import Prepared
 from onboard.core.filter.readings import Index
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -36,9 +36,6 @@ _GATES = np.array([GATE_VELOCITY, GATE_HEIGHT, GATE_TILT, GATE_HEADING])
 _TAILS = np.array([np.inf, TAIL[1], TAIL[2], TAIL[3]])
 _BELIEVED, _REFUSED = 1, 2
 """What may be known of a velocity before it is looked at; 0: nothing."""
-
-
-_NONE = np.zeros(0)
 
 
 class Gone(NamedTuple):
@@ -84,38 +81,17 @@ class Gone(NamedTuple):
         out: Array = np.concatenate((t, self.states[some], bias), axis=1)
         return out
 
-    def traces(self, ready: Epochs, *, whole: bool) -> list[EpochTrace]:
-        """What each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""
-        # Not a view of none of them: that would keep all of them.
-        rows = self.rows[0].copy() if whole else np.zeros((0, self.rows.shape[2]))
+    def traced(self, ready: Epochs, traces: Traces, *, whole: bool) -> None:
+        """Add what each of the epochs ``ready`` measured; ``whole`` with all that was whitened."""
         # Velocity comes first in each epoch; the rows of height and attitude are not shown.
         many = np.diff(self.first_row)
         place = np.arange(len(self.raw)) - np.repeat(self.first_row[:-1], many)
         shown = self.raw[place < np.repeat(self.velocities, many)]
-        innovations, columns = shown[:, 0].copy(), shown[:, 1:].astype(np.float32)
-        first, seen = self.first_row.tolist(), np.cumsum(self.velocities).tolist()
-        return [
-            EpochTrace(
-                t,
-                innovations[c - v : c],
-                columns[c - v : c],
-                rows[a:b, 0],
-                rows[a:b, 1:],
-                v,
-                bool(h),
-                (),
-                _NONE,
-            )
-            for t, v, h, a, b, c in zip(
-                ready.t[self.epochs].tolist(),
-                self.velocities.tolist(),
-                self.heights.tolist(),
-                first,
-                first[1:],
-                seen,
-                strict=False,
-            )
-        ]
+        traces.add(ready.t[self.epochs], self.velocities, shown)
+        if whole:
+            rows = np.split(self.rows[0].copy(), self.first_row[1:-1])
+            for of_one, height in zip(rows, self.heights.tolist(), strict=True):
+                traces.add_rows(of_one, height=bool(height))
 
 
 class OrdinaryFlight:

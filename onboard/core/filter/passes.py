@@ -14,7 +14,7 @@ from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
-from onboard.core.filter.traces import EpochState, EpochTrace, PassResult, state_row
+from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -128,12 +128,15 @@ class Pass:
         self._subtract(made.bias_b - self.bias_b)
         self.filter.begin_block()
         result = PassResult(Block(ready.start, ready.end, NormalSums.zeros(0)))
+        if self.keep_traces:
+            result.traces = Traces(len(ready.epochs), self.model.size)
         sums = self._go_through(made.segment, ready, result)
         self._take_bias_out()
         self.sums += sums
-        result.block.sums = block = sums.member(0)
+        block = sums.member(0)
         if self.filter.noise_gram is not None:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
+        result.block = Block(ready.start, ready.end, block)
         return result
 
     def _made_ready(self, source: Source) -> Kept:
@@ -220,7 +223,7 @@ class Pass:
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])
         if self.keep_traces:
-            result.traces += gone.traces(ready.epochs, whole=self.keep_rows)
+            gone.traced(ready.epochs, result.traces, whole=self.keep_rows)
         if self.keep_states:
             result.states.append(gone.noted(ready.epochs, self.bias_b))
         self._estimate(sums, len(gone.epochs))
@@ -241,21 +244,12 @@ class Pass:
         if made.velocities:
             self._last_velocity_t = made.t
         if self.keep_traces:
-            rows = slice(None) if self.keep_rows else slice(0)
-            # Copies: views would keep the whole bank's innovations of every epoch alive.
-            result.traces.append(
-                EpochTrace(
-                    made.t,
-                    made.raw_innovation.copy(),
-                    made.raw_columns.astype(np.float32),
-                    made.y[0, rows].copy(),
-                    made.h[0, rows].copy(),
-                    made.velocities,
-                    made.height,
-                    made.refused,
-                    made.refused_by,
-                )
-            )
+            shown = np.column_stack([made.raw_innovation, made.raw_columns])
+            result.traces.add(np.array([made.t]), np.array([made.velocities]), shown)
+            result.traces.add_refused(made.refused, made.refused_by)
+            if self.keep_rows:
+                rows = np.column_stack([made.y[0], made.h[0]])
+                result.traces.add_rows(rows, height=made.height)
 
     @property
     def _until_solved(self) -> int:

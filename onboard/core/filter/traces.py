@@ -35,6 +35,8 @@ class EpochState:
 
 STATE_NUMBERS = 1 + 3 + 9 + 3 + 3
 """Of the fields of :class:`EpochState`, in their order."""
+TOGETHER = 1024
+"""Epochs whose residuals are found at once [cost]."""
 
 
 class StateLog:
@@ -111,6 +113,141 @@ class EpochTrace:
     refused_by: Array
 
 
+class Traces:
+    """What n epochs measured, side by side: as objects they would be three times as large.
+
+    Attributes:
+        refused: names of what the gates refused, by the number of the epoch.
+        refused_by: (2 or 3,) innovation of a velocity that was refused, likewise.
+    """
+
+    __slots__ = (
+        "_columns",
+        "_count",
+        "_innovation",
+        "_rows",
+        "_t",
+        "_velocities",
+        "refused",
+        "refused_by",
+    )
+
+    def __init__(self, room: int = 0, m: int = 0) -> None:
+        """Take for how many epochs there is room at first, and how many unknowns there are."""
+        self._count = 0
+        self._t = np.empty(room)
+        self._velocities = np.empty(room, dtype=np.int64)
+        self._innovation = np.empty((room, 3))
+        self._columns = np.empty((room, 3, m), dtype=np.float32)
+        self._rows: list[tuple[Array, bool]] = []
+        self.refused: dict[int, tuple[str, ...]] = {}
+        self.refused_by: dict[int, Array] = {}
+
+    def add(self, t: Array, velocities: NDArray[np.int64], shown: Array) -> None:
+        """Take k epochs.
+
+        Args:
+            t: (k,) time on the boot clock, s.
+            velocities: (k,) how many components of velocity each has.
+            shown: (sum of velocities, m + 1) velocity innovations at ``theta = 0``, NED, m/s, and
+                their regressors.
+        """
+        new = self._next(len(t))
+        self._t[new], self._velocities[new] = t, velocities
+        innovation, columns = self._innovation[new], self._columns[new]
+        there = np.arange(3) < np.reshape(velocities, (-1, 1))
+        innovation[~there], columns[~there] = np.nan, 0.0
+        innovation[there], columns[there] = shown[:, 0], shown[:, 1:]
+
+    def add_refused(self, names: tuple[str, ...], by: Array) -> None:
+        """What was refused of the last epoch."""
+        if names:
+            self.refused[self._count - 1] = names
+        if len(by):
+            self.refused_by[self._count - 1] = by
+
+    def add_rows(self, rows: Array, *, height: bool) -> None:
+        """(r, m + 1) all that was whitened of the next epoch: of every one, or of none."""
+        self._rows.append((rows, height))
+
+    def extend(self, others: Traces) -> None:
+        """Take the epochs of others, too."""
+        first, new = self._count, self._next(len(others))
+        self._t[new], self._velocities[new] = others.t, others.velocities
+        self._innovation[new], self._columns[new] = others.innovation, others.columns
+        self._rows += others._rows
+        self.refused |= {first + i: names for i, names in others.refused.items()}
+        self.refused_by |= {first + i: by for i, by in others.refused_by.items()}
+
+    def at(self, theta: Array) -> Traces:
+        """The same with innovations at ``theta`` (m,), their regressors left out."""
+        out, n = Traces(len(self)), len(self)
+        out._t[:], out._velocities[:], out._count = self.t, self.velocities, n
+        out._innovation[:] = residual(self.innovation, self.columns, theta)
+        out.refused, out.refused_by = dict(self.refused), dict(self.refused_by)
+        return out
+
+    def _next(self, count: int) -> slice:
+        """Places of the next epochs; where room is short there is made twice as much."""
+        first, self._count = self._count, self._count + count
+        if self._count > len(self._t):
+            more = max(2 * len(self._t), self._count) - len(self._t)
+            for name in ("_t", "_velocities", "_innovation", "_columns"):
+                old = getattr(self, name)
+                room = np.empty((more, *old.shape[1:]), dtype=old.dtype)
+                setattr(self, name, np.concatenate([old, room]))
+        return slice(first, self._count)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[EpochTrace]:
+        nothing, m = np.zeros(0), self._columns.shape[2]
+        for i, (t, v) in enumerate(zip(self.t.tolist(), self.velocities.tolist(), strict=True)):
+            rows, height = self._rows[i] if self._rows else (np.zeros((0, m + 1)), False)
+            yield EpochTrace(
+                t,
+                self._innovation[i, :v],
+                self._columns[i, :v],
+                rows[:, 0],
+                rows[:, 1:],
+                v,
+                height,
+                self.refused.get(i, ()),
+                self.refused_by.get(i, nothing),
+            )
+
+    @property
+    def t(self) -> Array:
+        """(n,) times on the boot clock, s."""
+        return self._t[: self._count]
+
+    @property
+    def velocities(self) -> NDArray[np.int64]:
+        """(n,) how many components of velocity each has."""
+        return self._velocities[: self._count]
+
+    @property
+    def innovation(self) -> Array:
+        """(n, 3) velocity innovation at ``theta = 0``, NED, m/s; NaN where there is none."""
+        return self._innovation[: self._count]
+
+    @property
+    def columns(self) -> NDArray[np.float32]:
+        """(n, 3, m) its regressors; zero where there is none."""
+        return self._columns[: self._count]
+
+
+def residual(innovation: Array, columns: NDArray[np.floating], theta: Array) -> Array:
+    """(n, 3) what unknowns ``theta`` (m,) leave of innovations (n, 3) with columns (n, 3, m)."""
+    out = innovation.copy()
+    # Some at a time: all of a day's in double precision would be much.
+    for first in range(0, len(out), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        out[part] -= columns[part] @ theta
+    return out
+
+
 @dataclass(slots=True)
 class PassResult:
     """What a pass has made of one segment.
@@ -125,6 +262,6 @@ class PassResult:
 
     block: Block
     states: list[Array] = field(default_factory=list)
-    traces: list[EpochTrace] = field(default_factory=list)
+    traces: Traces = field(default_factory=Traces)
     refused: dict[str, int] = field(default_factory=dict)
     epochs: int = 0

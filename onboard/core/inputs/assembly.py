@@ -24,12 +24,12 @@ from onboard.core.inputs.limits import (
     TEMPERATURE_EVERY,
 )
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
 from onboard.core.inputs.samples import GpsFix
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.inputs.streams import Streams
 from onboard.core.inputs.tracks import ImuTrack
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import untrimmed_rotation, untrimmed_rotation_dcm
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,8 @@ class Assembly:
         """Samples that these fixes need, the gyroscope on the accelerometer's times."""
         cut = _needed(t, fixes.t)
         t, rows = t[cut], rows[cut]
-        w_b = rows[:, :3]
+        # Not views: they would keep the temperature of every sample alive.
+        w_b, raw_s = rows[:, :3].copy(), rows[:, 3:6].copy()
         lag = parameters.gyro_lag
         if abs(lag) > LEAST_LAG_S:
             shifted = np.clip(t + lag, t[0], t[-1])
@@ -163,13 +164,14 @@ class Assembly:
         t_attitude, angles = self.streams.recorded.arrays()
         slow = self.streams.slow_arrays(imu)
         if np.all(np.isfinite(rows[:, 6])):
-            slow["temperature"] = (t[::TEMPERATURE_EVERY], rows[::TEMPERATURE_EVERY, 6])
+            few = slice(None, None, TEMPERATURE_EVERY)
+            slow["temperature"] = (t[few].copy(), rows[few, 6].copy())
         return Segment(
             t,
             w_b,
-            rows[:, 3:6],
+            raw_s,
             t_attitude,
-            _rotation(angles, parameters, over_mavlink=self.streams.over_mavlink),
+            _attitude(angles, parameters, over_mavlink=self.streams.over_mavlink),
             parameters.R_bs,
             slow,
             parameters.lever_arm(imu),
@@ -228,14 +230,13 @@ def _with_rates(
     return (imu, rows) if w is None else (first, np.hstack([w, rows[:, 3:]]))
 
 
-def _rotation(angles: Array, parameters: ParametersInForce, *, over_mavlink: bool) -> Array:
-    """Attitude (k, 3, 3) of the accelerometer's body axes from the reported angles (k, 3), rad."""
-    roll, pitch, yaw = angles.T
+def _attitude(angles: Array, parameters: ParametersInForce, *, over_mavlink: bool) -> Attitudes:
+    """Attitude of the accelerometer's body axes from the reported angles (k, 3), rad."""
     # Firmware that has trims but no choice of EKF is older than the EKFs.
     old = "AHRS_TRIM_X" in parameters.values and "AHRS_EKF_TYPE" not in parameters.values
     if old or parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
-        return untrimmed_rotation_dcm(roll, pitch, yaw, parameters.trim)
+        return ReportedAttitude(angles, parameters.trim, by_dcm=True)
     pitch_trim = 0.0
     if over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
         pitch_trim = float(np.deg2rad(parameters.get("PTCH_TRIM_DEG", default=0.0)))
-    return untrimmed_rotation(roll, pitch, yaw, parameters.trim, pitch_trim)
+    return ReportedAttitude(angles, parameters.trim, pitch_trim)

@@ -33,10 +33,14 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 
     None if they are too few to tell.
     """
-    joined = [_joined(run) for run in _runs(batches)]
-    step = float(np.median(np.concatenate([np.diff(t) for t, _ in joined] or [np.ones(1)])))
-    found = [p for _, raw in joined for p in _periodograms(raw, step)]
-    return np.mean(found, axis=0) if found else None
+    runs = list(_runs(batches))
+    steps = [np.diff(_times(run)) for run in runs] or [np.ones(1)]
+    step = float(np.median(np.concatenate(steps)))
+    count, found = 0, np.zeros(1)
+    for run in runs:
+        for p in _periodograms(_joined(run)[1], step):
+            count, found = count + 1, found + p
+    return found / count if count else None
 
 
 def white(density: Array) -> Array:
@@ -77,8 +81,21 @@ def _runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:
 
 def _joined(run: Sequence[Batch]) -> tuple[Array, Array]:
     """Samples of all segments, each once: times (n,), s, and raw force (n, 3)."""
-    t, index = np.unique(np.concatenate([b.segment.t for b in run]), return_index=True)
-    return t, np.concatenate([b.segment.raw_s for b in run])[index]
+    raw = [b.segment.raw_s[i:] for b, i in zip(run, _new(run), strict=True)]
+    return _times(run), np.concatenate(raw)
+
+
+def _times(run: Sequence[Batch]) -> Array:
+    """(n,) s, those of the samples of all segments, each once."""
+    return np.concatenate([b.segment.t[i:] for b, i in zip(run, _new(run), strict=True)])
+
+
+def _new(run: Sequence[Batch]) -> Iterator[int]:
+    """From which of its samples on a segment goes on where those before it end."""
+    last = -np.inf
+    for t in (batch.segment.t for batch in run):
+        yield int(np.searchsorted(t, last, side="right"))
+        last = max(last, float(t[-1]))
 
 
 def _periodograms(raw: Array, step: float) -> Iterator[Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.limits import DENSE_S, LONGEST_FIX_GAP_S, NEAR_S
+from onboard.core.inputs.reported_attitude import Attitudes
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import (
@@ -82,7 +83,7 @@ class Segment:
     w_b: Array
     raw_s: Array
     t_attitude: Array
-    R_attitude: Array
+    R_attitude: Attitudes
     R_bs: Array
     slow: dict[str, Signal] = field(default_factory=dict)
     lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
@@ -92,10 +93,14 @@ class Segment:
         return Hermite(self.t, np.hstack([self.w_b, self.raw_s]))
 
     def _between_samples(self, at: Array, delay: float) -> Array:
-        t_k, R_k = self.t_attitude, self.R_attitude
+        t_k = self.t_attitude
         if len(t_k) < 2:
-            return interpolate_rotation(at, t_k, R_k)
+            return interpolate_rotation(at, t_k, self.R_attitude[:])
         at = np.clip(at, t_k[0], t_k[-1])
+        # Few of the samples are next to a time that is asked for.
+        k, asked = self._before(at), np.zeros(len(t_k), dtype=bool)
+        asked[k] = asked[k + 1] = True
+        t_k, R_k = t_k[asked], self.R_attitude[asked]
         loops = compiled_loops()
         if loops is not None:
             between = np.empty((len(at), 3, 3))
@@ -103,7 +108,7 @@ class Segment:
             samples = plain(t_k), plain(R_k)
             loops.attitudes(rates.t, rates.cubics, *samples, plain(at), delay, PARTS, between)
             return between
-        k = np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
+        k = (np.cumsum(asked) - 1)[k]
         used, which = np.unique(k, return_inverse=True)
         start, end = t_k[used], t_k[used + 1]
         rate = Hermite(self.t, self.w_b)
@@ -124,6 +129,11 @@ class Segment:
         between = turned(start[which], at) @ rotation_from_vector(share * missed[which])
         out: Array = R_k[k] @ between
         return out
+
+    def _before(self, at: Array) -> NDArray[np.intp]:
+        """(m,) the attitude sample before each of the times ``at`` (m,) that has one after it."""
+        t_k = self.t_attitude
+        return np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
 
     def slow_at(self, name: str, at: Array) -> Array | None:
         """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""

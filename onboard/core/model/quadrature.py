@@ -225,5 +225,6 @@ class NodeMaker:
 
     def recorded_attitude(self, t: Array) -> Array:
         """(*S, 3, 3) at times ``t`` of shape S, straight arcs between its samples."""
-        flat = interpolate_rotation(t.ravel(), self.segment.t_attitude, self.segment.R_attitude)
+        samples = self.segment.t_attitude, self.segment.R_attitude[:]
+        flat = interpolate_rotation(t.ravel(), *samples)
         return flat.reshape(*t.shape, 3, 3)

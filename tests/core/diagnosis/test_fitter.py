@@ -142,7 +142,7 @@ def test_known_noise_in_the_regressors_does_not_weaken_an_estimate():
     noisy = Problem(clean.model, h, clean.y)
     blocks = noisy.blocks
     for block in blocks:
-        block.sums.G[6] = h.shape[1] * sigma**2
+        block.G[6] = h.shape[1] * sigma**2
     kept = Fitter(blocks, clean.model).fit(range(7)).theta[6]
     weakened = noisy.fitter().fit(range(7)).theta[6]
     assert weakened == pytest.approx(2.0 / (1.0 + sigma**2), rel=0.03)
@@ -194,7 +194,7 @@ def test_jumps_and_stepped_agree_where_regressors_are_noisy(problem):
     blocks = problem.blocks
     rng = np.random.default_rng(8)
     for block in blocks:
-        block.sums.G[:3] = rng.uniform(0.5, 2.0, 3)
+        block.G[:3] = rng.uniform(0.5, 2.0, 3)
     fitter = Fitter(blocks, problem.model)
     free = list(range(7))
     before = fitter.fit(free)

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.faults import fault_effect
-from onboard.core.filter.traces import EpochTrace
+from onboard.core.filter.traces import Traces
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
 
@@ -19,25 +19,21 @@ def batches():
     return heard(spec).engine(1).batches
 
 
-def trace(t, innovation, refused=()):
-    off = np.array(innovation) if refused else np.zeros(0)
-    taken = np.zeros(0) if refused else np.array(innovation)
-    nothing = np.zeros((len(taken), 1))
-    return EpochTrace(t, taken, nothing, np.zeros(0), nothing, len(taken), True, refused, off)
-
-
 def flight(*stages):
     """Epochs by stage: (until, innovation, why it was refused)."""
-    out, t = [], 0.0
+    out, t = Traces(), 0.0
     for until, innovation, refused in stages:
         while t < until - 1e-6:
-            out.append(trace(t, np.asarray(innovation, dtype=float), refused))
+            off = np.array(innovation)
+            taken = np.zeros((0, 1)) if refused else off[:, None]
+            out.add(np.array([t]), np.array([len(taken)]), taken)
+            out.add_refused(refused, off if refused else np.zeros(0))
             t += STEP_S
     return out
 
 
 def interval(stages, batches):
-    found = fault_effect(flight(*stages), np.zeros(1), batches, 0.0, LEAST, COAST_S)
+    found = fault_effect(flight(*stages), batches, 0.0, LEAST, COAST_S)
     assert found is not None
     assert len(found.intervals) == 1
     return found.intervals[0]
@@ -97,7 +93,5 @@ def test_what_the_filter_jumps_by_when_it_gives_in_is_not_the_end(batches):
 @pytest.mark.parametrize("first", [0.1, 2.0])
 def test_drift_of_the_inertia_is_no_fault(batches, first):
     growing = [(20 + k * STEP_S, (first * (1.0 + 0.1 * k), 0.0), V) for k in range(1, 60)]
-    found = fault_effect(
-        flight((20, NONE, ()), *growing), np.zeros(1), batches, 0.0, LEAST, COAST_S
-    )
+    found = fault_effect(flight((20, NONE, ()), *growing), batches, 0.0, LEAST, COAST_S)
     assert found is None

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.core.estimate.dead_reckoning import Interval, free_drift
+from onboard.core.estimate.dead_reckoning import Chain, free_drift
 from onboard.core.filter.traces import EpochState
 from onboard.core.maths.earth import STANDARD_GRAVITY, coriolis_n, earth_rate_n, transport_rate_n
 from onboard.core.maths.frames import rotation_from_vector
@@ -19,18 +19,16 @@ def steady(v_n, horizon, step=STEP):
     Raw force is zero and the whole force is in beta, so that two calibrations are two forces.
     """
     turn = earth_rate_n(LATITUDE) + transport_rate_n(LATITUDE, 0.0, v_n)
-    chain = [
-        Interval(
-            start=k * step,
-            end=(k + 1) * step,
-            turn=rotation_from_vector(turn * step),
-            by_scale=np.zeros((3, 3)),
-            by_offset=step * np.eye(3),
-            velocity=v_n,
-            latitude=LATITUDE,
-        )
-        for k in range(round(horizon / step))
-    ]
+    k = np.arange(round(horizon / step))
+    chain = Chain(
+        start=k * step,
+        end=(k + 1) * step,
+        turn=np.tile(rotation_from_vector(turn * step), (len(k), 1, 1)),
+        by_scale=np.zeros((len(k), 3, 3)),
+        by_offset=np.tile(step * np.eye(3), (len(k), 1, 1)),
+        velocity=np.tile(v_n, (len(k), 1)),
+        latitude=np.full(len(k), LATITUDE),
+    )
     state = EpochState(0.0, np.zeros(3), np.eye(3), v_n, np.zeros(3))
     force = -np.array([0.0, 0.0, STANDARD_GRAVITY]) - coriolis_n(LATITUDE, 0.0, v_n)
     return chain, [state], force
@@ -58,8 +56,8 @@ def test_an_offset_drifts_with_time():
 def test_which_windows_are_looked_at_does_not_depend_on_when_the_clock_began(since):
     """Windows that follow on a grid of epochs: sums of times must not decide by rounding."""
     chain, states, force = steady(np.array([20.0, 0.0, 0.0]), 240.0, step=0.4)
-    chain = [replace(x, start=since + x.start, end=since + x.end) for x in chain]
-    states = [replace(states[0], t=since)] + [replace(states[0], t=x.end) for x in chain]
+    chain = replace(chain, start=since + chain.start, end=since + chain.end)
+    states = [replace(states[0], t=since)] + [replace(states[0], t=t) for t in chain.end.tolist()]
     six = np.concatenate([np.ones(3), force])
     drift = free_drift(chain, states, [six], horizon_s=10.0, most=24)
     assert drift.windows == 24

@@ -76,5 +76,5 @@ def test_the_estimate_drifts_little_and_what_is_wrong_grows_with_time(flight):
 
 
 def test_without_flight_there_is_nothing(flight):
-    _, states, in_force, _ = flight
-    assert len(free_errors([], states, (in_force,), horizon_s=HORIZON_S).t) == 0
+    chain, states, in_force, _ = flight
+    assert len(free_errors(chain[:0], states, (in_force,), horizon_s=HORIZON_S).t) == 0

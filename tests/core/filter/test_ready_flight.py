@@ -74,11 +74,17 @@ def test_traces_keep_nothing_alive_but_themselves(batches):
     """Of an hour's flight they are kept; a view of something larger keeps all of that."""
     made = a_pass(calibration_model(POINT))
     made.keep_traces = True
+    kept = [made.process(b.segment, b.fixes, b.trusted).traces for b in batches]
     arrays = [
         array
-        for batch in batches
-        for trace in made.process(batch.segment, batch.fixes, batch.trusted).traces
-        for array in (trace.innovation, trace.columns, trace.y, trace.h, trace.refused_by)
+        for traces in kept
+        for array in (
+            traces.t,
+            traces.velocities,
+            traces.innovation,
+            traces.columns,
+            *traces.refused_by.values(),
+        )
     ]
     assert arrays
     roots = {}
