@@ -172,6 +172,8 @@ class Traces:
 
     def extend(self, others: Traces) -> None:
         """Take the epochs of others, too."""
+        if not len(others):
+            return  # of a segment that began nothing, for how many unknowns nobody knows
         first, new = self._count, self._next(len(others))
         self._t[new], self._velocities[new] = others.t, others.velocities
         self._innovation[new], self._columns[new] = others.innovation, others.columns

@@ -93,6 +93,7 @@ def test_those_of_several_batches_follow_on_each_other():
     parts = [noted(7)[0], noted(11)[0]]
     for part in parts:
         whole.extend(part)
+        whole.extend(Traces())  # a segment in which nothing could begin
     for x, y in zip(whole, [*parts[0], *parts[1]], strict=True):
         assert_same(x, y)
 
