@@ -13,17 +13,12 @@ from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError
 from onboard.recordings.bulk import no_collection
+from onboard.recordings.dataflash_batch import Batch, record_times
 from onboard.recordings.dataflash_columns import block_of, samples_in_order
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_formats import parse_format
 from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
-from onboard.recordings.dataflash_records import (
-    CONVERTERS,
-    IMU_NAMES,
-    NEEDED,
-    Batch,
-    record_times,
-)
+from onboard.recordings.dataflash_records import CONVERTERS, IMU_NAMES, NEEDED
 from onboard.recordings.dataflash_walk import FMT_LENGTH, MAGIC
 from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 

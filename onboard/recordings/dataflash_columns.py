@@ -13,16 +13,10 @@ import numpy as np
 
 from onboard.core.inputs.blocks import NO_ATTITUDE, AttitudeColumns, Block, ImuColumns, Places
 from onboard.core.inputs.samples import Sample
+from onboard.recordings.dataflash_batch import Batch
 from onboard.recordings.dataflash_context import Context
-from onboard.recordings.dataflash_records import (
-    ATTITUDE_NAME,
-    CONVERTERS,
-    IMU_NAMES,
-    Batch,
-    attitude_angles,
-    imu_numbers,
-    imu_rows,
-)
+from onboard.recordings.dataflash_inertial import attitude_angles, imu_numbers, imu_rows
+from onboard.recordings.dataflash_records import ATTITUDE_NAME, CONVERTERS, IMU_NAMES
 
 Batches: TypeAlias = Sequence[tuple[Places, Batch]]
 """Records of one format each, and where they stand."""

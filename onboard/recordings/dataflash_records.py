@@ -8,28 +8,24 @@ GPS week milliseconds in ``TimeMS`` and the boot clock in ``T``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from onboard.core.inputs.samples import (
     AirData,
-    AttitudeSample,
     Battery,
     EkfBias,
     EkfHealth,
     GpsFix,
-    ImuSample,
     Outputs,
     ParameterValue,
-    Sample,
     Throttle,
     VehicleState,
     Vibration,
 )
 from onboard.recordings.bulk import samples_of
+from onboard.recordings.dataflash_batch import Batch, Converted, Converter
 from onboard.recordings.dataflash_context import (
     CHANNELS,
     GPS_NAMES,
@@ -38,12 +34,9 @@ from onboard.recordings.dataflash_context import (
     Series,
     receiver_of,
 )
-from onboard.recordings.dataflash_formats import Format, Records
-
-Integers = NDArray[np.int64]
+from onboard.recordings.dataflash_inertial import attitude, imu
 
 SECONDS_PER_WEEK = 604800.0
-MOST_IMUS = 5
 SAME_FIX_S = 2e-3
 """GPA is written right after the GPS record that it belongs to."""
 LONGEST_SILENCE_S = 2.0
@@ -62,88 +55,6 @@ EVENTS: dict[int, tuple[bool | None, bool | None]] = {
     28: (None, False),
 }
 """EV record: event number to (armed, landed)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """Some records of one format and their times (n,), s, NaN where not known."""
-
-    form: Format
-    records: Records
-    t: Floats
-
-    def floats(self, *columns: str) -> list[list[float]]:
-        """Columns as lists of Python floats."""
-        return [self.form.numbers(self.records, column).tolist() for column in columns]
-
-    def integers(self, column: str, default: int = 0) -> list[int]:
-        """An integer column, or a default where the layout has none."""
-        if not self.form.has(column):
-            return [default] * len(self.records)
-        return self.form.integers(self.records, column, default)
-
-
-Converted = Iterable[Sample | None]
-Converter = Callable[[Batch, Context], Converted]
-
-
-def record_times(form: Format, records: Records) -> Floats | None:
-    """(n,) boot time of records, s; None where the layout has no time of its own."""
-    if form.has("TimeUS"):
-        return form.numbers(records, "TimeUS") / 1e6
-    if form.name.startswith("GPS"):
-        return form.numbers(records, "T") / 1e3 if form.has("T") else None
-    return form.numbers(records, "TimeMS") / 1e3 if form.has("TimeMS") else None
-
-
-def imu_numbers(batch: Batch) -> Integers:
-    """(n,) numbers of the accelerometers of IMU records, from 1."""
-    first = int(batch.form.name[3:] or 1)
-    told = np.minimum(np.array(batch.integers("I")), MOST_IMUS)  # damaged bytes make any number
-    numbers: Integers = told.astype(np.int64) + first
-    return numbers
-
-
-def imu_rows(batch: Batch) -> tuple[Floats, NDArray[np.bool_]]:
-    """Rate, force and temperature (n, 7) of IMU records, and whether they are measurements (n,).
-
-    The temperature is NaN where the record has none.
-    """
-    form, records = batch.form, batch.records
-    names = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
-    measured = np.column_stack([form.numbers(records, name) for name in names])
-    named = next((c for c in ("T", "Temp") if form.has(c)), None)
-    heat = form.numbers(records, named) if named else np.zeros(len(records))
-    # A temperature of exactly 0 is that of a sensor without a thermometer.
-    celsius = np.where(heat == 0.0, np.nan, heat)
-    # Not a measurement: the sensor was not there yet, or there is none such.
-    there = np.any(measured != 0.0, axis=1) & (imu_numbers(batch) <= MOST_IMUS)
-    return np.column_stack((measured, celsius)), there
-
-
-def imu(batch: Batch, _context: Context) -> Converted:
-    """IMU (with or without instance), IMU2, IMU3."""
-    rows, there = imu_rows(batch)
-    p, q, r, x, y, z, celsius = rows.T.tolist()
-    force, rate = list(zip(x, y, z, strict=True)), list(zip(p, q, r, strict=True))
-    heat = [None if math.isnan(degrees) else degrees for degrees in celsius]
-    numbers = imu_numbers(batch).tolist()
-    samples: list[Sample | None] = []
-    samples += samples_of(ImuSample, batch.t.tolist(), numbers, force, rate, heat)
-    for k in np.flatnonzero(~there).tolist():
-        samples[k] = None
-    return samples
-
-
-def attitude_angles(batch: Batch) -> Floats:
-    """Roll, pitch and yaw (n, 3) of ATT records, rad."""
-    columns = (batch.form.numbers(batch.records, c) for c in ("Roll", "Pitch", "Yaw"))
-    return np.radians(np.column_stack(tuple(columns)))
-
-
-def attitude(batch: Batch, _context: Context) -> Converted:
-    """ATT."""
-    return samples_of(AttitudeSample, batch.t.tolist(), *attitude_angles(batch).T.tolist())
 
 
 def gps(batch: Batch, context: Context) -> Converted:
