@@ -19,6 +19,7 @@ from onboard.core.vehicle.effects.inflow import Inflow
 from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.own import own
+from onboard.core.vehicle.effects.own_motion import OwnMotion
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
@@ -53,12 +54,15 @@ class Variant:
         gusty: whether the air is turbulent, so that gusts act on the mean force, and commands
             answer them.
         change: when the mass or the thrust became another; None: never.
+        moving: by how much several flights differ in the force that goes with their own motion,
+            1/s; zero: not at all.
     """
 
     profile_top: float = TOP_M
     by_components: bool = False
     gusty: bool = False
     change: Change | None = None
+    moving: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +166,7 @@ def copter_model(
         ThrustTilt(),
         RotorDrag(frame, by_components=variant.by_components),
         BodyDrag(frame),
+        *([own([OwnMotion(variant.moving) for _ in parts])] if variant.moving else []),
         MotorLag(),
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),

@@ -12,6 +12,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.airframe_file import DIGITS, numbers_of_file
 from onboard.core.vehicle.battery import fitted_battery
+from onboard.core.vehicle.between import spread
 from onboard.core.vehicle.copter import (
     Outputs,
     Variant,
@@ -24,12 +25,13 @@ from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.ground_effect import GroundEffect
 from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.effects.motor_lag import MotorLag
+from onboard.core.vehicle.effects.own_motion import PLAUSIBLE as MOVING
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import AMBIGUOUS, APART
+from onboard.core.vehicle.limits import AMBIGUOUS, APART, FEWEST_FLIGHTS
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, held_out, likelier, matched
 from onboard.core.vehicle.model import ForceModel
@@ -66,7 +68,8 @@ def match_copter(
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    variant, found = _with_change(flight, frame, force_sigma)
+    moving = _moving(flight, frame, force_sigma)
+    variant, found = _with_change(flight, frame, force_sigma, moving)
     if found.turbulence.found:
         variant = replace(variant, gusty=True)
         found = matched(copter_model(flight, frame, force_sigma, variant))
@@ -91,8 +94,20 @@ def match_copter(
     )
 
 
+def _moving(flight: Flight, frame: CopterAirframe, force_sigma: Array) -> float:
+    """By how much flights differ in the force that goes with their own motion, 1/s.
+
+    Zero where they are too few to tell.
+    """
+    if flight.parts < FEWEST_FLIGHTS:
+        return 0.0
+    fit = likelier(copter_model(flight, frame, force_sigma, Variant(moving=MOVING)))
+    places = [k for k, u in enumerate(fit.model.unknowns) if u.name.startswith("moving_")]
+    return spread(fit.theta[places], fit.covariance[np.ix_(places, places)], MOVING)
+
+
 def _with_change(
-    flight: Flight, frame: CopterAirframe, force_sigma: Array
+    flight: Flight, frame: CopterAirframe, force_sigma: Array, moving: float
 ) -> tuple[Variant, Matched]:
     """The model, with a sudden change of mass or thrust where one is needed, and what it finds.
 
@@ -100,7 +115,7 @@ def _with_change(
     """
 
     def model(change: Change | None) -> ForceModel:
-        return copter_model(flight, frame, force_sigma, Variant(change=change))
+        return copter_model(flight, frame, force_sigma, Variant(change=change, moving=moving))
 
     first = likelier(model(None))
     change = change_of(first, model)
@@ -112,8 +127,8 @@ def _with_change(
             other = matched(model(since))
             if _better(other, found):
                 change, found = since, other
-            return Variant(change=change), found
-    return Variant(), matched(model(None), first)
+            return Variant(change=change, moving=moving), found
+    return Variant(moving=moving), matched(model(None), first)
 
 
 def _better(other: Matched, found: Matched) -> bool:

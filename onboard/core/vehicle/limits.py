@@ -69,6 +69,8 @@ BLOCK_S: Final = 12.0
 """Length of a block whose sums are kept, s: longer than the disturbance remembers [cost]."""
 FEWEST_BLOCKS: Final = 5
 """Fewer blocks do not tell the scatter between them [probability]."""
+FEWEST_FLIGHTS: Final = 5
+"""Fewer flights do not tell by how much flights differ [probability]."""
 FOLDS: Final = 8
 """Folds of the cross-validation [cost]."""
 INSTRUMENT_WINDOWS: Final = (2, 4)
