@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -147,6 +148,40 @@ def test_asking_the_clock_again_says_the_same_and_changes_nothing(stamps):
         again = clock.seconds_ms(stamp) if kind == "ms" else clock.seconds_us(stamp)
         assert again == first
         assert (clock.latest, clock.reboots) == (latest, reboots)
+
+
+@given(
+    before=st.lists(st.integers(0, 40_000), max_size=4),
+    stamps=st.lists(st.integers(0, 40_000), min_size=1, max_size=6),
+    after=st.lists(st.integers(0, 40_000), max_size=4),
+)
+def test_stamps_that_only_advance_may_be_told_at_once(before, stamps, after):
+    alone, together = BootClock(), BootClock()
+    for ms in before:
+        assert heard_ms(alone, ms) == heard_ms(together, ms)
+    t = np.array(stamps, np.float64) * 1e-3
+    at_once = together.only_advances(t)
+    if at_once:
+        together.advance(float(t.max()))
+    for k, ms in enumerate(stamps):
+        assert heard_ms(alone, ms) == t[k]
+        if not at_once:
+            heard_ms(together, ms)
+    for ms in after:
+        assert heard_ms(alone, ms) == heard_ms(together, ms)
+    assert (alone.latest, alone.reboots) == (together.latest, together.reboots)
+
+
+def test_a_stray_stamp_is_forgotten_by_stamps_told_at_once():
+    clock = BootClock()
+    for ms in (40_000, 5_000):
+        heard_ms(clock, ms)
+    assert clock.only_advances(np.array([40.02, 40.04]))
+    clock.advance(40.04)
+    heard_ms(clock, 5_000)
+    assert (clock.latest, clock.reboots) == (40.04, 0)
+    assert not clock.only_advances(np.array([40.06, 37.0]))
+    assert not clock.only_advances(np.array([WRAP_S - 1.0]))
 
 
 def test_a_decoder_with_the_links_clock_takes_its_time_and_does_not_move_it():

@@ -159,11 +159,15 @@ class Calibrator:
         )
 
     def _may_forget(self, block: Block) -> bool:
-        """Whether an accelerometer may be begun anew: that HIGHRES_IMU came, is forgotten, too."""
+        """Whether parameters or another receiver may change which samples of a source are taken.
+
+        With an accelerometer that is begun anew it is forgotten that HIGHRES_IMU came.
+        """
         receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
         known = {self._trust.receiver} - {None}
-        told = any(isinstance(s, ParameterValue) for s in block.others)
-        return told or len(receivers | known) > 1
+        names = {s.name for s in block.others if isinstance(s, ParameterValue)}
+        told = names & {*OF_ACCELEROMETER, "AHRS_ORIENTATION"}
+        return bool(told) or len(receivers | known) > 1
 
     def go_through(self, block: Block) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
         """Take a block that is admitted, to the end.

@@ -236,28 +236,28 @@ def lagging(t: float) -> ImuSample:
 
 def test_one_that_lags_begins_a_boot():
     """Against what came before the block, and within it."""
-    for at in (3000, 3007):
+    for at in (3000, 3007, 3299):
         assert_same(inserted(FLIGHT, at, lagging(time_at(FLIGHT, at) - 3.5)), 300)
 
 
-def test_another_receiver_begins_an_accelerometer_anew():
-    """That of before was given up; what had come until then is forgotten with the rest."""
-    long = [
-        replace(s, receiver=2) if isinstance(s, GpsFix) and s.t > 30.0 else s for s in flight(100.0)
-    ]
+def test_a_receiver_that_never_had_a_fix_is_given_up():
+    long: list[Sample] = []
+    for s in flight(90.0):
+        long += [replace(s, fix_type=1), replace(s, receiver=2)] if isinstance(s, GpsFix) else [s]
     assert assert_same(long, 500) > 0.9 * len(long)
-    assert assert_same(highres(long, len(long) * 2 // 3, seconds=30.0), 500) > 0.5 * len(long)
+    recorded = Recorded()
+    fed(in_blocks(long, 500), recorded)
+    assert recorded.calibrator.trust.receiver == 2
+    assert recorded.calibrator.imus == (1, 2)
+    assert_same(highres(long, len(long) // 2, seconds=30.0), 500)
 
 
 def test_a_gap_is_seen_by_what_comes_after_the_fix():
     """An older inertial sample behind a late fix says less than the newest one before it."""
     newest = FLIGHT[-1].t + 2.51
-    late = replace(fix(newest - 2.505), v_n=10.0)
-    ending = [
-        ImuSample(newest, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.1)),
-        late,
-        ImuSample(newest - 0.02, 2, (0.0, 0.0, -9.8), (0.0, 0.0, 0.1)),
-    ]
+    late = fix(newest - 2.505)
+    first, second = (next(s for s in FLIGHT if getattr(s, "imu", 0) == imu) for imu in (1, 2))
+    ending = [replace(first, t=newest), late, replace(second, t=newest - 0.02)]
     size = len(FLIGHT) // 4 + 3
     alone, together = Recorded(), Recorded()
     for sample in FLIGHT + ending:
