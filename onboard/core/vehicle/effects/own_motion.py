@@ -10,8 +10,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import ByStep, Unknown
 
-PLAUSIBLE = 0.15
-"""1/s; half of what rotors drag by [physics]."""
+PLAUSIBLE = 0.3
+"""1/s; as much as small rotors drag by [physics]."""
 
 
 class OwnMotion(ByStep):
