@@ -100,6 +100,7 @@ FLIGHTS = (
 LOOKS: tuple[str, ...] = (
     "lower ends of noise levels: as they were, or those of data sheets",
     "the search for noise levels: a stencil a factor of two wide, or Fisher's scoring",
+    "headings set anew put right, and force noise by the samples' restlessness, or neither",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
