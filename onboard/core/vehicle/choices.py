@@ -43,7 +43,7 @@ class Choices:
         self._N = sum((b.N for b in fit.blocks), np.zeros((len(fit.theta),) * 2))
         self._b = sum((b.b for b in fit.blocks), np.zeros(len(fit.theta)))
         self._s = float(sum(b.s for b in fit.blocks))
-        self._nominal = fit.model.nominal - fit.theta
+        self._nominal = fit.model.nominal_near(fit.theta) - fit.theta
         self.folds = _folds(len(fit.blocks))
 
     @property
@@ -63,7 +63,7 @@ class Choices:
         """With these effects free."""
         x, free = self._at(effects, self._N, self._b)
         f = self.fit
-        apart = f.theta + x - f.model.nominal
+        apart = x - self._nominal
         squares = self._s - 2.0 * self._b @ x + x @ self._N @ x + f.prior @ (apart * apart)
         information = (self._N + np.diag(f.prior))[np.ix_(free, free)]
         root = np.sqrt(f.inflation[free])

@@ -35,8 +35,8 @@ from onboard.core.vehicle.several import wind_sigmas
 from onboard.core.vehicle.signals import Signals, Stream
 
 FULL_RANGE = (0.85, 1.05)
-"""The highest voltage flown, over the frame's full one, between which the battery is the frame's;
-else it is another battery, and what was flown is taken for full [physics]."""
+"""The highest voltage, at rest or flown, over the frame's full one, between which the battery is
+the frame's; else it is another battery, and that voltage is taken for full [physics]."""
 
 
 DENSITY_RANGE_M = 500.0
@@ -126,7 +126,7 @@ def full_voltage(flight: Flight, frame: CopterAirframe) -> float:
     volts = voltage_of(flight)
     if volts is None:
         return frame.maxVoltage
-    most = float(np.percentile(volts, 99))
+    most = float(np.fmax(np.percentile(volts, 99), flight.rest_volts))
     ours = FULL_RANGE[0] < most / frame.maxVoltage < FULL_RANGE[1]
     return frame.maxVoltage if ours else most
 

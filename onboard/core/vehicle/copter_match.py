@@ -30,6 +30,7 @@ from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import AMBIGUOUS, APART, FEWEST_FLIGHTS
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
@@ -39,6 +40,7 @@ from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.signals import Signals
 from onboard.core.vehicle.sudden import CHANGES, change_of
+from onboard.core.vehicle.turbulence import turbulence_of
 
 MANOEUVRES = {
     e.name: e.manoeuvre
@@ -70,9 +72,11 @@ def match_copter(
     """
     moving = _moving(flight, frame, force_sigma)
     variant, found = _with_change(flight, frame, force_sigma, moving)
-    if found.turbulence.found:
-        variant = replace(variant, gusty=True)
-        found = matched(copter_model(flight, frame, force_sigma, variant))
+    answering = replace(variant, gusty=True)
+    model = copter_model(flight, frame, force_sigma, answering)
+    # A plain fit that took the answers for the cause has too little drag to show a gust.
+    if found.turbulence.seen or turbulence_of(fitted(model)).seen:
+        variant, found = answering, matched(model)
     for name, change in RIVAL_FORMS:
         if name in found.chosen.effects:
             other_form = replace(variant, **change)

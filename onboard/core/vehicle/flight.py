@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -47,6 +48,7 @@ class Flight:
         attitude_sigma: of roll and pitch, rad.
         measured_wind: (n, 3) towards north and east, and its sigma, m/s; or empty (n, 0).
         part: (n,) which of several recordings a step is of (:mod:`onboard.core.vehicle.several`).
+        rest_volts: of the battery before the flight began, V; NaN where nobody saw it.
         step_s: length of a step, s.
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
     """
@@ -70,6 +72,7 @@ class Flight:
     attitude_sigma: float
     measured_wind: Array = field(default_factory=lambda: np.zeros((0, 0)))
     part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    rest_volts: float = math.nan
     step_s: float = STEP_S
     ground_seen: bool = True
 
@@ -171,6 +174,7 @@ def flight_of(
         airspeed=joined["airspeed"],
         ekf_wind=joined["ekf_wind"],
         measured_wind=joined["measured_wind"],
+        rest_volts=_before(signals.battery, float(joined["t"][air][0])),
     )
     flight = flight.kept(air)
     # What was cut out divides a piece: the noise's memory must not reach across.
@@ -178,6 +182,13 @@ def flight_of(
     piece = np.concatenate([[0], np.cumsum(breaks | (np.diff(flight.piece) != 0))])
     flight.piece[:] = piece
     return flight
+
+
+def _before(battery: Stream, t: float) -> float:
+    """Median voltage before ``t``, V; NaN where there is none."""
+    volts = battery.x[battery.t < t, 0]
+    volts = volts[np.isfinite(volts)]
+    return float(np.median(volts)) if len(volts) else math.nan
 
 
 def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[str, Array] | None:

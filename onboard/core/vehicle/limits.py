@@ -55,7 +55,7 @@ CORRELATION_S: Final = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0)
 block's [cost]."""
 WHITE_SHARES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 """Shares of white noise in the variance of the disturbance that are tried [cost]."""
-GUST_LEVELS: Final = (0.0, 0.3, 1.0, 3.0, 10.0)
+GUST_LEVELS: Final = (0.0, 0.3, 1.0, 2.0, 4.0, 10.0)
 """Gust noise, as multiples of the force noise at the mean sensitivity, that is tried [cost]."""
 LEAST_NOISE_M_S2: Final = 0.005
 """Noise that no force goes below, m/s^2: steps of logged numbers [data sheet]."""
@@ -117,8 +117,12 @@ ALIKE: Final = 0.7
 AMBIGUOUS: Final = 10.0
 """Fall of chi-square within which two effects cannot be told apart (Kass and Raftery, 1995)
 [probability]."""
-TURBULENCE_FLOOR_M_S: Final = 0.3
-"""Gusts below this are within what errors of the velocity look like, m/s [data sheet]."""
+UNCLEAR_M_S: Final = 0.3
+"""Errors of the velocity that a forward residual may be of, m/s: six times what receivers are good
+for, as long as a fault of theirs lasts [data sheet]."""
+RECEIVER_M_S: Final = 0.1
+"""Gusts below this, and below the recording's own errors of the velocity, are within what those
+look like, m/s: twice the median error of good receivers [data sheet]."""
 HEADING_RAD: Final = 0.03
 """What a heading is good to that a compass holds, rad: at speed it is an error of the velocity
 across the way, wandering for as long as nobody turns [data sheet]."""

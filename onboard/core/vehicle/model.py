@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -13,7 +14,7 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 from onboard.core.vehicle.effects.own import Own
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import HEADING_RAD, TURBULENCE_FLOOR_M_S
+from onboard.core.vehicle.limits import HEADING_RAD, UNCLEAR_M_S
 
 DIFFERENCE = 1e-3
 """Step of a difference quotient, in plausible sizes: forces are smooth [cost]."""
@@ -54,6 +55,12 @@ class ForceModel:
     def nominal(self) -> Array:
         """(m,) values of the nominal airframe."""
         return np.array([u.nominal for u in self.unknowns])
+
+    def nominal_near(self, theta: Array) -> Array:
+        """(m,) values that a nominal airframe may have, as near to ``theta`` (m,) as they are."""
+        within = np.array([u.within for u in self.unknowns])
+        out: Array = self.nominal + np.clip(theta - self.nominal, -within, within)
+        return out
 
     @property
     def plausible(self) -> Array:
@@ -160,13 +167,28 @@ class ForceModel:
         out: Array = np.sqrt(np.sum(self.gust_slope(theta) ** 2, axis=-1))
         return out
 
+    def sensitivity_to(self, theta: Array, rms: float) -> Array:
+        """(n, k) the same for gusts of this RMS, m/s, beside which the wind itself may be small.
+
+        The straight line that leaves least of a bent force over normal gusts (statistical
+        linearisation; J. B. Roberts and P. D. Spanos, *Random Vibration and Statistical
+        Linearization*, 1990), by three points of Gauss and Hermite.
+        """
+        apart = math.sqrt(3.0) * rms
+        slopes = [
+            (self.predicted(theta, gust) - self.predicted(theta, -gust)) / (2.0 * apart)
+            for gust in apart * np.eye(3)
+        ]
+        out: Array = np.sqrt(np.sum(np.square(slopes), axis=0))
+        return out
+
     def unclear(self, theta: Array) -> Array:
         """(n, k) m/s^2 that errors of the velocity and of the heading may make, and no gust."""
         slope = self.gust_slope(theta)
         u_n = np.einsum("nij,ni->nj", self.flight.R_bn, self.air(theta).u_b)
         across = np.column_stack([-u_n[:, 1], u_n[:, 0], np.zeros(len(u_n))])
         turned = np.einsum("nki,ni->nk", slope, across)
-        square = TURBULENCE_FLOOR_M_S**2 * np.sum(slope**2, axis=-1)
+        square = UNCLEAR_M_S**2 * np.sum(slope**2, axis=-1)
         out: Array = np.sqrt(square + (HEADING_RAD * turned) ** 2)
         return out
 

@@ -64,6 +64,7 @@ def joined(flights: Sequence[Flight]) -> Flight:
         **whole,
         velocity_sigma=max(f.velocity_sigma for f in flights),
         attitude_sigma=max(f.attitude_sigma for f in flights),
+        rest_volts=float(np.fmax.reduce([f.rest_volts for f in flights])),
         ground_seen=all(f.ground_seen for f in flights),
     )
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.limits import (
     FALSE_ALARM,
+    RECEIVER_M_S,
     SENSED_GUST_M_S,
     SURE,
-    TURBULENCE_FLOOR_M_S,
 )
 from onboard.core.vehicle.noise import (
     AxisNoise,
@@ -25,6 +26,9 @@ from onboard.core.vehicle.noise import (
 )
 from onboard.core.vehicle.windows import windows_of
 
+TINY = 1e-12
+"""Of a square of a sensitivity, 1/s^2: no drag at all [physics]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Turbulence:
@@ -34,18 +38,18 @@ class Turbulence:
         rms: of those that the noise shows, slower than the steps, m/s.
         sigma: of it, as the air's: a flight meets some gusts, not all.
         evidence: twice the log-likelihood that it adds.
+        floor: what other things than gusts look like, m/s.
         whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; None where
             that is not known.
         whole_sigma: of it.
-        floor: what other things than gusts look like, m/s.
     """
 
     rms: float
     sigma: float
     evidence: float
+    floor: float
     whole: float | None = None
     whole_sigma: float = math.nan
-    floor: float = TURBULENCE_FLOOR_M_S
 
     @property
     def seen(self) -> bool:
@@ -64,31 +68,54 @@ def turbulence_of(fit: Fit) -> Turbulence:
     An airspeed sensor shows those along the flow directly: a plane's angles follow the gusts, so
     that its forces hide them.
     """
-    flight = fit.model.flight
     if AirspeedScale.name in {e.name for e in fit.model.effects}:
         return _felt(fit)
-    lateral = (0, 1) if "rotor_drag" in {e.name for e in fit.model.effects} else (1,)
-    found = []
-    for k, axis in enumerate(fit.model.axes):
-        if axis not in lateral:
-            continue
-        data = fit.residual[:, k], fit.sensitivity[:, k], flight.piece, flight.step_s
-        noise = fitted_noise(*data, gusts=True)
-        evidence, _ = gust_evidence(*data, noise)
-        seconds = len(flight) * flight.step_s
-        memory = noise.correlation_s * (1.0 - noise.white) + flight.step_s
-        found.append((noise.gust, evidence, seconds / (2.0 * memory)))
-    gust = float(np.sqrt(np.mean([g * g for g, _, _ in found]))) if found else 0.0
-    count = sum(n for _, _, n in found) if found else 1.0
-    evidence = sum(e for _, e, _ in found)
-    sigma = gust / math.sqrt(2.0 * max(count, 1.0))
+    gust, sigma, evidence = _pushed(fit)
+    floor = math.hypot(RECEIVER_M_S, fit.model.flight.velocity_sigma)
     if any(u.name == "gust_variance" for u in fit.model.unknowns):
         k = fit.model.index("gust_variance")
         variance, spread = float(fit.theta[k]), float(fit.sigma[k])
         if variance > max(SURE * spread, gust**2):
             whole = math.sqrt(variance)
-            return Turbulence(gust, sigma, evidence, whole, spread / (2.0 * whole))
-    return Turbulence(gust, sigma, evidence)
+            return Turbulence(gust, sigma, evidence, floor, whole, spread / (2.0 * whole))
+    return Turbulence(gust, sigma, evidence, floor)
+
+
+def _pushed(fit: Fit) -> tuple[float, float, float]:
+    """RMS of gusts by what they do sideways, its sigma, m/s, and the evidence of them.
+
+    What of the coloured noise does not grow with the sensitivity is another thing, or gusts all the
+    same, by a drag that is not quite the model's: each share of it is as likely.
+    """
+    model = fit.model
+    lateral = (0, 1) if "rotor_drag" in {e.name for e in model.effects} else (1,)
+    axes = [k for k, axis in enumerate(model.axes) if axis in lateral]
+    if not axes:
+        return 0.0, 0.0, 0.0
+    sensitivity, gust = fit.sensitivity, 0.0
+    for _ in range(2):
+        each = np.array([_sideways(fit, k, sensitivity[:, k]) for k in axes])
+        grown, whole = np.sqrt(each[:, :2].mean(axis=0)).tolist()
+        gust = 0.5 * (grown + max(grown, whole))
+        # What gusts of this size do, now that it is known.
+        sensitivity = model.sensitivity_to(fit.theta, max(gust, RECEIVER_M_S))
+    count, evidence = each[:, 2:].sum(axis=0).tolist()
+    sigma = math.hypot(gust / math.sqrt(2.0 * count), (gust - grown) / math.sqrt(3.0))
+    return gust, sigma, evidence
+
+
+def _sideways(fit: Fit, k: int, sensitivity: Array) -> tuple[float, float, float, float]:
+    """Of axis k: squares of gusts, m^2/s^2, how many there were, and their evidence.
+
+    Squares are by what grows with the ``sensitivity`` (n,), 1/s, and by all coloured noise.
+    """
+    flight = fit.model.flight
+    data = fit.residual[:, k], sensitivity, flight.piece, flight.step_s
+    noise = fitted_noise(*data, gusts=True)
+    memory = noise.correlation_s * (1.0 - noise.white) + flight.step_s
+    count = len(flight) * flight.step_s / (2.0 * memory)
+    whole = (1.0 - noise.white) * rms(fit.residual[:, k]) ** 2 / max(rms(sensitivity) ** 2, TINY)
+    return noise.gust**2, whole, count, gust_evidence(*data, noise)[0]
 
 
 def _felt(fit: Fit) -> Turbulence:
@@ -104,7 +131,7 @@ def _felt(fit: Fit) -> Turbulence:
     gust = coloured / (_kept(windows.length_s / noise.correlation_s) * max(abs(scale), 0.1))
     memory = 2.0 * (noise.correlation_s + windows.length_s)
     sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
-    return Turbulence(gust, sigma, evidence, gust, sigma, SENSED_GUST_M_S)
+    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, gust, sigma)
 
 
 def _kept(x: float) -> float:

@@ -87,6 +87,15 @@ def test_a_voltage_that_falls_by_little_is_not_left_to_the_thrust():
     within(match, "voltage_sag.share", 1.0)
 
 
+def test_a_battery_that_is_down_as_soon_as_it_is_loaded_was_full_at_rest():
+    """Flown from 10.4 V on, it is no pack of fewer cells, whose thrust would be a third less."""
+    flight = copter_flight(volts=(10.4, 8.0), sag=1.0, seed=13)
+    match = matched(replace(flight, rest_volts=12.6))
+    assert names(match) == {"voltage_sag"}
+    within(match, "voltage_sag.share", 1.0)
+    within(match, "thrust_scale.log_ratio", 0.0)
+
+
 def test_without_outputs_the_sides_are_told_and_the_thrust_is_not_tested():
     flight = copter_flight(wind=(4.0, 0.0), seed=9)
     match = matched(flight.kept(np.ones(len(flight), dtype=bool)).__class__(

@@ -9,30 +9,36 @@ import pytest
 
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import Variant, copter_model
+from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.fit import fitted
+from onboard.core.vehicle.signals import Signals
 from tests.core.vehicle.flights import STEP, G, copter_flight, flight_with, smooth
 
 C_M, AREA = 0.24833, 0.058108
 SIGMA = np.array([0.003, 0.003, 0.01])
-GUST, MEMORY_S = 0.8, 2.0
+COPTER = Signals(kind="copter")
+MEMORY_S = 2.0
 
 
-def gauss_markov(rng, n):
+def gauss_markov(rng, n, size):
     keep = np.exp(-STEP / MEMORY_S)
     x = np.empty(n)
     x[0] = rng.normal()
     for k in range(1, n):
         x[k] = keep * x[k - 1] + np.sqrt(1.0 - keep**2) * rng.normal()
-    return GUST * x
+    return size * x
 
 
-def leaning_flight(seed, seconds=160.0):
-    """Drag of the nominal frame, a velocity that no gust moves, and a tilt that holds it."""
+def leaning_flight(seed, seconds=160.0, gust=0.8):
+    """Drag of the nominal frame, a velocity that no gust moves, and a tilt that holds it.
+
+    ``gust`` is the RMS of a horizontal component, m/s; there is a third of it upwards.
+    """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = STEP * np.arange(n)
     v_n = np.stack([smooth(rng, n, s, 4.0) for s in (4.0, 4.0, 1.0)], axis=1)
-    gusts = np.stack([gauss_markov(rng, n), gauss_markov(rng, n), 0.3 * gauss_markov(rng, n)], 1)
+    gusts = np.stack([gauss_markov(rng, n, size * gust) for size in (1.0, 1.0, 0.3)], axis=1)
     u_n = v_n - np.array([2.0, -1.5, 0.0]) - gusts
     height = 600.0 + smooth(rng, n, 5.0, 6.0)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
@@ -102,3 +108,20 @@ def test_a_tilt_that_answers_gusts_takes_nothing_off_the_drag():
     # Least squares takes the answer for the cause.
     assert np.mean(plain) < 0.8 * SLOPE
     assert abs(np.mean(told) - SLOPE) < 0.5 * abs(np.mean(plain) - SLOPE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gust", [0.05, 0.2, 0.4, 0.8])
+def test_gusts_have_their_size_and_are_answered_whether_they_are_named_or_not(gust):
+    """Answers to gusts too small to be told from errors of the velocity bend the thrust as much."""
+    sizes = []
+    for seed in range(3, 6):
+        match = match_copter(leaning_flight(seed, gust=gust), COPTER, CopterAirframe(), SIGMA)
+        named = {d.name for d in match.effects}
+        assert named == ({"wind"} if gust < 0.1 else {"wind", "turbulence"})
+        assert "gust_variance" in match.numbers
+        if match.wind is not None and match.wind.turbulence_rms is not None:
+            sizes.append(match.wind.turbulence_rms)
+    if sizes:
+        # Three flights of 80 gusts along two axes.
+        assert abs(np.mean(sizes) / gust - 1.0) < 4.0 / np.sqrt(2 * 2 * 80 * len(sizes)) + 0.05

@@ -56,6 +56,14 @@ def test_each_coefficient_that_is_off_is_named_alone_with_its_value(change, effe
     assert abs(number.real - truth) < 4.0 * number.sigma
 
 
+@pytest.mark.parametrize("reading", [0.967, 1.0])
+def test_a_sensor_that_reads_one_of_the_nominal_ways_is_no_rival(reading):
+    """Held half-way between them it would be off by as much as a little less drag explains."""
+    match = matched(plane_flight(seed=6, wind=(-4.0, -2.5), c_drag_p=0.08, reading=reading))
+    assert names(match) == {"wind", "drag"}
+    assert not match.ambiguous
+
+
 def test_a_propeller_that_pulls_less_at_speed_is_no_drag():
     """With the nominal one for all the thrust, the speed's share would be the profile's drag."""
     match = matched(plane_flight(seed=8, lost=0.008))

@@ -36,7 +36,8 @@ class AirspeedScale(Effect):
         """Nominally between the simulator's and a right one."""
         self.simulated = simulated_scale(rho)
         middle, half = 0.5 * (1.0 + self.simulated), 0.5 * abs(1.0 - self.simulated)
-        super().__init__([Unknown("scale", middle, 0.15, FLOOR + half, "1", doubt=0.003)])
+        scale = Unknown("scale", middle, 0.15, FLOOR + half, "1", doubt=0.003, within=half)
+        super().__init__([scale])
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Predict the reading."""

@@ -28,6 +28,7 @@ class Unknown:
         unit: in the document.
         doubt: what the form of the law itself is good for, as a standard deviation.
         share: the same as a share of the value.
+        within: by how much it may be off in an airframe that is nominal all the same.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Unknown:
     unit: str
     doubt: float = 0.0
     share: float = 0.0
+    within: float = 0.0
 
     def doubted(self, value: float, sigma: float) -> float:
         """A sigma of the fit with what the law is good for."""
