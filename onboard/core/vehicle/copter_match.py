@@ -75,7 +75,7 @@ def match_copter(
     answering = replace(variant, gusty=True)
     model = copter_model(flight, frame, force_sigma, answering)
     # A plain fit that took the answers for the cause has too little drag to show a gust.
-    if found.turbulence.seen or turbulence_of(fitted(model)).seen:
+    if found.turbulence.answered or turbulence_of(fitted(model)).answered:
         variant, found = answering, matched(model)
     for name, change in RIVAL_FORMS:
         if name in found.chosen.effects:

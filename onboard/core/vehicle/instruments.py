@@ -6,8 +6,8 @@ answer for the cause: a copter that leans into a gust changes its own speed alon
 and drag comes out too small.  Whitening makes that worse, as what is left of a steady speed is
 little.  So regressors are taken as far as something tells them that the gust has not reached yet:
 commands by what they were before it, speeds through the air by the path over ground and the
-heading, which a gust moves over seconds.  J. D. Angrist and J.-S. Pischke, *Mostly Harmless
-Econometrics* (2009), chapter 4.
+heading before it, which a gust moves over seconds.  J. D. Angrist and J.-S. Pischke, *Mostly
+Harmless Econometrics* (2009), chapter 4.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.limits import INSTRUMENT_WINDOWS, THRUST_AXIS
+from onboard.core.vehicle.limits import INSTRUMENT_WINDOWS, PATH_WINDOWS, THRUST_AXIS
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, whitened
 from onboard.core.vehicle.windows import windows_of
@@ -61,16 +61,17 @@ def whitened_rows(
         if jacobian is not None and instrumented:
             m = jacobian.shape[-1]
             mine, other = made[:, 1 : 1 + m], made[:, 1 + m :]
-            by = other if sideways else _past(mine, windows.piece)
+            before = (other, PATH_WINDOWS) if sideways else (mine, INSTRUMENT_WINDOWS)
+            by = _past(before[0], windows.piece, before[1])
             made = np.hstack([made[:, :1], told_by(mine, by)])
         out.append(made)
     return out
 
 
-def _past(rows: Array, piece: NDArray[np.int64]) -> Array:
-    """(r, j) the rows as they were some windows ago; zero where the piece had not begun."""
+def _past(rows: Array, piece: NDArray[np.int64], lags: Sequence[int]) -> Array:
+    """(r, j) the rows as they were so many windows ago; zero where the piece had not begun."""
     past = []
-    for lag in INSTRUMENT_WINDOWS:
+    for lag in lags:
         moved = np.zeros_like(rows)
         moved[lag:] = rows[:-lag]
         moved[np.concatenate([np.ones(lag, dtype=bool), piece[lag:] != piece[:-lag]])] = 0.0

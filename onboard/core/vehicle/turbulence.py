@@ -12,6 +12,7 @@ from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.limits import (
+    APART,
     FALSE_ALARM,
     RECEIVER_M_S,
     SENSED_GUST_M_S,
@@ -39,6 +40,7 @@ class Turbulence:
         sigma: of it, as the air's: a flight meets some gusts, not all.
         evidence: twice the log-likelihood that it adds.
         floor: what other things than gusts look like, m/s.
+        errors: of the recording's own velocity, m/s.
         whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; None where
             that is not known.
         whole_sigma: of it.
@@ -48,6 +50,7 @@ class Turbulence:
     sigma: float
     evidence: float
     floor: float
+    errors: float
     whole: float | None = None
     whole_sigma: float = math.nan
 
@@ -55,6 +58,14 @@ class Turbulence:
     def seen(self) -> bool:
         """Whether it is more than chance."""
         return survival(self.evidence, 1) < FALSE_ALARM
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is surely something that an autopilot answers.
+
+        Of gusts too small to be named the answers bend what is told by as many of its sigmas.
+        """
+        return self.seen and self.rms > APART * self.errors + SURE * self.sigma
 
     @property
     def found(self) -> bool:
@@ -71,14 +82,16 @@ def turbulence_of(fit: Fit) -> Turbulence:
     if AirspeedScale.name in {e.name for e in fit.model.effects}:
         return _felt(fit)
     gust, sigma, evidence = _pushed(fit)
-    floor = math.hypot(RECEIVER_M_S, fit.model.flight.velocity_sigma)
+    errors = fit.model.flight.velocity_sigma
+    floor = math.hypot(RECEIVER_M_S, errors)
     if any(u.name == "gust_variance" for u in fit.model.unknowns):
         k = fit.model.index("gust_variance")
         variance, spread = float(fit.theta[k]), float(fit.sigma[k])
         if variance > max(SURE * spread, gust**2):
             whole = math.sqrt(variance)
-            return Turbulence(gust, sigma, evidence, floor, whole, spread / (2.0 * whole))
-    return Turbulence(gust, sigma, evidence, floor)
+            spread /= 2.0 * whole
+            return Turbulence(gust, sigma, evidence, floor, errors, whole, spread)
+    return Turbulence(gust, sigma, evidence, floor, errors)
 
 
 def _pushed(fit: Fit) -> tuple[float, float, float]:
@@ -131,7 +144,8 @@ def _felt(fit: Fit) -> Turbulence:
     gust = coloured / (_kept(windows.length_s / noise.correlation_s) * max(abs(scale), 0.1))
     memory = 2.0 * (noise.correlation_s + windows.length_s)
     sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
-    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, gust, sigma)
+    errors = flight.velocity_sigma
+    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, errors, gust, sigma)
 
 
 def _kept(x: float) -> float:
