@@ -51,8 +51,8 @@ class Variant:
     Attributes:
         profile_top: height from which the wind is constant, m.
         by_components: whether rotors that lean drag as the simulator's do.
-        gusty: whether the air is turbulent, so that gusts act on the mean force, and commands
-            answer them.
+        gusts: RMS of those that are seen in turbulent air, where they act on the mean force and
+            commands answer them, m/s; zero in calm air.
         change: when the mass or the thrust became another; None: never.
         moving: by how much several flights differ in the force that goes with their own motion,
             1/s; zero: not at all.
@@ -60,7 +60,7 @@ class Variant:
 
     profile_top: float = TOP_M
     by_components: bool = False
-    gusty: bool = False
+    gusts: float = 0.0
     change: Change | None = None
     moving: float = 0.0
 
@@ -159,7 +159,7 @@ def copter_model(
     everything: list[Effect] = [
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
         own([WindProfile(variant.profile_top) for _ in parts]),
-        *([own([GustDrag() for _ in parts])] if variant.gusty else []),
+        *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),
         *([MassChange(change, flight)] if change else []),
         VerticalDrag(frame),
@@ -179,7 +179,7 @@ def copter_model(
     ]
     effects = tuple(e for e in everything if not e.missing(still))
     axes = (0, 1, 2) if still.commands is not None else (0, 1)
-    return ForceModel(flight, effects, axes, start, instrumented=axes if variant.gusty else ())
+    return ForceModel(flight, effects, axes, start, instrumented=axes if variant.gusts else ())
 
 
 def copter_missing(flight: Flight, frame: CopterAirframe) -> dict[str, str]:

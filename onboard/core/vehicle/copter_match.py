@@ -32,7 +32,7 @@ from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import AMBIGUOUS, APART, FEWEST_FLIGHTS
+from onboard.core.vehicle.limits import AMBIGUOUS, APART, FEWEST_FLIGHTS, RECEIVER_M_S
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, held_out, likelier, matched
 from onboard.core.vehicle.model import ForceModel
@@ -72,11 +72,15 @@ def match_copter(
     """
     moving = _moving(flight, frame, force_sigma)
     variant, found = _with_change(flight, frame, force_sigma, moving)
-    answering = replace(variant, gusty=True)
-    model = copter_model(flight, frame, force_sigma, answering)
+    seen = max(found.turbulence.rms, RECEIVER_M_S)
+    answering = replace(variant, gusts=seen)
+    fit = fitted(copter_model(flight, frame, force_sigma, answering))
+    air = turbulence_of(fit)
     # A plain fit that took the answers for the cause has too little drag to show a gust.
-    if found.turbulence.answered or turbulence_of(fitted(model)).answered:
-        variant, found = answering, matched(model)
+    if found.turbulence.answered or air.answered:
+        variant = replace(answering, gusts=max(air.rms, RECEIVER_M_S))
+        model = copter_model(flight, frame, force_sigma, variant)
+        found = matched(model, fitted(model, fit.theta))
     for name, change in RIVAL_FORMS:
         if name in found.chosen.effects:
             other_form = replace(variant, **change)

@@ -6,6 +6,7 @@ is algebra on the blocks' sums about the estimate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,9 +17,12 @@ from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FEWEST_BLOCKS,
+    LEAST_SHARE,
+    MORE_ROUNDS,
     NOISE_ROUNDS,
     ROUNDS,
     SETTLED,
+    SHRINKING,
     STALE,
 )
 from onboard.core.vehicle.model import ForceModel
@@ -193,7 +197,8 @@ def _settled(
 
     now = cost(theta)
     at, slope, level = theta, model.steps(theta), _level(model, theta)
-    for _ in range(ROUNDS):
+    share, before = 1.0, math.inf
+    for _ in range(MORE_ROUNDS if model.instrumented else ROUNDS):
         if np.max(np.abs(theta - at) / model.plausible) > STALE:
             at, slope, level = theta, model.steps(theta), _level(model, theta)
         left = measured - model.predicted(theta)
@@ -204,11 +209,19 @@ def _settled(
             b = b + r[:, 1:].T @ r[:, 0]
         step = np.linalg.solve(N, b)
         sigma = np.sqrt(np.diag(np.linalg.inv(N)))
+        size = float(np.max(np.abs(step) / sigma))
+        if model.instrumented:
+            # Regressors that are told from the past lead to no minimum of these squares, and where
+            # they lead to and fro it is half the way.
+            share = 0.5 * share if size > SHRINKING * before else share
+            theta, before = theta + share * step, size
+            if size < SETTLED or share < LEAST_SHARE:
+                break
+            continue
         for _halving in range(6):
             trial = theta + step
             then = cost(trial)
-            # Regressors that are told from the past lead to no minimum of these squares.
-            if model.instrumented or then <= now + 1e-6:
+            if then <= now + 1e-6:
                 theta, now = trial, then
                 break
             step = 0.5 * step

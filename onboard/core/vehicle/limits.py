@@ -84,6 +84,12 @@ THRUST_AXIS: Final = 2
 """Body axis along which the commands act."""
 ROUNDS: Final = 6
 """Gauss-Newton steps at the most [cost]."""
+MORE_ROUNDS: Final = 20
+"""The same where regressors are told from the past, and steps may lead to and fro [cost]."""
+SHRINKING: Final = 0.8
+"""Of the step before: a step that is larger has gone too far [cost]."""
+LEAST_SHARE: Final = 0.1
+"""Of a step; where less would be gone there is a kink, and no better place near it [cost]."""
 SETTLED: Final = 0.02
 """Sigmas that a step may move and count as no move [cost]."""
 STALE: Final = 0.03

@@ -84,13 +84,12 @@ def turbulence_of(fit: Fit) -> Turbulence:
     gust, sigma, evidence = _pushed(fit)
     errors = fit.model.flight.velocity_sigma
     floor = math.hypot(RECEIVER_M_S, errors)
-    if any(u.name == "gust_variance" for u in fit.model.unknowns):
-        k = fit.model.index("gust_variance")
-        variance, spread = float(fit.theta[k]), float(fit.sigma[k])
-        if variance > max(SURE * spread, gust**2):
-            whole = math.sqrt(variance)
-            spread /= 2.0 * whole
-            return Turbulence(gust, sigma, evidence, floor, errors, whole, spread)
+    if any(u.name == "faster_gusts" for u in fit.model.unknowns):
+        k = fit.model.index("faster_gusts")
+        more, spread = float(fit.theta[k]), float(fit.sigma[k])
+        if more > SURE * spread:
+            whole = gust * math.exp(more)
+            return Turbulence(gust, sigma, evidence, floor, errors, whole, whole * spread)
     return Turbulence(gust, sigma, evidence, floor, errors)
 
 
@@ -132,7 +131,10 @@ def _sideways(fit: Fit, k: int, sensitivity: Array) -> tuple[float, float, float
 
 
 def _felt(fit: Fit) -> Turbulence:
-    """Gusts by what the airspeed sensor reads beyond the model, as far as it is no white noise."""
+    """Gusts by what the airspeed sensor reads beyond the model, as far as it is no white noise.
+
+    Whether white noise is the sensor's or that of faster gusts nobody knows.
+    """
     k, flight = len(fit.model.axes) - 1, fit.model.flight
     windows = windows_of(flight)
     residual = windows.mean(fit.residual[:, k])
@@ -144,8 +146,7 @@ def _felt(fit: Fit) -> Turbulence:
     gust = coloured / (_kept(windows.length_s / noise.correlation_s) * max(abs(scale), 0.1))
     memory = 2.0 * (noise.correlation_s + windows.length_s)
     sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
-    errors = flight.velocity_sigma
-    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, errors, gust, sigma)
+    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, flight.velocity_sigma)
 
 
 def _kept(x: float) -> float:
