@@ -55,8 +55,11 @@ CORRELATION_S: Final = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0)
 block's [cost]."""
 WHITE_SHARES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 """Shares of white noise in the variance of the disturbance that are tried [cost]."""
-GUST_LEVELS: Final = (0.0, 0.3, 1.0, 2.0, 4.0, 10.0)
+GUST_LEVELS: Final = (0.0, 0.3, 1.0, 3.0, 10.0)
 """Gust noise, as multiples of the force noise at the mean sensitivity, that is tried [cost]."""
+FINER_LEVELS: Final = (0.45, 0.55, 0.67, 0.82, 1.22, 1.5, 1.8, 2.2)
+"""Times the best of them, tried with the best of the others: rows weigh by it, and where a law is
+not quite the vehicle's a wind depends on their weights [cost]."""
 LEAST_NOISE_M_S2: Final = 0.005
 """Noise that no force goes below, m/s^2: steps of logged numbers [data sheet]."""
 

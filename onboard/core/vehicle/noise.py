@@ -9,7 +9,9 @@ a recursion of first order, here solved by doubling so that it needs no loop ove
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.limits import (
     CORRELATION_S,
+    FINER_LEVELS,
     GUST_LEVELS,
     LEAST_NOISE_M_S2,
     WHITE_SHARES,
@@ -137,15 +140,18 @@ def fitted_noise(
         step_s: s.
         gusts: whether noise may grow with the sensitivity.
     """
-    best = AxisNoise(1.0)
-    best_score = -math.inf
-    for level in GUST_LEVELS if gusts else (0.0,):
-        for tau in CORRELATION_S:
-            for white in WHITE_SHARES:
-                score, trial = _scored(residual, sensitivity, piece, step_s, (level, tau, white))
-                if score > best_score:
-                    best_score, best = score, trial
-    return best
+    levels = GUST_LEVELS if gusts else (0.0,)
+    grid = itertools.product(levels, CORRELATION_S, WHITE_SHARES)
+    data = residual, sensitivity, piece, step_s
+
+    def likeliest(shapes: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
+        return max(shapes, key=lambda shape: _scored(*data, shape)[0])
+
+    level, tau, white = likeliest(grid)
+    if level > 0.0:
+        near = (level, *(level * by for by in FINER_LEVELS))
+        level, tau, white = likeliest((its, tau, white) for its in near)
+    return _scored(*data, (level, tau, white))[1]
 
 
 def gust_evidence(

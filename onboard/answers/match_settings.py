@@ -1,0 +1,106 @@
+"""Parameters with which ArduPilot's simulator flies and senses like a recording."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.answers.flown import FlownRecording
+from onboard.answers.sensor_level import DRIVER_LAG_S, calibration_settings
+from onboard.core.vehicle.effects.wind_profile import TOP_M
+from onboard.core.vehicle.limits import APART
+from onboard.core.vehicle.records import Difference, VehicleMatch
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter for the simulator (or for EKF3), its sigma, and what it is for."""
+
+    name: str
+    value: float
+    sigma: float
+    reason: str
+
+
+def settings_of(
+    vehicle: VehicleMatch,
+    sensors: tuple[Difference, ...],
+    effects: tuple[Difference, ...],
+    recording: FlownRecording,
+) -> tuple[Setting, ...]:
+    """Parameters with which the simulator flies and senses like the recording; only the proven."""
+    named = {d.name: d for d in (*sensors, *effects)}
+    out: list[Setting] = []
+    wind = vehicle.wind
+    if "wind" in named and wind is not None:
+        out += _wind_settings(vehicle)
+    if "turbulence" in named and "rms_with_faster" in named["turbulence"].values:
+        # The simulator's gusts change with each of its steps, and point anywhere: the setting is
+        # their length, not a component, and slow gusts alone do not tell it.
+        value = named["turbulence"].values["rms_with_faster"]
+        gain = math.sqrt(2.0)
+        if value.sigma < 0.5 * value.real:
+            length, its = gain * value.real, gain * value.sigma
+            out.append(Setting("SIM_WIND_TURB", length, its, "turbulence"))
+    if {"rotor_drag", "body_drag"} & set(named):
+        out += _drag_settings(vehicle)
+    if "gps_latency" in named:
+        value = named["gps_latency"].values["delay"]
+        lag, its = max(1e3 * value.real, 0.0), 1e3 * math.hypot(value.sigma, DRIVER_LAG_S)
+        out.append(Setting("SIM_GPS1_LAG_MS", float(round(lag)), its, "gps_latency"))
+    if "airspeed_scale" in named:
+        value = named["airspeed_scale"].values["over_equivalent"]
+        told = recording.signals.parameters.get("ARSPD_RATIO", 2.0)
+        ratio = told * (value.simulation / value.real) ** 2
+        sigma = 2.0 * ratio * value.sigma / value.real
+        out.append(Setting("SIM_ARSPD_RATIO", ratio, sigma, "airspeed_scale"))
+    if "gps_lever_arm" in named:
+        for axis in "xyz":
+            value = named["gps_lever_arm"].values[axis]
+            name = f"SIM_GPS1_POS_{axis.upper()}"
+            out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
+    if not recording.derived:
+        for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
+            out.append(Setting(name, number, sigma, "accelerometer"))
+    return tuple(out)
+
+
+def _wind_settings(vehicle: VehicleMatch) -> list[Setting]:
+    """SIM_WIND_*: where it comes from, and its speed from 60 m on."""
+    wind = vehicle.wind
+    if wind is None:
+        return []
+    speed = math.hypot(wind.north, wind.east)
+    direction = math.degrees(math.atan2(-wind.east, -wind.north)) % 360.0
+    unit = np.array([wind.north, wind.east]) / max(speed, 1e-9)
+    sigma = float(np.hypot(unit[0] * wind.sigma_north, unit[1] * wind.sigma_east))
+    across = float(np.hypot(unit[1] * wind.sigma_north, unit[0] * wind.sigma_east))
+    kind = 1.0
+    if wind.profile_exponent is not None:
+        # The simulator has a square root and a straight line up to 60 m.
+        kind = 0.0 if abs(wind.profile_exponent - 0.5) < abs(wind.profile_exponent - 1.0) else 2.0
+        power = 0.5 if kind == 0.0 else 1.0
+        gain = (TOP_M / min(max(wind.height, 0.5), TOP_M)) ** power
+        speed, sigma = speed * gain, sigma * gain
+    turn = math.degrees(across / max(speed, 1e-9))
+    return [
+        Setting("SIM_WIND_SPD", speed, sigma, "wind"),
+        Setting("SIM_WIND_DIR", direction, turn, "wind, where it comes from"),
+        Setting("SIM_WIND_T", kind, 0.0, "wind_profile" if kind != 1.0 else "wind, uniform"),
+    ]
+
+
+def _drag_settings(vehicle: VehicleMatch) -> list[Setting]:
+    """EK3_DRAG_*: what EKF3 needs to find the wind of this vehicle."""
+    out = []
+    c = vehicle.numbers.get("rotor_drag.mcoef")
+    if c is not None and c.real > APART * c.sigma:
+        out.append(Setting("EK3_DRAG_MCOEF", c.real, c.sigma, "rotor_drag"))
+    for axis in "xy":
+        k = vehicle.numbers.get(f"body_drag.{axis}")
+        if k is not None and k.real > APART * k.sigma:
+            name = f"EK3_DRAG_BCOEF_{axis.upper()}"
+            out.append(Setting(name, 1.0 / k.real, k.sigma / k.real**2, "body_drag"))
+    return out
