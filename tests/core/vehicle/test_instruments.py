@@ -126,3 +126,21 @@ def test_gusts_have_their_size_and_are_answered_whether_they_are_named_or_not(gu
     if sizes:
         # Three flights of 80 gusts along two axes.
         assert abs(np.mean(sizes) / gust - 1.0) < 4.0 / np.sqrt(2 * 2 * 80 * len(sizes)) + 0.05
+
+
+def test_gusts_of_a_size_do_what_the_best_straight_line_through_the_drag_does():
+    flight = copter_flight(still=True, seconds=20.0)
+    model = copter_model(flight, CopterAirframe(), SIGMA)
+    theta = model.nominal
+    rotor, body = model.indices("rotor_drag"), model.indices("body_drag")
+    linear = theta.copy()
+    linear[body] = 0.0
+    ahead = model.sensitivity_to(linear, 0.7)[:, 0]
+    assert np.allclose(ahead, model.sensitivity(linear)[:, 0], rtol=1e-6)
+    square = theta.copy()
+    square[rotor] = 0.0
+    # E f(g) g / s^2 of f = k |g| g is k s sqrt(8 / pi): of three points sqrt(3) instead.
+    k = 0.5 * flight.rho * theta[body[0]]
+    told = model.sensitivity_to(square, 0.7)[:, 0] / (k * 0.7)
+    assert np.allclose(told, np.sqrt(8.0 / np.pi), rtol=0.1)
+    assert np.all(model.sensitivity(square)[:, 0] < 0.3 * told * k * 0.7)
