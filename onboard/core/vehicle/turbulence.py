@@ -65,7 +65,8 @@ class Turbulence:
 
         Of gusts too small to be named the answers bend what is told by as many of its sigmas.
         """
-        return self.seen and self.rms > APART * self.errors + SURE * self.sigma
+        more = self.seen and self.rms > APART * self.errors + SURE * self.sigma
+        return self.found or more
 
     @property
     def found(self) -> bool:
