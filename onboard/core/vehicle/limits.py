@@ -131,11 +131,11 @@ AMBIGUOUS: Final = 10.0
 """Fall of chi-square within which two effects cannot be told apart (Kass and Raftery, 1995)
 [probability]."""
 UNCLEAR_M_S: Final = 0.3
-"""Errors of the velocity that a forward residual may be of, m/s: six times what receivers are good
-for, as long as a fault of theirs lasts [data sheet]."""
+"""Errors of the velocity, m/s, that what is left of a force may be of and need no effect: six times
+what receivers are good for [data sheet]."""
 RECEIVER_M_S: Final = 0.1
 """Gusts below this, and below the recording's own errors of the velocity, are within what those
-look like, m/s: twice the median error of good receivers [data sheet]."""
+look like on a copter, m/s: twice the median error of good receivers [data sheet]."""
 HEADING_RAD: Final = 0.03
 """What a heading is good to that a compass holds, rad: at speed it is an error of the velocity
 across the way, wandering for as long as nobody turns [data sheet]."""

@@ -17,6 +17,7 @@ from onboard.core.vehicle.limits import (
     RECEIVER_M_S,
     SENSED_GUST_M_S,
     SURE,
+    UNCLEAR_M_S,
 )
 from onboard.core.vehicle.noise import (
     AxisNoise,
@@ -84,7 +85,9 @@ def turbulence_of(fit: Fit) -> Turbulence:
         return _felt(fit)
     gust, sigma, evidence = _pushed(fit)
     errors = fit.model.flight.velocity_sigma
-    floor = math.hypot(RECEIVER_M_S, errors)
+    # At a plane's speed what a heading is off by is an error of the velocity across it, too.
+    copter = "rotor_drag" in {e.name for e in fit.model.effects}
+    floor = math.hypot(RECEIVER_M_S if copter else UNCLEAR_M_S, errors)
     if any(u.name == "faster_gusts" for u in fit.model.unknowns):
         k = fit.model.index("faster_gusts")
         more, spread = float(fit.theta[k]), float(fit.sigma[k])
