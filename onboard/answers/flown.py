@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import (
     AirData,
     Battery,
@@ -30,7 +31,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
 )
 from onboard.core.inputs.segments import Batch
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans
 from onboard.core.vehicle.trajectory import Sensors
@@ -98,14 +99,19 @@ class Flown:
 
     def finish(self) -> object:
         """Everything is known now: find the ground, and learn from the rest."""
-        fixes = [s for s in self._kept if isinstance(s, GpsFix) and s.fix_type >= 3]
+        fixes = [s for s in self._kept if _counts(s)]
         if fixes:
             t = np.array([f.t for f in fixes])
             v = np.array([(f.v_n, f.v_e, math.nan if f.v_d is None else f.v_d) for f in fixes])
             height = np.array([f.altitude for f in fixes])
             if not self.airborne:
                 self.grounded = grounded_spans(
-                    t, v, height, rolls=self.kind != "copter", wings=self.kind == "plane"
+                    t,
+                    v,
+                    height,
+                    said=_said_to_stand(self._kept),
+                    rolls=self.kind != "copter",
+                    wings=self.kind == "plane",
                 )
             self.ground = float(np.percentile(height, 0.5))
         step = _averaged_over(self._kept)
@@ -300,6 +306,22 @@ def _mean(group: list[ImuSample]) -> ImuSample:
         last.w_step,
         last.source,
     )
+
+
+def _counts(sample: Sample) -> TypeGuard[GpsFix]:
+    """Whether it is a fix in three dimensions."""
+    return isinstance(sample, GpsFix) and sample.fix_type >= 3
+
+
+def _said_to_stand(samples: list[Sample]) -> Mask:
+    """(n,) whether the autopilot said, at each fix, that the vehicle is on the ground."""
+    word, said = Ground(), []
+    for sample in samples:
+        if isinstance(sample, VehicleState):
+            word.feed(sample)
+        elif _counts(sample):
+            said.append(word.grounded is True)
+    return np.array(said, dtype=bool)
 
 
 def _with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) -> list[Sample]:

@@ -6,6 +6,7 @@ import math
 
 from onboard.answers.match import Match
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.records import Compared, Difference, WindEstimate
 
 TITLES = {
@@ -103,8 +104,10 @@ def blown(wind: WindEstimate) -> str:
     """A wind, where it comes from, and how sure that is."""
     speed = math.hypot(wind.north, wind.east)
     sigma = math.hypot(wind.sigma_north, wind.sigma_east)
-    if speed < 3.0 * sigma or speed < 0.3:
-        return f"calm: {speed:.2f} ± {sigma:.2f} m/s"
+    if speed < 3.0 * sigma or speed < FLOOR_M_S:
+        # What a flight does not tell from a calm need not be one.
+        told = "calm" if 3.0 * sigma < FLOOR_M_S else "perhaps calm"
+        return f"{told}: {speed:.2f} ± {sigma:.2f} m/s"
     origin = math.degrees(math.atan2(-wind.east, -wind.north)) % 360.0
     said = f"{speed:.2f} ± {sigma:.2f} m/s from {origin:.0f}° at a height of {wind.height:.0f} m"
     if wind.profile_exponent is not None:

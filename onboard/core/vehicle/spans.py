@@ -16,18 +16,26 @@ from onboard.core.vehicle.limits import (
 
 
 def grounded_spans(
-    t: Array, v_n: Array, height: Array, *, rolls: bool = False, wings: bool = False
+    t: Array,
+    v_n: Array,
+    height: Array,
+    *,
+    said: Mask | None = None,
+    rolls: bool = False,
+    wings: bool = False,
 ) -> list[tuple[float, float]]:
     """Intervals (s) in which a vehicle stands on the ground, with a margin to either side.
 
-    A hover is still, too: only what is as low as the lowest such place counts.  Wings hold no
-    hover, so that a plane's stands may differ by what a receiver's height wanders from the
-    take-off to the landing.
+    A hover is still, too: only what is as low as the lowest such place counts, and what the
+    autopilot says of it: from one flight to the next a receiver's height wanders by metres.  Wings
+    hold no hover, so that a plane's stands may differ by that from the take-off to the landing.
 
     Args:
         t: (n,) times of fixes, s.
         v_n: (n, 3) velocity, m/s; NaN down where it is not measured.
         height: (n,) m.
+        said: (n,) where the autopilot says that it stands; a word that is not taken back in the
+            air costs what is still.
         rolls: whether it may move on the ground: then what is level, and as low as where it
             stands before or after, is the ground.
         wings: whether it is a plane.
@@ -36,24 +44,21 @@ def grounded_spans(
         return []
     v_n = np.where(np.isnan(v_n), np.stack([0.0 * t, 0.0 * t, -_climb(t, height)], axis=1), v_n)
     slow = np.linalg.norm(v_n, axis=1) < STILL_M_S
-    runs = [(i, j) for i, j in _runs(slow) if t[j - 1] - t[i] >= STILL_S]
+    runs = _lasting(t, slow)
+    stands = [] if said is None else _lasting(t, slow & said)
     apart_m = HEIGHT_WANDER_M if wings else GROUND_M
     if rolls:
         level = np.abs(v_n[:, 2]) < LEVEL_M_S
         low = height < _ground(t, height, runs, apart_m) + GROUND_M
-        runs += [(i, j) for i, j in _runs(level & low) if t[j - 1] - t[i] >= STILL_S]
-    if not runs:
-        return []
+        runs += _lasting(t, level & low)
     levels = [float(np.median(height[i:j])) for i, j in runs]
-    lowest = min(levels)
+    lowest = min(levels, default=np.inf)
     # A flight that is recorded in parts may begin in a hover: nothing was lower then either.
-    if float(np.percentile(height, 1)) < lowest - apart_m:
-        return []
-    return [
-        (float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S)
-        for (i, j), level_m in zip(runs, levels, strict=True)
-        if level_m < lowest + apart_m
-    ]
+    if float(np.percentile(height, 1)) >= lowest - apart_m:
+        stands += [
+            run for run, level_m in zip(runs, levels, strict=True) if level_m < lowest + apart_m
+        ]
+    return [(float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S) for i, j in sorted(stands)]
 
 
 def _ground(t: Array, height: Array, stands: list[tuple[int, int]], apart_m: float) -> Array:
@@ -82,6 +87,11 @@ def inside(t: Array, spans: list[tuple[float, float]]) -> Mask:
     for start, end in spans:
         out |= (t >= start) & (t <= end)
     return out
+
+
+def _lasting(t: Array, flags: Mask) -> list[tuple[int, int]]:
+    """Those runs that are long enough to tell a stand from a moment without speed."""
+    return [(i, j) for i, j in _runs(flags) if t[j - 1] - t[i] >= STILL_S]
 
 
 def _runs(flags: Mask) -> list[tuple[int, int]]:

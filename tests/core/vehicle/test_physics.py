@@ -164,6 +164,25 @@ def test_what_may_hover_has_not_landed_above_where_it_stood():
         assert not inside(t[hovering], spans).any()
 
 
+@pytest.mark.parametrize("wander_m", [0.0, 4.0])
+def test_a_second_stand_is_told_by_the_autopilot_wherever_the_height_has_wandered(wander_m):
+    t = np.arange(0.0, 300.0, 0.2)
+    up = np.interp(t, [0, 10, 20, 90, 100, 200, 210, 280, 290], [0, 0, 20, 20, 0, 0, 20, 20, 0])
+    v = np.stack([0 * t, 0 * t, -np.gradient(up, t)], axis=1)
+    height, said = up + wander_m * (t > 150.0), (up < 0.01) & (t < 280.0)
+    spans = grounded_spans(t, v, height, said=said)
+    assert _covered(spans, 100.0, 199.0)
+    assert not inside(t[(up > 10.0)], spans).any()
+
+
+def test_a_word_that_nobody_took_back_does_not_end_a_flight_that_moves():
+    t, v, height = _taken_off(0.0)
+    stuck = np.ones(len(t), dtype=bool)
+    for said in (None, stuck):
+        spans = grounded_spans(t, v, height, said=said, rolls=True, wings=True)
+        assert not inside(np.linspace(25.0, 170.0, 50), spans).any()
+
+
 def test_a_model_without_error_does_not_drift_alone():
     flight = copter_flight(seconds=40.0)
     n = len(flight)
