@@ -67,9 +67,15 @@ class Around:
         """(K, 3) derivative of the same, at the antenna, to ``window^2``, m/s^3."""
         return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))
 
-    def second_derivative(self, window: float) -> Array:
-        """(K, 3) of the averaged force at the antenna, axes of the epoch, m/s^4."""
-        return self._own(self.antenna.second_derivative(self.now.t, window, 2.0 * AROUND_SPAN_S))
+    def shapes(self, window: float) -> Array:
+        """(K, 3, 2) how else velocities may be averaged that spread alike over ``window``, m/s.
+
+        Two moments, and a first-order lag, each less the even mean over the span; at the antenna,
+        axes of the epoch.
+        """
+        t, even = self.now.t, self.antenna.averaged(self.now.t, window)
+        others = (self.antenna.paired(t, window), self.antenna.lagged(t, window))
+        return np.stack([self._own(x - even) for x in others], axis=-1)
 
     def _own(self, x: Array) -> Array:
         """In the body axes of the epochs."""

@@ -14,8 +14,8 @@ from onboard.core.model.regressors import Direct, Family, Unknown
 AXIS = "xyz"
 ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
 """Unknowns of the recorded attitude."""
-THIRD_MOMENT = 1e-3
-"""Prior sigma, s^3: that of an exponential filter with a time constant of 80 ms."""
+SHAPE = 1.0
+"""Prior sigma of the share that is not an even mean: the whole."""
 ANTENNA_SIGMA = 0.05
 """Prior sigma of an error of the lever arm, m.  A person with a ruler knows neither where in its
 housing an antenna receives nor where on its board a sensor is to better than 2 or 3 cm; where
@@ -90,7 +90,15 @@ class HeightLatency(Family):
 
 
 class GpsSmoothing(Family):
-    """Averaging span of the receiver; the unknown is ``window^2`` less that taken."""
+    """Averaging span of the receiver, and how it weighs what is in it.
+
+    The first unknown is ``window^2`` less that taken: twelve times the variance of the response.
+    The others are how much of it is two moments (a receiver that interpolates between its own
+    epochs, as ArduPilot's simulator does) and how much is a first-order lag (one that filters),
+    instead of an even mean.  All three spread alike, so that without a span there are no shapes.
+    Of one shape held for another, what the quickest manoeuvres need of the span and what the slow
+    ones do disagree; scale and offset of z make up for it, by ten sigma on planes.
+    """
 
     name = "gps_smoothing"
 
@@ -98,22 +106,20 @@ class GpsSmoothing(Family):
         """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
         self.unknowns = (
             Unknown("window_squared", "s^2", -(taken**2), sigma),
-            Unknown("third_moment", "s^3", 0.0, THIRD_MOMENT),
+            Unknown("paired", "1", 0.0, SHAPE),
+            Unknown("lagging", "1", 0.0, SHAPE),
         )
         self.taken = taken
 
     def velocity(self, around: Around) -> Direct:
-        """Mean over the span less the value, per s^2 of ``window^2``; third derivative over 6.
-
-        A filter that looks back (every real one) is not symmetric about its delay; its third
-        central moment would otherwise be taken for delay where the manoeuvre is quick.
-        """
-        third = around.second_derivative(self.taken) / 6.0
-        return Direct(body=np.stack([around.slope(self.taken), third], axis=-1))
+        """Mean over the span less the value, per s^2 of ``window^2``; the other shapes less it."""
+        shapes = around.shapes(self.taken)
+        body = np.concatenate([around.slope(self.taken)[..., None], shapes], axis=-1)
+        return Direct(body=body)
 
     def position(self, around: Around) -> Direct:
-        """``a / 24``: the mean of a parabola over the span."""
-        body = np.zeros((len(around.now.t), 3, 2))
+        """``a / 24``: the mean of a parabola over the span, in whichever shape."""
+        body = np.zeros((len(around.now.t), 3, 3))
         body[..., 0] = around.f_mean / 24.0
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0

@@ -9,6 +9,8 @@ at two places of an epoch instead of at all samples around it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from onboard.core.maths.arrays import Array
@@ -16,9 +18,8 @@ from onboard.core.maths.compiling import compiled_loops, plain
 
 RESOLVED_S = 0.125
 """s; over a shorter span the slope of a force is mostly vibration."""
-SECOND_DERIVATIVE_S = 0.12
-"""s; to either side, over which a second derivative is taken, to whole pairs of nodes: shorter is
-noise, longer misses a manoeuvre of 1 Hz [noisy flights tell 0.12 from 0.13 by up to 1.6 sigma]."""
+SPREAD = math.sqrt(12.0)
+"""A span over the standard deviation of what is in it evenly."""
 
 
 class Gained:
@@ -27,13 +28,14 @@ class Gained:
     Vibration that the nodes resolve is cancelled, whatever the span.
     """
 
-    __slots__ = ("_a", "_start", "_step", "_v", "_x")
+    __slots__ = ("_a", "_late", "_start", "_step", "_v", "_x")
 
     def __init__(self, start: float, step: float, a: Array) -> None:
         """Take ``a`` (n, 3), m/s^2, axes that do not turn, at ``start + i step``, s; n >= 2."""
         self._a = plain(a)
         self._v, self._x = v, x = np.zeros_like(self._a), np.zeros_like(self._a)
         self._start, self._step = start, step
+        self._late: tuple[float, Array] | None = None
         loops = compiled_loops()
         if loops is not None:
             loops.twice(step, self._a, v, x)
@@ -97,6 +99,47 @@ class Gained:
         out: Array = (ends - 2.0 * self.place(t)) / 6.0
         return out
 
+    def paired(self, t: Array, window: float) -> Array:
+        """``mean(V) - V`` of two moments, as far apart as to spread like ``window``, s: (k, 3)."""
+        half = window / SPREAD
+        return 0.5 * (self.velocity(t, half) + self.velocity(t, -half)) - self.velocity(t)
+
+    def lagged(self, t: Array, window: float) -> Array:
+        """``lag(V) - V`` of a first-order lag that spreads like ``window``, s: (k, 3), m/s.
+
+        Its time constant is its spread and its delay, which counts as latency: it is looked at so
+        much later.  A lagged velocity is ``V`` less the time constant times the lagged force.
+        """
+        lag = window / SPREAD
+        if lag <= 0.0:
+            return np.zeros((len(t), 3))
+        since = t + lag - self._start
+        i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
+        s = (since - i * self._step)[:, None]
+        a, slope = self._a[i], (self._a[i + 1] - self._a[i]) / self._step
+        kept = np.exp(-s / lag)
+        force = kept * self._lagged_force(lag)[i] + (1.0 - kept) * (a - lag * slope) + slope * s
+        out: Array = self.velocity(t, lag) - lag * force - self.velocity(t)
+        return out
+
+    def _lagged_force(self, lag: float) -> Array:
+        """(n, 3) the force at the nodes behind a first-order lag, s; it began as its mean was."""
+        if self._late is not None and self._late[0] == lag:
+            return self._late[1]
+        a, x = self._a, self._step / lag
+        kept = np.exp(-x)
+        share = (1.0 - kept) / x  # straight lines between nodes: exact
+        z = np.empty_like(a)
+        z[0] = a[: int(1.0 / x) + 1].mean(axis=0)
+        z[1:] = (share - kept) * a[:-1] + (1.0 - share) * a[1:]
+        # What one node keeps of the one before, two keep squared: doubled until nothing is left.
+        k = 1
+        while k < len(z) and kept**k > np.finfo(float).eps:
+            z[k:] += kept**k * z[:-k]  # numpy copies what overlaps
+            k *= 2
+        self._late = lag, z
+        return z
+
     def slope(self, t: Array, window: float, longest: float) -> Array:
         """Derivative of :meth:`averaged` to ``window^2``; the limit ``V'' / 24`` at zero.
 
@@ -115,22 +158,4 @@ class Gained:
             return limit
         high, low = min(1.02 * window, longest), 0.98 * window
         out: Array = (self.averaged(t, high) - self.averaged(t, low)) / (high**2 - low**2)
-        return out
-
-    def second_derivative(self, t: Array, window: float, longest: float) -> Array:
-        """Of the averaged force, over about 0.12 s to either side.
-
-        Args:
-            t: (k,) s.
-            window: s, over which the force is averaged besides.
-            longest: span that the nodes allow, s.
-
-        Returns:
-            (k, 3) m/s^4.
-        """
-        pair = 2.0 * self._step
-        h = pair * max(1, round(SECOND_DERIVATIVE_S / pair))
-        width = min(window, longest - 2.0 * h)
-        before, now, after = (self.mean(t + s, width) for s in (-h, 0.0, h))
-        out: Array = (before - 2.0 * now + after) / h**2
         return out

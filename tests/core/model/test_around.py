@@ -126,16 +126,37 @@ def test_smoothing_slope_of_a_short_window_is_the_second_derivative():
     assert at(got) == pytest.approx(1.0 / 24.0, rel=1e-6)
 
 
-def test_the_second_derivative_of_a_parabola_is_its_own():
-    got = gained(lambda t: 3.0 * t**2 - t + 7.0).second_derivative(NOW, 0.0, LONGEST)
-    assert at(got) == pytest.approx(6.0)
+@pytest.mark.parametrize("window", [0.05, 0.2, 0.346, 0.8])
+def test_two_moments_and_a_lag_are_what_they_are_called(window):
+    """Against an exponential's mean by brute force, with its own delay taken out."""
+    tau = window / np.sqrt(12.0)
+    u, w = np.linspace(0.0, 40.0 * tau, 400_001), 5.0
+    share = np.exp(-u / tau)
+
+    def velocity(t):
+        return -np.cos(w * t + 0.7) / w
+
+    made = gained(lambda t: np.sin(w * t + 0.7))
+    lag = np.sum(share * velocity(tau - u)) / share.sum() - velocity(0.0)
+    began = np.exp(-1.0 / tau)  # of what was before the first node
+    assert at(made.lagged(NOW, window)) == pytest.approx(lag, abs=2e-4 + began)
+    pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
+    assert at(made.paired(NOW, window)) == pytest.approx(pair, abs=1e-4)
 
 
-@pytest.mark.parametrize("window", [0.2, 0.5])
-def test_the_second_derivative_of_an_averaged_force_is_the_average_of_its_own(window):
-    made = gained(lambda t: t**4)
-    wide, narrow = (at(made.second_derivative(NOW, w, LONGEST)) for w in (window, 0.0))
-    assert wide - narrow == pytest.approx(window**2, rel=0.02)
+@pytest.mark.parametrize("window", [1e-6, 0.01, 0.13, 0.5])
+def test_whatever_its_shape_a_response_that_spreads_alike_bends_a_ramp_alike(window):
+    made = gained(lambda t: 3.0 * t - 2.0)
+    even = at(made.averaged(NOW, window))
+    assert even == pytest.approx(window**2 / 24.0 * 3.0, rel=1e-6)
+    began = np.exp(-1.0 * np.sqrt(12.0) / window)
+    for got in (made.paired(NOW, window), made.lagged(NOW, window)):
+        assert at(got) == pytest.approx(even, rel=1e-6 + 50.0 * began, abs=1e-14)
+
+
+def test_without_a_span_there_are_no_shapes():
+    made = around(maker(100.0), EPOCH, 0.0)
+    assert not made.shapes(0.0).any()
 
 
 @pytest.mark.parametrize(("centre", "width"), [(0.0, 0.3), (0.1, 0.05), (-0.2, 0.013)])

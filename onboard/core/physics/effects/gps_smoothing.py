@@ -25,7 +25,7 @@ class GpsSmoothing(Effect):
     source = "mean of v over the span, about the time of the fix"
     cure = "set the receiver's dynamic model to airborne and raise its rate"
     apart = "accelerate and brake hard and often; a lever arm needs turns instead"
-    in_every_model: ClassVar[tuple[str, ...]] = ("window_squared",)
+    in_every_model: ClassVar[tuple[str, ...]] = ("window_squared", "paired", "lagging")
     least: ClassVar[float] = 0.15
 
     @classmethod
@@ -38,8 +38,8 @@ class GpsSmoothing(Effect):
 
     @classmethod
     def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
-        """No averaging at all; the unknown is the square of the span."""
-        return {"window_squared": -(point.window**2)}
+        """No averaging at all, in no shape; the unknown is the square of the span."""
+        return {"window_squared": -(point.window**2), "paired": 0.0, "lagging": 0.0}
 
     @classmethod
     def size(cls, found: Finding) -> str:
