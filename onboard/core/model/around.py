@@ -68,13 +68,19 @@ class Around:
         return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))
 
     def shapes(self, window: float) -> Array:
-        """(K, 3, 2) how else velocities may be averaged that spread alike over ``window``, m/s.
+        """(K, 3, 3) how else velocities may be averaged that spread alike over ``window``, m/s.
 
-        Two moments, and a first-order lag, each less the even mean over the span; at the antenna,
-        axes of the epoch.
+        Two moments as far apart as the epochs, of which the newer or the older weighs more, and a
+        first-order lag, each less the even mean over the span; at the antenna, axes of the epoch.
         """
-        t, even = self.now.t, self.antenna.averaged(self.now.t, window)
-        others = (self.antenna.paired(t, window), self.antenna.lagged(t, window))
+        t, antenna = self.now.t, self.antenna
+        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
+        others = (
+            antenna.paired(t, window, apart, newer=True),
+            antenna.paired(t, window, apart, newer=False),
+            antenna.lagged(t, window),
+        )
+        even = antenna.averaged(t, window)
         return np.stack([self._own(x - even) for x in others], axis=-1)
 
     def _own(self, x: Array) -> Array:

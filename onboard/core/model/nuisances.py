@@ -14,6 +14,8 @@ from onboard.core.model.regressors import Direct, Family, Unknown
 AXIS = "xyz"
 ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
 """Unknowns of the recorded attitude."""
+SHAPES = ("mostly_newer", "mostly_older", "lagging")
+"""How a receiver may weigh what is in its span, in the order of the columns."""
 SHAPE = 1.0
 """Prior sigma of the share that is not an even mean: the whole."""
 ANTENNA_SIGMA = 0.05
@@ -93,11 +95,13 @@ class GpsSmoothing(Family):
     """Averaging span of the receiver, and how it weighs what is in it.
 
     The first unknown is ``window^2`` less that taken: twelve times the variance of the response.
-    The others are how much of it is two moments (a receiver that interpolates between its own
-    epochs, as ArduPilot's simulator does) and how much is a first-order lag (one that filters),
-    instead of an even mean.  All three spread alike, so that without a span there are no shapes.
-    Of one shape held for another, what the quickest manoeuvres need of the span and what the slow
-    ones do disagree; scale and offset of z make up for it, by ten sigma on planes.
+    The others are how much of it is two moments an epoch apart, of which the newer or the older
+    weighs more (a receiver that interpolates between its own epochs, as ArduPilot's simulator
+    does), and how much is a first-order lag (one that filters), instead of an even mean.  All
+    spread alike, so that without a span there are no shapes.
+
+    Where one shape is held for another, quick manoeuvres and slow ones want another span, and
+    scale and offset of z make up for it: by seven sigma on the simulator's planes.
     """
 
     name = "gps_smoothing"
@@ -106,8 +110,7 @@ class GpsSmoothing(Family):
         """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
         self.unknowns = (
             Unknown("window_squared", "s^2", -(taken**2), sigma),
-            Unknown("paired", "1", 0.0, SHAPE),
-            Unknown("lagging", "1", 0.0, SHAPE),
+            *(Unknown(name, "1", 0.0, SHAPE) for name in SHAPES),
         )
         self.taken = taken
 
@@ -119,7 +122,7 @@ class GpsSmoothing(Family):
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span, in whichever shape."""
-        body = np.zeros((len(around.now.t), 3, 3))
+        body = np.zeros((len(around.now.t), 3, len(self.unknowns)))
         body[..., 0] = around.f_mean / 24.0
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0

@@ -99,10 +99,28 @@ class Gained:
         out: Array = (ends - 2.0 * self.place(t)) / 6.0
         return out
 
-    def paired(self, t: Array, window: float) -> Array:
-        """``mean(V) - V`` of two moments, as far apart as to spread like ``window``, s: (k, 3)."""
-        half = window / SPREAD
-        return 0.5 * (self.velocity(t, half) + self.velocity(t, -half)) - self.velocity(t)
+    def paired(self, t: Array, window: float, apart: float, *, newer: bool) -> Array:
+        """``mean(V) - V`` of two moments that spread like ``window``, s: (k, 3), m/s.
+
+        Args:
+            t: (k,) s, where the mean of the two is.
+            window: s.
+            apart: by which they are apart, s; by more where that spreads too little.
+            newer: which of them weighs more; both alike where they are as far apart as they must.
+        """
+        spread = window / SPREAD
+        apart = max(apart, 2.0 * spread)
+        if apart <= 0.0:
+            return np.zeros((len(t), 3))
+        # Weights a and 1 - a spread by apart * sqrt(a (1 - a)).
+        less = 0.5 - math.sqrt(max(0.25 - (spread / apart) ** 2, 0.0))
+        way = apart if newer else -apart
+        more_weighed, less_weighed = (
+            self.velocity(t, less * way),
+            self.velocity(t, (less - 1) * way),
+        )
+        out: Array = (1.0 - less) * more_weighed + less * less_weighed - self.velocity(t)
+        return out
 
     def lagged(self, t: Array, window: float) -> Array:
         """``lag(V) - V`` of a first-order lag that spreads like ``window``, s: (k, 3), m/s.

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from onboard.core.inputs.segments import Segment
 from onboard.core.model.around import AROUND_SPAN_S, around
@@ -140,8 +142,22 @@ def test_two_moments_and_a_lag_are_what_they_are_called(window):
     lag = np.sum(share * velocity(tau - u)) / share.sum() - velocity(0.0)
     began = np.exp(-1.0 / tau)  # of what was before the first node
     assert at(made.lagged(NOW, window)) == pytest.approx(lag, abs=2e-4 + began)
-    pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
-    assert at(made.paired(NOW, window)) == pytest.approx(pair, abs=1e-4)
+    for newer in (True, False):
+        pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
+        got = made.paired(NOW, window, 0.0, newer=newer)
+        assert at(got) == pytest.approx(pair, abs=1e-4)
+
+
+@given(st.floats(0.02, 0.98), st.floats(0.05, 0.4))
+def test_what_is_interpolated_between_two_epochs_is_two_moments(share, apart):
+    """``share`` of the older one: its delay counts as latency, its spread as the window."""
+    force = np.random.default_rng(3).normal(size=201).cumsum()
+    made = gained(lambda t: np.interp(t, 0.01 * np.arange(-100, 101), force))
+    newest = NOW + share * apart
+    seen = (1.0 - share) * made.velocity(newest) + share * made.velocity(newest - apart)
+    window = apart * np.sqrt(12.0 * share * (1.0 - share))
+    got = made.paired(NOW, window, apart, newer=share < 0.5)
+    assert at(got) == pytest.approx(at(seen - made.velocity(NOW)), abs=1e-6)
 
 
 @pytest.mark.parametrize("window", [1e-6, 0.01, 0.13, 0.5])
@@ -150,8 +166,9 @@ def test_whatever_its_shape_a_response_that_spreads_alike_bends_a_ramp_alike(win
     even = at(made.averaged(NOW, window))
     assert even == pytest.approx(window**2 / 24.0 * 3.0, rel=1e-6)
     began = np.exp(-1.0 * np.sqrt(12.0) / window)
-    for got in (made.paired(NOW, window), made.lagged(NOW, window)):
-        assert at(got) == pytest.approx(even, rel=1e-6 + 50.0 * began, abs=1e-14)
+    pairs = [made.paired(NOW, window, 0.2, newer=newer) for newer in (True, False)]
+    for got in (*pairs, made.lagged(NOW, window)):
+        assert at(got) == pytest.approx(even, rel=1e-5 + 50.0 * began, abs=1e-13)
 
 
 def test_without_a_span_there_are_no_shapes():

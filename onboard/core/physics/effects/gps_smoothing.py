@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.nuisances import SHAPES
 from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import first, measured
@@ -25,7 +26,7 @@ class GpsSmoothing(Effect):
     source = "mean of v over the span, about the time of the fix"
     cure = "set the receiver's dynamic model to airborne and raise its rate"
     apart = "accelerate and brake hard and often; a lever arm needs turns instead"
-    in_every_model: ClassVar[tuple[str, ...]] = ("window_squared", "paired", "lagging")
+    in_every_model: ClassVar[tuple[str, ...]] = ("window_squared", *SHAPES)
     least: ClassVar[float] = 0.15
 
     @classmethod
@@ -39,7 +40,7 @@ class GpsSmoothing(Effect):
     @classmethod
     def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
         """No averaging at all, in no shape; the unknown is the square of the span."""
-        return {"window_squared": -(point.window**2), "paired": 0.0, "lagging": 0.0}
+        return {"window_squared": -(point.window**2), **dict.fromkeys(SHAPES, 0.0)}
 
     @classmethod
     def size(cls, found: Finding) -> str:
