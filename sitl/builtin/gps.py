@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from sitl.builtin import effects as fx
 from sitl.builtin import rotation
 from sitl.builtin.smoothing import DT, RATE, Array
 from sitl.builtin.trajectory import Trajectory
-from sitl.builtin.truth import GpsTruth, Truth
+from sitl.builtin.truth import GpsTruth, Response, Truth
 
 FIX_3D, NO_FIX = 3, 1
 SEMI_MAJOR, ECCENTRICITY_2 = 6_378_137.0, 6.694_379_990_14e-3
@@ -80,8 +81,9 @@ class Receiver:
         valid = epochs - skew * (epochs - origin)
         v_n, p_n = self._antenna(trajectory, truth)
         window = smoothing_window(truth)
-        velocity = _sample(_centred_mean(v_n, window), valid - start)
-        position = _sample(_centred_mean(p_n, window), valid - start)
+        spread = SPREADING[gps.response]
+        velocity = _sample(spread(v_n, window), valid - start)
+        position = _sample(spread(p_n, window), valid - start)
         return [
             self._fix(truth, float(t), velocity[i], position[i], origin)
             for i, t in enumerate(epochs)
@@ -167,6 +169,37 @@ def _centred_mean(x: Array, window_s: float) -> Array:
     ends = 0.5 * (padded[:n] + padded[2 * half : 2 * half + n])
     out: Array = (full - ends) / (2 * half)
     return out
+
+
+def _filtered(x: Array, window_s: float) -> Array:
+    """A filter of first order that spreads like a mean over ``window_s``, its delay taken out."""
+    n = round(window_s * RATE / np.sqrt(12.0))
+    if n == 0:
+        return x
+    # Of the samples before, each weighs so much less than the next; the last 6e-6 are left out.
+    weights = np.exp(-np.arange(12 * n) / n)
+    weights /= weights.sum()
+    late = round(float(weights @ np.arange(12 * n)))
+    padded = np.concatenate([np.repeat(x[:1], 12 * n, 0), x, np.repeat(x[-1:], late, 0)])
+    size = 2 ** int(np.ceil(np.log2(len(padded) + 12 * n)))
+    response = np.fft.rfft(weights, size)[:, None] * np.fft.rfft(padded, size, axis=0)
+    out: Array = np.fft.irfft(response, size, axis=0)[12 * n + late : 12 * n + late + len(x)]
+    return out
+
+
+def _two_moments(x: Array, window_s: float) -> Array:
+    """The mean of two moments that spread like all of ``window_s``."""
+    n = round(window_s * RATE / np.sqrt(12.0))
+    i = np.arange(len(x))
+    out: Array = 0.5 * (x[np.maximum(i - n, 0)] + x[np.minimum(i + n, len(x) - 1)])
+    return out
+
+
+SPREADING: Mapping[Response, Callable[[Array, float], Array]] = {
+    "mean": _centred_mean,
+    "filter": _filtered,
+    "two moments": _two_moments,
+}
 
 
 def _sample(x: Array, t: Array) -> Array:

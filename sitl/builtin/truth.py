@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -45,13 +46,18 @@ class ImuTruth:
     temperature_time: float = 180.0
 
 
+Response: TypeAlias = Literal["mean", "filter", "two moments"]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GpsTruth:
     """The receiver: how late, how noisy, where its antenna is.
 
     ``delay`` is the mean time from validity of a fix to its arrival; the autopilot stamps a
     fix ``stamped_early`` before its arrival, as ArduPilot does when it takes the transport
-    time off.  Noise: white and first-order coloured, per axis; ``vertical`` multiplies both.
+    time off.  What it reports is spread in time as a mean over ``smoothing``, s, in the shape of
+    its ``response``: that mean, a filter of first order, or two moments.  Noise: white and
+    first-order coloured, per axis; ``vertical`` multiplies both.
     """
 
     rate: float = 5.0
@@ -59,6 +65,7 @@ class GpsTruth:
     stamped_early: float = 0.02
     jitter: float = 0.008
     smoothing: float = 0.0
+    response: Response = "mean"
     antenna: Vector3 = (0.0, 0.0, 0.0)
     velocity_noise: float = 0.03
     velocity_coloured: float = 0.03

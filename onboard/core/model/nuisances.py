@@ -183,11 +183,11 @@ class GyroTiming(Family):
 
 
 class GyroScale(Family):
-    """Scale of the gyroscope, which nobody calibrates: a nuisance, 1 % by its data sheet."""
+    """Scale of the gyroscope, which nobody calibrates: a nuisance, 3 % by older data sheets."""
 
     name = "gyro_scale"
 
-    def __init__(self, sigma: float = 0.01) -> None:
+    def __init__(self, sigma: float = 0.03) -> None:
         """Take the prior sigma."""
         self.unknowns = tuple(Unknown(f"gyro_scale_{a}", "1", 0.0, sigma) for a in AXIS)
 
