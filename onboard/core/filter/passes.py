@@ -111,7 +111,7 @@ class Pass:
         """Go through the epochs ``fixes``; when running, the first is the last one of before.
 
         Args:
-            segment: samples that cover the epochs and 0.45 s to either side.
+            segment: samples that cover the epochs and 0.63 s to either side.
             fixes: n GPS epochs on the boot clock as stamped (latency not removed).
             trusted: (n,) whether the receiver is to be believed there.
         """

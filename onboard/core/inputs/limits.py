@@ -15,16 +15,16 @@ trusted flight [data sheet]."""
 
 # What is needed around a fix (assembly).
 
-REACH_S: Final = 1.0
+REACH_S: Final = 1.4
 """s; inertial samples are needed this long before a fix's stamp: latency and half the averaging
-span [physics: the longest latency 0.45, the nodes' 0.44, and a margin]."""
+span [physics: the longest latency 0.7, the nodes' 0.62, and a margin]."""
 REACH_MARGIN_S: Final = 0.1
 """s; by which samples are taken from earlier than that, for even times move a little [cost]."""
-AHEAD_S: Final = 0.6
-"""s; and this long after it [physics: a negative latency 0.1, the nodes' 0.44, and a margin]."""
-AFTER_S: Final = 0.45
+AHEAD_S: Final = 0.8
+"""s; and this long after it [physics: a negative latency 0.1, the nodes' 0.62, and a margin]."""
+AFTER_S: Final = 0.63
 """s; without which after the last fix of a piece nothing of it is taken [physics: the
-nodes' 0.44]."""
+nodes' 0.62]."""
 KEPT_S: Final = 0.3
 """s; samples are kept this much longer than they reach [cost]."""
 SLOW_KEPT_S: Final = 1.0

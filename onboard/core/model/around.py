@@ -20,10 +20,10 @@ from onboard.core.model.quadrature import (
 )
 from onboard.core.model.smoothing import Gained
 
-AROUND_SPAN_S = 0.44
-"""Reach of the nodes to either side of an epoch: receivers average over less than 0.85 s, which is
+AROUND_SPAN_S = 0.62
+"""Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
 the most that is looked for [physics]."""
-FEWEST_PAIRS = 14
+FEWEST_PAIRS = 20
 """Of nodes in that time, however slow the samples: 31 ms each, within which a manoeuvre of 2 Hz
 bends by 2 % [cost]."""
 

@@ -43,7 +43,7 @@ def test_of_three_a_small_jump_is_said_of_the_one_that_made_it():
     time = jump.unknowns["time"]
     since_start = AT - asked[2].final.origin.t0
     assert time.value == pytest.approx(since_start, abs=3.0 * time.sigma)
-    assert time.sigma < 0.5  # the others are compared by the second
+    assert time.sigma < 1.0  # the others are compared by the second, the flight by ten
     for axis, size in zip("xyz", (0.05, -0.04, 0.0), strict=True):
         found = jump.unknowns[axis]
         assert found.value == pytest.approx(size, abs=4.0 * found.sigma)

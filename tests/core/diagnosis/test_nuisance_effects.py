@@ -14,6 +14,7 @@ from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.result import Estimate
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.nuisances import SHAPES
 from onboard.core.physics.effect import SURE, NuisanceFit
 from onboard.core.physics.effects.heading_error import EKF_SIGMA_RAD as HEADING_SIGMA
 from onboard.core.physics.effects.heading_error import LEAST_RAD as LEAST_HEADING
@@ -80,7 +81,8 @@ LEAST = {
 
 def test_these_are_all():
     assert set(nuisance_kinds()) == {*LEAST, "mount_tilt"}
-    assert sorted(timing_unknowns()) == ["attitude_delay", "gps_delay", "window_squared"]
+    timing = {"attitude_delay", "gps_delay", "window_squared", *SHAPES}
+    assert set(timing_unknowns()) == timing
     assert sorted(constant_unknowns()) == ["heading", "tilt_pitch", "tilt_roll"]
     every = {u for kind in nuisance_kinds().values() for u in kind.in_every_model}
     assert every == {*timing_unknowns(), *constant_unknowns()}

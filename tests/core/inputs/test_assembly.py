@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.assembly import Assembly, AssemblySettings
-from onboard.core.inputs.limits import AHEAD_S, IMU_GAP_S, REACH_S
+from onboard.core.inputs.limits import AFTER_S, AHEAD_S, IMU_GAP_S, REACH_S
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 
@@ -111,8 +111,10 @@ def test_a_fix_is_used_exactly_if_samples_without_a_gap_are_around_it(holes):
         before, after = t[t <= at][::-1], t[t > at]
         reached = covered(at, before, -1.0), covered(at, after, 1.0)
         # The first fixes wait for an attitude that is old enough.
-        enough = reached[0] >= REACH_S - 0.1 and reached[1] >= 0.3 and at >= imu[0] + REACH_S
-        clear = reached[0] < REACH_S - 0.15 or reached[1] < 0.25 or at < imu[0] + REACH_S
+        enough = (
+            reached[0] >= REACH_S - 0.1 and reached[1] >= AFTER_S + 0.02 and at >= imu[0] + REACH_S
+        )
+        clear = reached[0] < REACH_S - 0.15 or reached[1] < AFTER_S - 0.02 or at < imu[0] + REACH_S
         if enough and at <= t[-1] - AHEAD_S - 0.1:
             assert np.any(np.abs(used - at) < 1e-6), at
         elif clear:
