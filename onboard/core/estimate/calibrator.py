@@ -341,16 +341,17 @@ class Calibrator:
         following = self._ground.after(state)
         ended = bool(self._ground.armed) and following.armed is False
         changed = following.grounded is not self._ground.grounded
-        events = self._advance(everything=True) if ended or changed else ()
+        landed = state.t if following.grounded else math.inf
+        events = self._advance(everything=True, landed=landed) if ended or changed else ()
         self._ground = following
         if not ended:
             return events
         self._counts += self._engines.refine()
         return (*events, FlightEnded(state.t))
 
-    def _advance(self, *, everything: bool = False) -> tuple[Event, ...]:
+    def _advance(self, *, everything: bool = False, landed: float = math.inf) -> tuple[Event, ...]:
         made: dict[int, list[Batch]] = self._assembly.take(
-            self.parameters, everything=everything, grounded=self._ground.grounded
+            self.parameters, everything=everything, grounded=self._ground.grounded, landed=landed
         )
         newest = self._engines.add(made)
         self.flown_s += max(

@@ -22,6 +22,7 @@ from onboard.core.inputs.limits import (
     REACH_MARGIN_S,
     REACH_S,
     TEMPERATURE_EVERY,
+    TOUCHED_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
@@ -77,14 +78,19 @@ class Assembly:
         *,
         everything: bool = False,
         grounded: bool | None = False,
+        landed: float = np.inf,
     ) -> dict[int, list[Batch]]:
         """Batches of flight that are complete, by accelerometer; empty most of the time.
+
+        Where an autopilot says whether it has landed, the last seconds of flight wait for its word.
 
         Args:
             parameters: in force.
             everything: do not wait for a whole batch.
             grounded: whether the vehicle stands (then nothing is handed out); None: nobody says,
                 the motion decides.
+            landed: when the autopilot said that it had, s; what it may have touched before it did
+                waits for what stands.
         """
         waiting = self.streams.fixes
         least = LEAST_WAITING_S if everything else self._settings.batch_s
@@ -93,6 +99,8 @@ class Assembly:
         self.streams.settle()
         live = self.streams.live
         ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
+        if grounded is False:
+            ready = min(ready, landed - TOUCHED_S) if everything else ready - TOUCHED_S
         if min(ready, waiting.last) - waiting.first < least:
             return {}
         taken, trusted, t = waiting.take(ready)

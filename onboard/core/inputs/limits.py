@@ -38,6 +38,10 @@ FEWEST_SAMPLES: Final = 8
 """Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
 FEWEST_FIXES: Final = 3
 """Fixes of a batch: two intervals [cost]."""
+TOUCHED_S: Final = 3.0
+"""s before the autopilot's word that it has landed in which the vehicle may have touched the
+ground: detectors want a second of idling, at which a controller arrives in another one or two; an
+impact is no flight [physics]."""
 SILENT_S: Final = 2.0
 """s; an accelerometer that is so far behind the newest is not waited for [cost]."""
 LEAST_WAITING_S: Final = 0.5
