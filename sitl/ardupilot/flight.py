@@ -21,7 +21,8 @@ async def fly(
     seconds: float = 180.0,
     speedup: float = 5.0,
     seed: int = 1,
-) -> None:
+    changes: Mapping[float, Mapping[str, float]] | None = None,
+) -> dict[float, float]:
     """Take off, fly manoeuvres, land, and copy the DataFlash log.
 
     Args:
@@ -32,6 +33,10 @@ async def fly(
         seconds: of manoeuvres.
         speedup: simulated seconds a second, as far as the machine can follow.
         seed: of the manoeuvres.
+        changes: parameters that change in flight, by how many seconds of manoeuvres before.
+
+    Returns:
+        When they did, s since the autopilot's boot.
 
     Raises:
         NoBinaryError: there is no such binary here.
@@ -45,9 +50,16 @@ async def fly(
         url = f"tcpout://127.0.0.1:{process.ports[0]}"
         async with Pilot.at(url, vehicle, seed=seed) as pilot:
             await pilot.take_off()
-            await pilot.manoeuvre(seconds)
+            changed, flown = {}, 0.0
+            for at, values in sorted((changes or {}).items()):
+                await pilot.manoeuvre(at - flown)
+                for name, value in values.items():
+                    await pilot.set_parameter(name, value)
+                changed[at], flown = pilot.time, at
+            await pilot.manoeuvre(seconds - flown)
             await pilot.land()
             await pilot.wait(CLOSED_S)
         process.keep_log(out)
+        return changed
     finally:
         await process.stop()
