@@ -211,15 +211,17 @@ def scored(secret: Secret, d: Diagnosis, changed: float | None) -> Score:
     return out
 
 
-def lines(seeds: range, *, seconds: float, speedup: float) -> Iterator[str]:
-    """A row for each flight, and what they come to."""
+def lines(
+    seeds: range, *, seconds: float, speedup: float, keep: Path | None = None
+) -> Iterator[str]:
+    """A row for each flight, and what they come to; logs stay in the folder ``keep``, if any."""
     total = Score()
     for seed in seeds:
         s = drawn(seed)
         what = f"{seed} {s.vehicle}"
         yield f"{what}, sealed {s.seal}"
         with tempfile.TemporaryDirectory(prefix="sealed-") as folder:
-            log = Path(folder) / "flight.BIN"
+            log = (keep or Path(folder)) / f"{seed}.BIN"
             try:
                 changed = asyncio.run(
                     fly(
@@ -252,6 +254,7 @@ def main(arguments: list[str] | None = None) -> None:
     options.add_argument("--count", type=int, default=12)
     options.add_argument("--seconds", type=float, default=200.0, help="of manoeuvres")
     options.add_argument("--speedup", type=float, default=6.0)
+    options.add_argument("--keep", type=Path, help="a folder for the logs")
     chosen = options.parse_args(arguments)
     try:
         find_binary("copter")
@@ -259,7 +262,8 @@ def main(arguments: list[str] | None = None) -> None:
         print(error)
         return
     seeds = range(chosen.first, chosen.first + chosen.count)
-    for line in lines(seeds, seconds=chosen.seconds, speedup=chosen.speedup):
+    how = {"seconds": chosen.seconds, "speedup": chosen.speedup}
+    for line in lines(seeds, **how, keep=chosen.keep):
         print(line, flush=True)
 
 
