@@ -101,7 +101,7 @@ LOOKS: tuple[str, ...] = (
     "lower ends of noise levels: as they were, or those of data sheets",
     "the search for noise levels: a stencil a factor of two wide, or Fisher's scoring",
     "headings set anew put right, and force noise by the samples' restlessness, or neither",
-    "the receiver's response a mixture of shapes, spans to 1.2 s and a touch-down no flight, or not",
+    "the receiver's response a mixture of shapes, spans to 1.2 s, no touch-downs, or as it was",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
