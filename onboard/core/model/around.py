@@ -18,7 +18,7 @@ from onboard.core.model.quadrature import (
     Signals,
     turns_in_a_row,
 )
-from onboard.core.model.smoothing import Gained
+from onboard.core.model.smoothing import Gained, weight_of_two
 
 AROUND_SPAN_S = 0.62
 """Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
@@ -68,20 +68,29 @@ class Around:
         return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))
 
     def shapes(self, window: float) -> Array:
-        """(K, 3, 3) how else velocities may be averaged that spread alike over ``window``, m/s.
+        """(K, 3, 4) how else velocities may be averaged that spread alike over ``window``, m/s.
 
-        Two moments as far apart as the epochs, of which the newer or the older weighs more, and a
-        first-order lag, each less the even mean over the span; at the antenna, axes of the epoch.
+        Two moments as far apart as the epochs, of which the newer or the older weighs more, instead
+        of the even mean over the span; what two moments do whichever way they lean; and a
+        first-order lag instead of the even mean.  At the antenna, axes of the epoch.
         """
         t, antenna = self.now.t, self.antenna
-        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
-        others = (
-            antenna.paired(t, window, apart, newer=True),
-            antenna.paired(t, window, apart, newer=False),
-            antenna.lagged(t, window),
-        )
         even = antenna.averaged(t, window)
-        return np.stack([self._own(x - even) for x in others], axis=-1)
+        columns = (
+            self._two(window, newer=True) - even,
+            self._two(window, newer=False) - even,
+            antenna.leaning(t, window),
+            antenna.lagged(t, window) - even,
+        )
+        return np.stack([self._own(x) for x in columns], axis=-1)
+
+    def _two(self, window: float, *, newer: bool) -> Array:
+        t = self.now.t
+        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
+        less = weight_of_two(window, apart)
+        if less <= 0.0:
+            return np.zeros((len(t), 3))
+        return self.antenna.paired(t, window, less if newer else 1.0 - less)
 
     def _own(self, x: Array) -> Array:
         """In the body axes of the epochs."""

@@ -14,7 +14,7 @@ from onboard.core.model.regressors import Direct, Family, Unknown
 AXIS = "xyz"
 ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
 """Unknowns of the recorded attitude."""
-SHAPES = ("mostly_newer", "mostly_older", "lagging")
+SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
 """How a receiver may weigh what is in its span, in the order of the columns."""
 SHAPE = 1.0
 """Prior sigma of the share that is not an even mean: the whole."""
@@ -97,7 +97,8 @@ class GpsSmoothing(Family):
     The first unknown is ``window^2`` less that taken: twelve times the variance of the response.
     The others are how much of it is two moments an epoch apart, of which the newer or the older
     weighs more (a receiver that interpolates between its own epochs, as ArduPilot's simulator
-    does), and how much is a first-order lag (one that filters), instead of an even mean.  All
+    does), how much two moments lean besides, which is linear where their weights are not (about
+    halves), and how much is a first-order lag (one that filters), instead of an even mean.  All
     spread alike, so that without a span there are no shapes.
 
     Where one shape is held for another, quick manoeuvres and slow ones want another span, and

@@ -22,6 +22,16 @@ SPREAD = math.sqrt(12.0)
 """A span over the standard deviation of what is in it evenly."""
 
 
+def weight_of_two(window: float, apart: float) -> float:
+    """Weight, up to a half, of one of two moments that spread like ``window``, both s.
+
+    As far ``apart`` they do so with this weight of either; where even halves spread too little,
+    they are further apart.
+    """
+    spread = window / SPREAD / max(apart, 1e-9)
+    return 0.5 - math.sqrt(max(0.25 - spread**2, 0.0))
+
+
 class Gained:
     """An acceleration, straight lines between equidistant nodes, integrated twice and exactly.
 
@@ -99,27 +109,25 @@ class Gained:
         out: Array = (ends - 2.0 * self.place(t)) / 6.0
         return out
 
-    def paired(self, t: Array, window: float, apart: float, *, newer: bool) -> Array:
+    def paired(self, t: Array, window: float, older: float = 0.5) -> Array:
         """``mean(V) - V`` of two moments that spread like ``window``, s: (k, 3), m/s.
 
         Args:
             t: (k,) s, where the mean of the two is.
             window: s.
-            apart: by which they are apart, s; by more where that spreads too little.
-            newer: which of them weighs more; both alike where they are as far apart as they must.
+            older: weight of the older one, between 0 and 1.
         """
-        spread = window / SPREAD
-        apart = max(apart, 2.0 * spread)
-        if apart <= 0.0:
-            return np.zeros((len(t), 3))
-        # Weights a and 1 - a spread by apart * sqrt(a (1 - a)).
-        less = 0.5 - math.sqrt(max(0.25 - (spread / apart) ** 2, 0.0))
-        way = apart if newer else -apart
-        more_weighed, less_weighed = (
-            self.velocity(t, less * way),
-            self.velocity(t, (less - 1) * way),
-        )
-        out: Array = (1.0 - less) * more_weighed + less * less_weighed - self.velocity(t)
+        apart = window / SPREAD / math.sqrt(older * (1.0 - older))
+        newest, oldest = self.velocity(t, older * apart), self.velocity(t, (older - 1.0) * apart)
+        out: Array = (1.0 - older) * newest + older * oldest - self.velocity(t)
+        return out
+
+    def leaning(self, t: Array, window: float) -> Array:
+        """What two moments do where the newer one weighs three times as much as the older one.
+
+        Less the same the other way round, halved: (k, 3), m/s.
+        """
+        out: Array = 0.5 * (self.paired(t, window, 0.25) - self.paired(t, window, 0.75))
         return out
 
     def lagged(self, t: Array, window: float) -> Array:

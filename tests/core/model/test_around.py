@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from onboard.core.inputs.segments import Segment
 from onboard.core.model.around import AROUND_SPAN_S, around
 from onboard.core.model.quadrature import NodeMaker
-from onboard.core.model.smoothing import RESOLVED_S, Gained
+from onboard.core.model.smoothing import RESOLVED_S, Gained, weight_of_two
 from tests.core.model.test_quadrature import NOMINAL, attitude, force, maker, rates
 
 EPOCH = np.array([0.4, 1.5, 2.6])
@@ -142,10 +142,8 @@ def test_two_moments_and_a_lag_are_what_they_are_called(window):
     lag = np.sum(share * velocity(tau - u)) / share.sum() - velocity(0.0)
     began = np.exp(-1.0 / tau)  # of what was before the first node
     assert at(made.lagged(NOW, window)) == pytest.approx(lag, abs=2e-4 + began)
-    for newer in (True, False):
-        pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
-        got = made.paired(NOW, window, 0.0, newer=newer)
-        assert at(got) == pytest.approx(pair, abs=1e-4)
+    pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
+    assert at(made.paired(NOW, window)) == pytest.approx(pair, abs=1e-4)
 
 
 @given(st.floats(0.02, 0.98), st.floats(0.05, 0.4))
@@ -156,7 +154,9 @@ def test_what_is_interpolated_between_two_epochs_is_two_moments(share, apart):
     newest = NOW + share * apart
     seen = (1.0 - share) * made.velocity(newest) + share * made.velocity(newest - apart)
     window = apart * np.sqrt(12.0 * share * (1.0 - share))
-    got = made.paired(NOW, window, apart, newer=share < 0.5)
+    older = weight_of_two(window, apart)
+    assert older == pytest.approx(min(share, 1.0 - share), abs=1e-6)
+    got = made.paired(NOW, window, older if share < 0.5 else 1.0 - older)
     assert at(got) == pytest.approx(at(seen - made.velocity(NOW)), abs=1e-6)
 
 
@@ -166,9 +166,14 @@ def test_whatever_its_shape_a_response_that_spreads_alike_bends_a_ramp_alike(win
     even = at(made.averaged(NOW, window))
     assert even == pytest.approx(window**2 / 24.0 * 3.0, rel=1e-6)
     began = np.exp(-1.0 * np.sqrt(12.0) / window)
-    pairs = [made.paired(NOW, window, 0.2, newer=newer) for newer in (True, False)]
+    pairs = [made.paired(NOW, window, older) for older in (0.5, 0.25, 0.9)]
     for got in (*pairs, made.lagged(NOW, window)):
         assert at(got) == pytest.approx(even, rel=1e-5 + 50.0 * began, abs=1e-13)
+    assert at(made.leaning(NOW, window)) == pytest.approx(0.0, abs=1e-13)
+
+
+def test_two_moments_that_spread_too_little_are_halves_further_apart():
+    assert weight_of_two(1.0, 0.2) == pytest.approx(0.5)
 
 
 def test_without_a_span_there_are_no_shapes():
