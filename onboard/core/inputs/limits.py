@@ -17,7 +17,7 @@ trusted flight [data sheet]."""
 
 REACH_S: Final = 1.2
 """s; inertial samples are needed this long before a fix's stamp: latency and half the averaging
-span [physics: the longest latency 0.5, the nodes' 0.62, and a margin]."""
+span [physics: the longest latency 0.45, the nodes' 0.62, and a margin]."""
 REACH_MARGIN_S: Final = 0.1
 """s; by which samples are taken from earlier than that, for even times move a little [cost]."""
 AHEAD_S: Final = 0.8
