@@ -120,6 +120,7 @@ def choose(
             choice.candidates.append(best)
         choice.chosen.append(best)
         _reconsider(choice)
+    _simplify(choice)
     return choice
 
 
@@ -189,6 +190,32 @@ def _reconsider(choice: Choice) -> None:
                 if its > most and accepted(fitter, before, after, other):
                     better, most = other, its
         choice.chosen[choice.chosen.index(c)] = better
+
+
+def _simplify(choice: Choice) -> None:
+    """Exchange what does nothing that matters beside something with fewer unknowns.
+
+    Axes that are not square have room for a tilt and for what an EKF makes of it: their numbers
+    beyond the tilt are no chance on a quiet plane, and change nothing.
+    """
+    fitter = choice.fitter
+    for c in list(choice.chosen):
+        rest = [i for i in choice.free if i not in c.index]
+        before = fitter.fit(rest)
+        better: Candidate | None = None
+        most = least()
+        for other in choice.candidates:
+            if other in choice.chosen or len(other.index) >= len(c.index):
+                continue
+            instead = fitter.fit([*rest, *other.index])
+            score = other.score(fitter, before, instead)
+            if score < most or not accepted(fitter, before, instead, other):
+                continue
+            both = fitter.fit([*rest, *other.index, *c.index])
+            if not accepted(fitter, instead, both, c):
+                better, most = other, score
+        if better is not None:
+            choice.chosen[choice.chosen.index(c)] = better
 
 
 def of_others(choice: Choice, t0: float) -> str:
