@@ -104,6 +104,22 @@ def test_an_effect_that_resembles_what_acts_does_not_stand_in_for_it(seed):
     assert chosen(mixed) == best_subset(mixed) == {"a", "d"}
 
 
+@pytest.mark.parametrize(("more", "said"), [(0.08, "a"), (1.0, "b")])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_has_room_for_another_one_is_taken_if_what_it_adds_matters(seed, more, said):
+    """b is a and two more; what they explain is no chance, but may be nothing that matters."""
+    rng = np.random.default_rng(seed)
+    problem = made(rng, "a", size=3.0, rows=1500)
+    (a,), (b, added, _) = problem.columns("a"), problem.columns("b")
+    h = problem.h.copy()
+    h[..., b] = h[..., a]
+    wide = Problem(problem.model, h, problem.y + more * h[..., added])
+    at = np.zeros(problem.model.size)
+    alone = {n: least_squares(wide, [*range(6), *wide.columns(n)], at)[1] for n in "ab"}
+    assert surprise(alone["a"] - alone["b"], WIDTHS["b"]) > least()
+    assert chosen(wide, "ab") == {said}
+
+
 def test_no_more_than_the_limit_is_taken():
     problem = made(np.random.default_rng(1), *WIDTHS, size=1.0)
     assert best_subset(problem) == set(WIDTHS)
