@@ -26,7 +26,8 @@ class Candidate:
 
     ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
     ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
-    the offsets at one moment; other accelerometers may have been ``witness`` of it.
+    the offsets at one moment; other accelerometers may have been ``witness`` of it.  ``room_for``
+    are effects that it is when some of its unknowns are told by the others.
     """
 
     effect: str
@@ -36,6 +37,7 @@ class Candidate:
     places: float = 1.0
     jump: bool = False
     witness: Witness | None = None
+    room_for: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> list[int]:

@@ -193,7 +193,7 @@ def _reconsider(choice: Choice) -> None:
 
 
 def _simplify(choice: Choice) -> None:
-    """Exchange what does nothing that matters beside something with fewer unknowns.
+    """Exchange what does nothing that matters beside an effect that it has room for.
 
     Axes that are not square have room for a tilt and for what an EKF makes of it: their numbers
     beyond the tilt are no chance on a quiet plane, and change nothing.
@@ -205,7 +205,7 @@ def _simplify(choice: Choice) -> None:
         better: Candidate | None = None
         most = least()
         for other in choice.candidates:
-            if other in choice.chosen or len(other.index) >= len(c.index):
+            if other in choice.chosen or other.effect not in c.room_for:
                 continue
             instead = fitter.fit([*rest, *other.index])
             score = other.score(fitter, before, instead)

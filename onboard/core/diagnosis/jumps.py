@@ -190,4 +190,5 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         places=made.trusted_s / SPACINGS_S[0] if jump else 1.0,
         jump=jump,
         witness=family.witness if isinstance(family, BiasStep) else None,
+        room_for=family.room_for,
     )

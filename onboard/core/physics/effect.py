@@ -131,6 +131,8 @@ class Effect(Family):
         response: how it goes with one signal; None if with no single one.
         tilts_ekf: it changes the offset in flight, which an EKF takes for tilt at first.
         in_proportion: its regressors are those of the force that was measured without it.
+        room_for: effects that are this one with fewer unknowns: they are what is said where the
+            rest of it matters nothing.
         changes_force: what others in proportion to the force act on is without it.
         of_attitude: it is the recorded attitude that is wrong.
         in_every_model: its unknowns that are estimated anyway.
@@ -157,6 +159,7 @@ class Effect(Family):
     response: ClassVar[Response | None] = None
     tilts_ekf: ClassVar[bool] = False
     in_proportion: ClassVar[bool] = False
+    room_for: ClassVar[tuple[str, ...]] = ()
     changes_force: ClassVar[bool] = False
     of_attitude: ClassVar[bool] = False
     in_every_model: ClassVar[tuple[str, ...]] = ()

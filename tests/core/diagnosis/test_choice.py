@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,7 +118,10 @@ def test_what_has_room_for_another_one_is_taken_if_what_it_adds_matters(seed, mo
     at = np.zeros(problem.model.size)
     alone = {n: least_squares(wide, [*range(6), *wide.columns(n)], at)[1] for n in "ab"}
     assert surprise(alone["a"] - alone["b"], WIDTHS["b"]) > least()
-    assert chosen(wide, "ab") == {said}
+    both = candidates(wide, "ab")
+    offered = [replace(c, room_for=("a",) if c.effect == "b" else ()) for c in both]
+    choice = choose(wide.fitter(), list(range(6)), offered)
+    assert {c.effect for c in choice.chosen} == {said}
 
 
 def test_no_more_than_the_limit_is_taken():

@@ -27,6 +27,7 @@ class CrossAxis(Proportional):
     cure = "ArduPilot has no parameter for it: remount or replace the sensor"
     apart = "turn through all headings with bank and pitch: a tilt turns all axes alike"
     keys = PAIRS
+    room_for = ("mount_tilt",)
     plausible = (0.25,) * 6
     unknowns = tuple(Unknown(f"cross_{p}", "1", 0.0, 0.15) for p in PAIRS)
 
