@@ -113,6 +113,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-24",
     "2026-11-24-2",
     "2026-11-25",
+    "2026-11-25-2",
 )
 """Releases that have been judged."""
 
