@@ -21,7 +21,7 @@ from tests.report.test_answer import TRUE
 OTHER = type(TRUE)(scale=(0.99, 1.01, 0.985), offset=(-0.1, 0.15, 0.2))
 HIDDEN = {
     "nothing": (),
-    "jump": (effects.BiasStep(time=70.0, x=0.4, y=-0.3, z=0.3),),
+    "jump": (effects.BiasStep(time=50.0, x=0.4, y=-0.3, z=0.3),),
     "axes": (effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05),),
 }
 

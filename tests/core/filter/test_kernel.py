@@ -184,7 +184,7 @@ def _preference_kept():
 @pytest.fixture(scope="module")
 def engine():
     """With the batches of a simulated flight of which the attitude is not exact."""
-    samples, _ = flown("copter", 60.0, seed=3)
+    samples, _ = flown("copter", 75.0, seed=3)
     return fed(samples, Calibrator(CalibratorSettings(refine=False))).engine(1)
 
 
