@@ -15,11 +15,13 @@ class Proportional(Effect, abstract=True):
     """An effect proportional to the force: its regressors are those of the *true* force.
 
     What was measured contains the effect itself; ``taken`` (k,), what is known of its unknowns,
-    takes it off to first order, which leaves an error of third order.
+    takes it off to first order, which leaves an error of third order.  Of a turn half of it is
+    taken off: a turn is not one and its first order, but ``exp(-a) = 1 - a (1 - a / 2) + ...``.
     """
 
     in_proportion: ClassVar[bool] = True
     changes_force: ClassVar[bool] = True
+    taken_off: ClassVar[float] = 1.0
     taken: Array | None = None
     beside: tuple[tuple[Effect, Array], ...] = ()
 
@@ -37,7 +39,7 @@ class Proportional(Effect, abstract=True):
             if added is not None:
                 f_b = f_b + added @ size
         if self.taken is not None:
-            f_b = f_b + self.amount(f_b) @ self.taken
+            f_b = f_b + self.amount(f_b) @ (self.taken_off * self.taken)
         return self.amount(f_b)
 
     def amount(self, f_b: Array) -> Array:

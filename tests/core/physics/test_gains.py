@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.regimes import axis_of
+from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_ramp import BiasRamp
 from onboard.core.physics.effects.cross_axis import CrossAxis
@@ -20,7 +21,6 @@ F = np.array([[1.0, -2.0, -14.0], [3.0, 0.5, -9.0], [-2.0, 4.0, -20.0]])
     ("kind", "sizes"),
     [
         (CrossAxis, [0.05, -0.04, 0.03, 0.02, -0.05, 0.04]),
-        (MountTilt, [0.06, -0.08]),
         (ScaleNonlinearity, [0.02, -0.03, 0.02]),
         (LoadFlex, [0.06, -0.05]),
     ],
@@ -31,6 +31,18 @@ def test_about_its_size_the_true_force_comes_back(kind, sizes):
     rough = measured + effect.acceleration(SimpleNamespace(f_b=measured)) @ sizes
     fine = measured + effect.about(sizes).acceleration(SimpleNamespace(f_b=measured)) @ sizes
     assert np.max(np.abs(fine - F)) < 0.35 * np.max(np.abs(rough - F))
+
+
+def test_a_turn_about_its_size_comes_back_as_a_turn():
+    """Not as one and its first order, which would make it longer by half of its square."""
+    effect, tilt = MountTilt(Origin(t0=0.0)), np.array([0.06, -0.08])
+    measured = F @ rotation_from_vector(np.array([*tilt, 0.0])).T
+    seen = SimpleNamespace(f_b=measured)
+    rough = measured + effect.acceleration(seen) @ tilt
+    fine = measured + effect.about(tilt).acceleration(seen) @ tilt
+    long = np.linalg.norm(F, axis=1).max()
+    assert np.max(np.abs(rough - F)) > 0.3 * 0.1**2 * long
+    assert np.max(np.abs(fine - F)) < 0.1**3 * long
 
 
 def test_a_gain_acts_on_the_force_without_the_offsets_beside_it():

@@ -67,7 +67,7 @@ IF_LEVELLED = "if AHRS_TRIM is from levelling on the ground, it holds this tilt,
 
 
 class MountTilt(Proportional):
-    """Accelerometer turned against gyroscope and attitude: ``measured = true + tilt x true``.
+    """Accelerometer turned against gyroscope and attitude: ``measured = exp(tilt x) true``.
 
     The unknowns are by how much the attitude is too large *for the accelerometer*: minus the angles
     by which it is turned itself.  As unknowns of every model they are those of the recorded
@@ -93,6 +93,7 @@ class MountTilt(Proportional):
         Unknown("force_tilt_roll", "rad", 0.0, 0.15),
         Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
     )
+    taken_off: ClassVar[float] = 0.5
     in_every_model: ClassVar[tuple[str, ...]] = ("tilt_roll", "tilt_pitch")
 
     def __init__(self, origin: Origin) -> None:
