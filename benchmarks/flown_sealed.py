@@ -256,22 +256,31 @@ def lines(seeds: range, *, seconds: float, speedup: float) -> Iterator[str]:
     yield f"{right} of {numbers} numbers within {100 * WITHIN:.0f} % or {SIGMAS:.0f} sigma"
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Print the rows, or why there are none."""
-    options = argparse.ArgumentParser(description="Concealed in flights of ArduPilot's SITL.")
+def printed(
+    rows: Callable[..., Iterator[str]],
+    options: argparse.ArgumentParser,
+    arguments: list[str] | None,
+) -> None:
+    """Print what ``rows`` makes of the seeds and options that were chosen, or why nothing is."""
     options.add_argument("--first", type=int, default=1, help="first seed")
     options.add_argument("--count", type=int, default=12)
     options.add_argument("--seconds", type=float, default=200.0, help="of manoeuvres")
     options.add_argument("--speedup", type=float, default=6.0)
-    chosen = options.parse_args(arguments)
+    chosen = vars(options.parse_args(arguments))
     try:
         find_binary("copter")
     except NoBinaryError as error:
         print(error)
         return
-    seeds = range(chosen.first, chosen.first + chosen.count)
-    for line in lines(seeds, seconds=chosen.seconds, speedup=chosen.speedup):
+    first = chosen.pop("first")
+    for line in rows(range(first, first + chosen.pop("count")), **chosen):
         print(line, flush=True)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the rows, or why there are none."""
+    options = argparse.ArgumentParser(description="Concealed in flights of ArduPilot's SITL.")
+    printed(lines, options, arguments)
 
 
 if __name__ == "__main__":

@@ -20,15 +20,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.flown_sealed import SIGMAS, UNCHECKED, WITHIN
+from benchmarks.flown_sealed import SIGMAS, UNCHECKED, WITHIN, printed
 from onboard.answers.explain import explain
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.inputs.samples import ImuSample
 from onboard.recordings.opening import open_recording
 from sitl.ardupilot.flight import fly
-from sitl.ardupilot.process import find_binary
 from sitl.builtin.world import Vehicle
-from sitl.errors import NoBinaryError, SitlError
+from sitl.errors import SitlError
 
 AXES = "XYZ"
 ALWAYS = frozenset({"gps_latency", "gps_smoothing"})
@@ -250,21 +249,8 @@ def lines(
 def main(arguments: list[str] | None = None) -> None:
     """Print the rows, or why there are none."""
     options = argparse.ArgumentParser(description="Sensor errors in flights of ArduPilot's SITL.")
-    options.add_argument("--first", type=int, default=1, help="first seed")
-    options.add_argument("--count", type=int, default=12)
-    options.add_argument("--seconds", type=float, default=200.0, help="of manoeuvres")
-    options.add_argument("--speedup", type=float, default=6.0)
     options.add_argument("--keep", type=Path, help="a folder for the logs")
-    chosen = options.parse_args(arguments)
-    try:
-        find_binary("copter")
-    except NoBinaryError as error:
-        print(error)
-        return
-    seeds = range(chosen.first, chosen.first + chosen.count)
-    how = {"seconds": chosen.seconds, "speedup": chosen.speedup}
-    for line in lines(seeds, **how, keep=chosen.keep):
-        print(line, flush=True)
+    printed(lines, options, arguments)
 
 
 if __name__ == "__main__":

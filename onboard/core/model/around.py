@@ -75,22 +75,18 @@ class Around:
         first-order lag instead of the even mean.  At the antenna, axes of the epoch.
         """
         t, antenna = self.now.t, self.antenna
+        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
+        less = weight_of_two(window, apart)
+        if less <= 0.0:
+            return np.zeros((len(t), 3, 4))
         even = antenna.averaged(t, window)
         columns = (
-            self._two(window, newer=True) - even,
-            self._two(window, newer=False) - even,
+            antenna.paired(t, window, less) - even,
+            antenna.paired(t, window, 1.0 - less) - even,
             antenna.leaning(t, window),
             antenna.lagged(t, window) - even,
         )
         return np.stack([self._own(x) for x in columns], axis=-1)
-
-    def _two(self, window: float, *, newer: bool) -> Array:
-        t = self.now.t
-        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
-        less = weight_of_two(window, apart)
-        if less <= 0.0:
-            return np.zeros((len(t), 3))
-        return self.antenna.paired(t, window, less if newer else 1.0 - less)
 
     def _own(self, x: Array) -> Array:
         """In the body axes of the epochs."""

@@ -9,6 +9,7 @@ from benchmarks.explaining import heard
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.limits import SHARED_WINDOW_S
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
@@ -19,9 +20,9 @@ AT = 61.3
 SPEC = FlightSpec(vehicle="copter", seed=23, duration=130.0, imus=random_imus(23, 3))
 
 
-def judged(imus: int, asked: int, **step) -> Judge:
+def judged(imus: int, asked: int, at: float = AT, **step) -> Judge:
     """One accelerometer of a vehicle of several, ``step`` concealed."""
-    effect = concealed.BiasStep(time=AT, **step)
+    effect = concealed.BiasStep(time=at, **step)
     spec = dataclasses.replace(SPEC, imus=SPEC.imus[:imus], effects=(effect,))
     return examine(heard(spec), asked)
 
@@ -43,11 +44,24 @@ def test_of_three_a_small_jump_is_said_of_the_one_that_made_it():
     time = jump.unknowns["time"]
     since_start = AT - asked[2].final.origin.t0
     assert time.value == pytest.approx(since_start, abs=3.0 * time.sigma)
-    assert time.sigma < 1.0  # the others are compared by the second, the flight by ten
     for axis, size in zip("xyz", (0.05, -0.04, 0.0), strict=True):
         found = jump.unknowns[axis]
         assert found.value == pytest.approx(size, abs=4.0 * found.sigma)
         assert found.sigma < 0.01
+
+
+@pytest.mark.slow
+def test_of_three_the_moment_is_told_by_the_second_in_which_they_are_compared():
+    """Half a second where it is in a window, a little more where it is between two of them."""
+    sigmas = []
+    for at in (AT - 1.05, AT - 0.8, AT):
+        judge = judged(3, 2, at, imu=2, x=0.05, y=-0.04)
+        (jump,) = (e for e in judge.diagnosis().effects if e.name == "bias_step")
+        time = jump.unknowns["time"]
+        assert time.value + judge.final.origin.t0 == pytest.approx(at, abs=3.0 * time.sigma)
+        sigmas.append(time.sigma)
+    assert np.median(sigmas) < 0.5
+    assert max(sigmas) < SHARED_WINDOW_S
 
 
 @pytest.mark.slow
