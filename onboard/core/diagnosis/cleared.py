@@ -77,14 +77,15 @@ def _felt(
 ) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
-    What may be noise in the samples may be real, too: the flight is taken as its velocity is
-    likelier.
+    What may be noise in the samples may be real, too: of noise there is no more than the velocity
+    walks by, and the flight is taken as its velocity is likelier.
     """
     density = spectrum(batches)
     sampled = Examination(engine, testable, t0=t0, batches=batches).with_noise()
     if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
         return sampled
-    expecting = expected(batches, density)
+    noise = np.minimum(white(density), sampled.noise.force_walk**2)
+    expecting = expected(batches, density, noise)
     felt = Examination(engine, testable, t0=t0, batches=expecting, start=sampled).with_noise()
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 

@@ -152,13 +152,21 @@ class Assembly:
             if last - first + 1 < FEWEST_FIXES:
                 continue
             chosen = fixes.between(first, last + 1)
-            segment = self._segment(t[needed], turning, chosen, parameters, imu)
+            followed = gyro == parameters.attitude_imu
+            segment = self._segment(t[needed], turning, chosen, parameters, imu, followed=followed)
             out.append(Batch(segment, chosen, trusted[first : last + 1], fresh))
             self._continues[imu], self._gyro[imu] = float(fixes.t[last]), gyro
         return out
 
     def _segment(
-        self, t: Array, rows: Array, fixes: Fixes, parameters: ParametersInForce, imu: int
+        self,
+        t: Array,
+        rows: Array,
+        fixes: Fixes,
+        parameters: ParametersInForce,
+        imu: int,
+        *,
+        followed: bool,
     ) -> Segment:
         """Samples that these fixes need, the gyroscope on the accelerometer's times."""
         cut = _needed(t, fixes.t)
@@ -183,6 +191,7 @@ class Assembly:
             parameters.R_bs,
             slow,
             parameters.lever_arm(imu),
+            followed,
         )
 
 

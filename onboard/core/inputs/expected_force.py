@@ -12,8 +12,10 @@ Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples
 ``S`` is measured over the flight.  ``q`` is the least of it at any frequency: white noise has no
 more than that, so a tone adds nothing, and vibration that a low-pass has shaped is left as it is.
 Whether it is noise at all, samples do not say: a vehicle that is really shaken, in turbulence or by
-its own motors, has a force as restless, and its receiver agrees with every sum of it.  That is for
-the likelihood of what the receiver says to decide (:mod:`onboard.core.diagnosis.cleared`).
+its own motors, has a force as restless, and its receiver agrees with every sum of it.  Noise makes
+the velocity that is integrated walk, so that what the receiver finds of such a walk is the most
+that ``q`` can be; whether it is as much, is for the likelihood of what the receiver says to decide
+(:mod:`onboard.core.diagnosis.cleared`).
 """
 
 from __future__ import annotations
@@ -49,14 +51,15 @@ def white(density: Array) -> Array:
     return out
 
 
-def expected(batches: Sequence[Batch], density: Array) -> list[Batch]:
+def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Batch]:
     """The same flight with the expectation of the force in the place of its samples.
 
     Args:
         batches: the flight.
         density: (bins, 3) of its samples.
+        noise: (3,) density of what of them is white noise.
     """
-    gain = _gain(density)
+    gain = _gain(density, noise)
     made: dict[int, Segment] = {}
     for run in _runs(batches):
         t, raw = _joined(run)
@@ -107,9 +110,9 @@ def _periodograms(raw: Array, step: float) -> Iterator[Array]:
         yield np.abs(np.fft.rfft(piece * window, axis=0)) ** 2 * (step / np.sum(window**2))
 
 
-def _gain(density: Array) -> Array:
+def _gain(density: Array, noise: Array) -> Array:
     """(bins, 3) of the filter."""
-    gain: Array = np.clip(1.0 - white(density) / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
+    gain: Array = np.clip(1.0 - noise / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
     gain[0] = 1.0  # of the mean
     return gain
 

@@ -61,6 +61,17 @@ class ParametersInForce:
         ]
         return ids[0] == ids[1] != 0
 
+    @property
+    def attitude_imu(self) -> int:
+        """Whose gyroscope the recorded attitude is integrated from, as far as parameters tell.
+
+        EK3_PRIMARY counts the bits of EK3_IMU_MASK; a lane that changes in flight they do not tell.
+        """
+        mask = int(self.get("EK3_IMU_MASK", default=7.0))
+        lanes = [i + 1 for i in range(mask.bit_length()) if mask >> i & 1]
+        primary = int(self.get("EK3_PRIMARY", default=0.0))
+        return lanes[primary] if 0 <= primary < len(lanes) else 1
+
     def six(self, imu: int) -> SixParameters:
         """Scale and offset in force; one and zero where they were never reported."""
         known = self._sixes.get(imu)

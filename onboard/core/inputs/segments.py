@@ -77,6 +77,7 @@ class Segment:
         R_bs: (3, 3) board orientation.
         slow: other signals by name: times (j,) and values (j,) or (j, k).
         lever_arm_b: (3,) configured lever arm, accelerometer to GPS antenna, body axes, m.
+        gyro_followed: whether the recorded attitude is integrated from this very gyroscope.
     """
 
     t: Array
@@ -87,6 +88,7 @@ class Segment:
     R_bs: Array
     slow: dict[str, Signal] = field(default_factory=dict)
     lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
+    gyro_followed: bool = False
 
     def interpolant(self) -> Hermite:
         """Interpolant of (rate, raw) stacked to (n, 6)."""

@@ -183,20 +183,6 @@ class GyroTiming(Family):
         return cross(nodes.w_b, nodes.f_b)[..., None]
 
 
-class GyroScale(Family):
-    """Scale of the gyroscope, which nobody calibrates: a nuisance, 3 % by older data sheets."""
-
-    name = "gyro_scale"
-
-    def __init__(self, sigma: float = 0.03) -> None:
-        """Take the prior sigma."""
-        self.unknowns = tuple(Unknown(f"gyro_scale_{a}", "1", 0.0, sigma) for a in AXIS)
-
-    def rate(self, nodes: Signals) -> Array:
-        """``-e_j w_j``: the unknown is what the gyroscope reads too much."""
-        return -np.eye(3) * nodes.w_b[..., None, :]
-
-
 class AttitudeOffset(Family):
     """Constant errors of the recorded attitude: tilt fixed in the body, heading fixed to north."""
 
