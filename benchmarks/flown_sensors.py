@@ -3,8 +3,8 @@
 The built-in simulator's sealed challenge (:mod:`benchmarks.explaining`) knows what its own sensors
 can do.  This one asks a simulator that shares no code with this project, with what its users set:
 ``SIM_*`` parameters, of which some change in flight.  Every flight has errors of all six numbers of
-the calibration and a receiver that is late, so that every flight is asked for them, besides one
-effect or none.  A hash of the answer is printed before it flies.
+the calibration, gyroscopes whose scales are up to 3 % off and a receiver that is late, so that
+every flight is asked for them, besides one effect or none.  A hash of the answer is printed before it flies.
 """
 
 from __future__ import annotations
@@ -119,6 +119,13 @@ def _mount(s: Secret, rng: np.random.Generator) -> None:
     s.names.add("mount_tilt")
 
 
+def _gyroscope(s: Secret, rng: np.random.Generator) -> None:
+    # Nobody calibrates it, and nobody is told of it: a nuisance, of the size that data sheets have.
+    for axis in AXES:
+        its = float(rng.uniform(-3.0, 3.0))
+        s.parameters |= {f"SIM_GYR{i}_SCALE_{axis}": its for i in (1, 2)}
+
+
 def _nothing(s: Secret, rng: np.random.Generator) -> None:
     del s, rng
 
@@ -130,7 +137,8 @@ def drawn(seed: int) -> Secret:
     """A vehicle, its air and sensors, and one effect or none, as the seed has them."""
     rng = np.random.default_rng(seed)
     secret = Secret(seed, "copter" if rng.random() < 0.5 else "plane")
-    for draw in (_accelerometer, _air, _receiver, EFFECTS[int(rng.integers(len(EFFECTS)))]):
+    effect = EFFECTS[int(rng.integers(len(EFFECTS)))]
+    for draw in (_accelerometer, _air, _receiver, effect, _gyroscope):
         draw(secret, rng)
     return secret
 

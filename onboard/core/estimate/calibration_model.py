@@ -15,8 +15,8 @@ from onboard.core.estimate.limits import (
 )
 from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array, vector3
-from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.gyro_scale import GyroScale
+from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import (
     AttitudeOffset,
     GpsLatency,

@@ -1,4 +1,4 @@
-"""Scale of the gyroscope, which turns two attitudes alike: the one integrated here, and an EKF's."""
+"""Scale of the gyroscope: it turns two attitudes alike, the one integrated here and an EKF's."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ simulated vehicles with gyroscopes 3 % off differs by a fifth of a sigma]."""
 
 PIECE: Final = 200
 """Attitudes that are summed at once [cost]."""
-MOST_PIECE: Final = 500.0
-"""Time constants of a piece, past which nothing of its beginning is left [bound: e^500 is a number
-still]."""
+MOST_PIECE: Final = 300.0
+"""Time constants of a piece, past which nothing of its beginning is left [bound: the square of
+e^300 is a number still]."""
 _CORRECTED = np.repeat(CORRECTED_S, 3)
 
 

@@ -45,7 +45,8 @@ def batches(raw, pieces=8, gap=()):
 
 def of_noise(flight):
     """What is expected of the force given the samples."""
-    return expected(flight, spectrum(flight))
+    density = spectrum(flight)
+    return expected(flight, density, white(density))
 
 
 def felt(made):

@@ -1,0 +1,44 @@
+"""Gyroscopes whose scale is wrong, and an autopilot that believes them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.parameters import ParametersInForce
+from tests.core.estimate.test_simulated_flights import TRUE, assert_true, calibrated, flown
+
+WRONG = (0.03, -0.02, 0.025)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["copter", "plane"])
+def test_one_that_is_wrong_costs_nothing(vehicle):
+    """Held for right in quick turns, the attitude made y scale 3 sigma off, sigmas 2 to 5 times."""
+    found = []
+    for scale in ((0.0, 0.0, 0.0), WRONG):
+        imu = dataclasses.replace(TRUE, gyro_scale=scale)
+        samples, _ = flown(vehicle, 150.0, imu=imu, seed=3)
+        found.append(calibrated(samples))
+    right, wrong = found
+    assert_true(wrong)
+    error = np.array(wrong.scale + wrong.offset) - np.array(TRUE.scale + TRUE.offset)
+    sigma = np.array(wrong.scale_sigma + wrong.offset_sigma)
+    assert np.all(np.abs(error) <= 3.0 * sigma)
+    assert np.all(sigma <= 1.15 * np.array(right.scale_sigma + right.offset_sigma))
+
+
+@pytest.mark.parametrize(
+    ("values", "imu"),
+    [
+        ({}, 1),
+        ({"EK3_PRIMARY": 1.0}, 2),
+        ({"EK3_PRIMARY": 1.0, "EK3_IMU_MASK": 5.0}, 3),
+        ({"EK3_PRIMARY": 0.0, "EK3_IMU_MASK": 6.0}, 2),
+        ({"EK3_PRIMARY": 3.0, "EK3_IMU_MASK": 3.0}, 1),
+        ({"EK3_IMU_MASK": 0.0}, 1),
+    ],
+)
+def test_whose_gyroscope_an_ekf_integrates(values, imu):
+    """The lane that is preferred, counted among those that the mask makes."""
+    assert ParametersInForce(dict(values)).attitude_imu == imu
