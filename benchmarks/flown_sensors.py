@@ -4,7 +4,8 @@ The built-in simulator's sealed challenge (:mod:`benchmarks.explaining`) knows w
 can do.  This one asks a simulator that shares no code with this project, with what its users set:
 ``SIM_*`` parameters, of which some change in flight.  Every flight has errors of all six numbers of
 the calibration, gyroscopes whose scales are up to 3 % off and a receiver that is late, so that
-every flight is asked for them, besides one effect or none.  A hash of the answer is printed before it flies.
+every flight is asked for them, besides one effect or none.  A hash of the answer is printed before
+it flies.
 """
 
 from __future__ import annotations
