@@ -236,6 +236,7 @@ def sensors_of(diagnosis: Diagnosis) -> Sensors:
         timing.get("gps_delay_s", 0.0),
         max(timing.get("gps_smoothing_window_s", 0.0), 0.0),
         timing.get("imu_delay_s", 0.0),
+        np.array([g.value for g in c.gyro_scale]),
     )
 
 

@@ -63,7 +63,8 @@ def settings_of(
             out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
     if not recording.derived:
         for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
-            out.append(Setting(name, number, sigma, "accelerometer"))
+            sensor = "accelerometer" if name.startswith("SIM_ACC") else "gyroscope"
+            out.append(Setting(name, number, sigma, sensor))
     return tuple(out)
 
 

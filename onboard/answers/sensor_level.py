@@ -23,6 +23,7 @@ SIMULATED_PERIOD_S: Final = 0.2
 LAG_FLOOR_S: Final = 0.05
 WINDOW_FLOOR_S: Final = 0.15
 """What timing must differ by to be an effect, s (contracts of ``explain``) [use]."""
+PER_CENT: Final = 100.0
 SCALE_FLOOR: Final = 0.005
 OFFSET_FLOOR: Final = 0.02
 """What a scale (1) and an offset (m/s^2) must differ by to be worth a setting [use]."""
@@ -137,7 +138,7 @@ def _only_simulated(effect: Finding) -> Difference:
 
 
 def calibration_settings(real: Diagnosis) -> dict[str, tuple[float, float]]:
-    """SIM_ACC1_*, each with its sigma: the simulator's accelerometer errs with them as this one.
+    """SIM_ACC1_* and SIM_GYR1_*, each with its sigma: the simulator's sensors err as these do.
 
     Only what is calibrated and differs surely from what the vehicle has in force.
     """
@@ -152,4 +153,7 @@ def calibration_settings(real: Diagnosis) -> dict[str, tuple[float, float]]:
             out[f"SIM_ACC1_SCAL_{axis}"] = (c.scale[i], float(sigma[i]))
         if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * sigma[3 + i]:
             out[f"SIM_ACC1_BIAS_{axis}"] = (c.offset[i], float(sigma[3 + i]))
+    for axis, gyro in zip("XYZ", c.gyro_scale, strict=True):
+        if abs(gyro.value) > SCALE_FLOOR + SURE * gyro.sigma:
+            out[f"SIM_GYR1_SCALE_{axis}"] = (PER_CENT * gyro.value, PER_CENT * gyro.sigma)
     return out

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from sitl.builtin.effects import Vector3
 from sitl.builtin.params import Kind, Parameter, ParameterStore
 from sitl.builtin.truth import Truth
 
 ACCEL_STEMS = ("INS_ACC", "INS_ACC2", "INS_ACC3")
 AXES = ("X", "Y", "Z")
+PER_CENT = 100.0
 LOOP_RATE = {"plane": 50, "copter": 400}
 STREAM_RATES = {
     "RAW_SENS": 2,
@@ -84,7 +86,16 @@ def _simulator(truth: Truth) -> list[Parameter]:
         out += [Parameter(f"SIM_ACC{n}_SCAL_{a}", imu.scale[i]) for i, a in enumerate(AXES)]
         out += [Parameter(f"SIM_ACC{n}_BIAS_{a}", imu.offset[i]) for i, a in enumerate(AXES)]
         out.append(Parameter(f"SIM_ACC{n}_RND", imu.broadband))
+        out += [
+            Parameter(f"SIM_GYR{n}_SCALE_{a}", PER_CENT * imu.gyro_scale[i])
+            for i, a in enumerate(AXES)
+        ]
     return out
+
+
+def _shares(per_cent: Vector3) -> Vector3:
+    x, y, z = per_cent
+    return x / PER_CENT, y / PER_CENT, z / PER_CENT
 
 
 def truth_in_force(truth: Truth, parameters: ParameterStore) -> Truth:
@@ -95,6 +106,7 @@ def truth_in_force(truth: Truth, parameters: ParameterStore) -> Truth:
             scale=parameters.vector(f"SIM_ACC{n}_SCAL_"),
             offset=parameters.vector(f"SIM_ACC{n}_BIAS_"),
             broadband=parameters[f"SIM_ACC{n}_RND"],
+            gyro_scale=_shares(parameters.vector(f"SIM_GYR{n}_SCALE_")),
             position=parameters.vector("SIM_IMU_POS_") if n == 1 else imu.position,
             vibration_hz=parameters["SIM_VIB_FREQ_X"],
             temperature_start=parameters["SIM_IMUT_START"],

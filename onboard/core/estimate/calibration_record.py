@@ -125,6 +125,7 @@ def _record(
         coverage=seen.coverage,
         prior_sigma=_six(engine.settings.needs.prior),
         gyro_sigma=_six(gyro),
+        gyro_scale=_gyro_scale(engine, solution),
         load_mean=load[0],
         load_square=load[1],
         predictive_gain=residuals.predictive_gain,
@@ -240,6 +241,14 @@ def six_information(solution: Solution) -> Array:
     back = np.linalg.inv(parameters_jacobian(solution.theta))
     out: Array = back.T @ S @ back
     return (out + out.T) / 2
+
+
+def _gyro_scale(engine: Engine, solution: Solution) -> tuple[Estimate, ...]:
+    """By what share of the true rate each axis reads too much; the unknowns are of the reading."""
+    at = engine.model.slices["gyro_scale"]
+    left = 1.0 - solution.theta[at]
+    sigma = np.sqrt(np.diag(solution.covariance)[at]) / left**2
+    return tuple(map(Estimate, (1.0 / left - 1.0).tolist(), sigma.tolist()))
 
 
 def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:

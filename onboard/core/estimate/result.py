@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Self
@@ -80,7 +81,8 @@ class Calibration:
     with the estimate.  ``prior_sigma`` (scale, offset) is what was known before the flight;
     ``gyro_sigma`` (likewise) is what of their sigmas comes from the gyroscope's axes: all flights
     with it share that error.  Only a bench sees it, navigation does not
-    (:attr:`with_its_gyroscope`).
+    (:attr:`with_its_gyroscope`).  ``gyro_scale`` is by what share of the rate each axis of the
+    gyroscope reads too much, which nobody has a parameter for.
     ``load_mean`` and ``load_square`` are the means of the raw samples and of their squares, sensor
     axes: the loads that were flown, of which the six should give the force.
     """
@@ -109,6 +111,7 @@ class Calibration:
     coverage: Coverage
     prior_sigma: Six = (0.03, 0.03, 0.03, 0.5, 0.5, 0.5)
     gyro_sigma: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    gyro_scale: tuple[Estimate, ...] = (Estimate(0.0, math.inf),) * 3
     load_mean: Vector3 = (0.0, 0.0, -9.80665)
     load_square: Vector3 = (1.0, 1.0, 97.0)
     predictive_gain: float = float("nan")

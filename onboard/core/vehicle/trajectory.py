@@ -8,7 +8,7 @@ So the difference of the two, both averaged alike, is what a smoother
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class Sensors:
         gps_delay: lateness of the receiver's velocity, s.
         gps_window: averaging span of it, s.
         attitude_delay: lateness of the recorded attitude, s.
+        gyro_scale: (3,) by how much the gyroscope reads too much.
     """
 
     scale: Array
@@ -52,6 +53,7 @@ class Sensors:
     gps_delay: float = 0.0
     gps_window: float = 0.0
     attitude_delay: float = 0.0
+    gyro_scale: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +107,7 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
             continue
         R, _ = s.attitude_at(t + sensors.attitude_delay, sensors.attitude_delay)
         f_b = (sensors.scale * (s.raw_s[own] - sensors.offset)) @ s.R_bs.T
-        parts.append((t, f_b, s.w_b[own], R))
+        parts.append((t, f_b, s.w_b[own] / (1.0 + sensors.gyro_scale), R))
     if not parts:
         return None
     t, f_b, w_b, R = (np.concatenate(x) for x in zip(*parts, strict=True))
