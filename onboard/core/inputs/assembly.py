@@ -26,6 +26,7 @@ from onboard.core.inputs.limits import (
 )
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
+from onboard.core.inputs.rolling import Rolling
 from onboard.core.inputs.samples import GpsFix
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.inputs.streams import Streams
@@ -61,6 +62,7 @@ class Assembly:
         self.standing_s = 0.0
         self._continues: dict[int, float] = {}  # time of the last fix that was handed out
         self._gyro: dict[int, int] = {}  # whose gyroscope was used there
+        self._rolling = Rolling()
 
     def forget(self, imu: int) -> None:
         """Forget what waits of one accelerometer, but not what was refused of it."""
@@ -71,6 +73,7 @@ class Assembly:
         """Forget all that waits (reboot)."""
         self.streams.clear()
         self._continues.clear()
+        self._rolling.forget()
 
     def take(
         self,
@@ -101,6 +104,8 @@ class Assembly:
         ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
         if grounded is False:
             ready = min(ready, landed - TOUCHED_S) if everything else ready - TOUCHED_S
+        elif grounded is None and not everything:
+            ready = min(ready, self._rolling.held(*waiting.motion(ready)))
         if min(ready, waiting.last) - waiting.first < least:
             return {}
         taken, trusted, t = waiting.take(ready)
@@ -108,16 +113,33 @@ class Assembly:
             return {}
         fixes = _fixes(taken, t)
         out: dict[int, list[Batch]] = {}
-        if grounded or (grounded is None and _still(live, fixes)):
+        first, end = self._flown(live, fixes, grounded=grounded)
+        if first > 0:
             self._continues.clear()  # what flies after it begins anew
-            self.standing_s += float(t[-1] - t[0])
-        else:
-            for imu in live:
-                batches = self._cut(imu, live, fixes, trusted, parameters)
-                if batches:
-                    out[imu] = batches
+        for imu in live:
+            batches = self._cut(
+                imu, live, fixes.between(first, end), trusted[first:end], parameters
+            )
+            if batches:
+                out[imu] = batches
+        if end < len(t):
+            self._continues.clear()
+        flown = float(t[end - 1] - t[first]) if first < end else 0.0
+        self.standing_s += float(t[-1] - t[0]) - flown
         self.streams.drop_before(float(t[-1]) - REACH_S - KEPT_S)
         return out
+
+    def _flown(
+        self, live: dict[int, ImuTrack], fixes: Fixes, *, grounded: bool | None
+    ) -> tuple[int, int]:
+        """First and last (excluded) of the fixes that were in the air."""
+        if grounded or (grounded is None and _still(live, fixes)):
+            self._rolling.stands(fixes.t, fixes.height)
+            return len(fixes), len(fixes)
+        if grounded is None:
+            return self._rolling.flight(fixes)
+        self._rolling.flies()
+        return 0, len(fixes)
 
     def _cut(
         self,

@@ -234,6 +234,16 @@ class FixTrack:
         self._fixes.append((fix, trusted))
         return True
 
+    def motion(self, until: float) -> tuple[Array, Array, Array]:
+        """Of what waits up to ``until``: times, s, heights, m, and speeds over ground, m/s."""
+        waiting = [f for f, _ in self._fixes if f.t <= until]
+        v_n = np.array([(f.v_n, f.v_e) for f in waiting]).reshape(-1, 2)
+        return (
+            np.array([f.t for f in waiting]),
+            np.array([f.altitude for f in waiting]),
+            np.hypot(v_n[:, 0], v_n[:, 1]),
+        )
+
     def take(self, until: float) -> tuple[list[GpsFix], NDArray[np.bool_], Array]:
         """Fixes up to ``until``, their trust and even times; the last stays as the next first."""
         n = int(np.searchsorted([f.t for f, _ in self._fixes], until, side="right"))
