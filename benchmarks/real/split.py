@@ -102,6 +102,7 @@ LOOKS: tuple[str, ...] = (
     "the search for noise levels: a stencil a factor of two wide, or Fisher's scoring",
     "headings set anew put right, and force noise by the samples' restlessness, or neither",
     "the receiver's response a mixture of shapes, spans to 1.2 s, no touch-downs, or as it was",
+    "attitudes that follow the gyroscope, no rolling, noise as the velocity walks, or as it was",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
@@ -114,6 +115,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-24-2",
     "2026-11-25",
     "2026-11-25-2",
+    "2026-11-25-3",
 )
 """Releases that have been judged."""
 
