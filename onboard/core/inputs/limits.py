@@ -45,6 +45,8 @@ impact is no flight [physics]."""
 GROUND_M: Final = 2.0
 """m; heights closer than this to where the vehicle stood are the ground [data sheet: what a
 receiver's height scatters by in a minute or two]."""
+STILL_M_S: Final = 0.3
+"""Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
 ROLLED_OUT_S: Final = 2.0
 """s without speed after which a vehicle has come to a stand [probability: ten fixes in a row]."""
 LONGEST_ROLL_S: Final = 120.0

@@ -10,12 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.inputs.limits import GROUND_M, LONGEST_ROLL_S, ROLLED_OUT_S
+from onboard.core.inputs.limits import GROUND_M, LONGEST_ROLL_S, ROLLED_OUT_S, STILL_M_S
 from onboard.core.inputs.segments import Fixes
 from onboard.core.maths.arrays import Array, Mask
-
-STOPPED_M_S = 0.3
-"""Speed of a vehicle that stands, as a receiver shows it [data sheet]."""
 
 
 class Rolling:
@@ -97,4 +94,4 @@ def _stopped(t: Array, speed: Array) -> bool:
     """Whether it has come to a stand by the end of these fixes."""
     if len(t) == 0 or t[-1] - t[0] < ROLLED_OUT_S:
         return False
-    return bool(np.all(speed[t > t[-1] - ROLLED_OUT_S] < STOPPED_M_S))
+    return bool(np.all(speed[t > t[-1] - ROLLED_OUT_S] < STILL_M_S))

@@ -17,12 +17,8 @@ FEWEST_STEPS: Final = 100
 MARGIN_S: Final = 3.0
 """s of flight next to the ground that are left out: contact and ground effect are another
 physics [physics]."""
-GROUND_M: Final = 2.0
-"""Heights closer than this to where the vehicle stood are the ground, m [data sheet]."""
 HEIGHT_WANDER_M: Final = 10.0
 """By how much a receiver's height may wander in a flight, m: in 95 % of hours [data sheet]."""
-STILL_M_S: Final = 0.3
-"""Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
 LEVEL_M_S: Final = 0.15
 """Vertical speed of a vehicle that rolls, as a receiver shows it, m/s [data sheet]."""
 STILL_S: Final = 1.0

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.inputs.limits import GROUND_M, STILL_M_S
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.fit import Fit
@@ -18,9 +19,7 @@ from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FALSE_ALARM,
-    GROUND_M,
     MARGIN_S,
-    STILL_M_S,
     TOLD_S,
 )
 from onboard.core.vehicle.model import ForceModel

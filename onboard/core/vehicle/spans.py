@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.inputs.limits import GROUND_M, STILL_M_S
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.limits import (
-    GROUND_M,
-    HEIGHT_WANDER_M,
-    LEVEL_M_S,
-    MARGIN_S,
-    STILL_M_S,
-    STILL_S,
-)
+from onboard.core.vehicle.limits import HEIGHT_WANDER_M, LEVEL_M_S, MARGIN_S, STILL_S
 
 
 def grounded_spans(
