@@ -7,8 +7,8 @@ import pytest
 
 from onboard.core.inputs.segments import Segment
 from onboard.core.model.around import around
+from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.nuisances import (
-    GyroScale,
     GyroTiming,
     Six,
 )

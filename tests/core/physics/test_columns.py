@@ -13,11 +13,11 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.model.around import around
+from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.nuisances import (
     AttitudeOffset,
     GpsLatency,
     GpsSmoothing,
-    GyroScale,
     ImuDelay,
     LeverArmError,
     Six,
