@@ -84,7 +84,8 @@ class Rolling:
         return first, end
 
     def _low(self, height: Array) -> Mask:
-        if self.stood is None:
+        # No receiver finds the same height for seconds: one that has it does not measure it.
+        if self.stood is None or len(height) == 0 or np.ptp(height) == 0.0:
             return np.zeros(len(height), dtype=bool)
         low: Mask = np.abs(height - self.stood) < GROUND_M
         return low

@@ -92,6 +92,13 @@ def test_before_the_first_stand_all_is_flight():
     assert spanned(flown.portions()) == pytest.approx((0.0, flown.t[-1], flown.t[-1]))
 
 
+def test_a_height_that_is_not_measured_says_nothing():
+    flown = Flown((30, 0, 0), (100, 0, 12), noise=0.0)
+    _, last, total = spanned(flown.portions())
+    assert total > 95.0
+    assert last == pytest.approx(flown.t[-1], abs=0.3)
+
+
 def test_what_is_held_back_is_not_held_for_ever():
     rolling = Rolling()
     rolling.stands(np.arange(10.0), np.full(10, 100.0))
