@@ -15,7 +15,7 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import FURTHEST, ONCE_MORE
+from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, ONCE_MORE
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
 from onboard.core.diagnosis.onsets import fitted, gains
@@ -70,6 +70,19 @@ def shown_from(
     out: Array = np.sqrt(needed(3, places, pool.variance, pool.freedom) / known)
     with_others = companions.shown_from(imu, known, pool.variance)
     return out if with_others is None else np.minimum(out, with_others)
+
+
+def reach_of_scan(looked: Sequence[Looked]) -> float:
+    """How far (s) from the best moment of a scan, not empty, there may be a better one.
+
+    Between two of its moments a jump may explain twice what it explains at either
+    (:data:`~onboard.core.diagnosis.limits.SCAN_S`), where an EKF that follows the accelerometer
+    makes one that comes later look nearly as good.  So all that explain half of the best one are
+    looked at again, as far as a jump is told.
+    """
+    best = max(looked, key=lambda at: at.gain)
+    apart = [abs(at.moment - best.moment) for at in looked if at.gain >= best.gain / 2.0]
+    return min(max(SCAN_S, *apart), FORGOTTEN_S)
 
 
 def jump_near(full: Examination, chosen: Sequence[Effect], centre: float, reach: float) -> BiasStep:

@@ -26,10 +26,11 @@ from onboard.core.diagnosis.jumps import (
     jump_near,
     jumps_anywhere,
     placed,
+    reach_of_scan,
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import CLEARLY, SCAN_S, SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, unused_flight
@@ -205,7 +206,7 @@ def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
     best = max(looked, key=lambda at: at.gain)
     if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < -2.0 * log(SEARCHED):
         return None
-    return jump_near(full, (), best.moment, SCAN_S)
+    return jump_near(full, (), best.moment, reach_of_scan(looked))
 
 
 def _wanders(choice: Choice) -> bool:

@@ -7,7 +7,9 @@ import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis import jumps, onsets, stepped, testability
+from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.limits import SCAN_S
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.score import time_sigma
 from onboard.core.diagnosis.selection import Fitter
@@ -128,6 +130,34 @@ def test_it_is_found_to_the_second(full, off, reach):
 
 
 @pytest.mark.slow
+def scan(gain):
+    """Moments of a scan of 300 s, and what a jump there explains."""
+    return [
+        jumps.Looked(float(t), float(gain(t)), np.ones(3)) for t in np.arange(0.0, 300.0, SCAN_S)
+    ]
+
+
+@pytest.mark.parametrize("at", [117.0, 118.0, 119.0])
+def test_a_jump_between_two_moments_of_a_scan_is_within_reach_of_what_looks_better(at):
+    # It explains half 3 s from where it is; an EKF that follows it makes a later one look better.
+    def gain(t):
+        return max(4100.0 * 0.5 ** (abs(t - at) / 3.0), 3600.0 - 3.0 * (t - 126.0) ** 2)
+
+    looked = scan(gain)
+    best = max(looked, key=lambda x: x.gain)
+    assert gain(at) > best.gain
+    assert abs(best.moment - at) > SCAN_S
+    assert abs(best.moment - at) < jumps.reach_of_scan(looked)
+
+
+def test_a_jump_that_stands_alone_is_looked_for_where_it_is():
+    assert jumps.reach_of_scan(scan(lambda t: 900.0 * 0.5 ** (abs(t - 61.0) / 3.0))) == SCAN_S
+
+
+def test_a_jump_is_looked_for_no_further_away_than_it_is_told():
+    assert jumps.reach_of_scan(scan(lambda t: 900.0 - t)) == FORGOTTEN_S
+
+
 @pytest.mark.parametrize("seed", [11, 12])
 def test_a_blow_just_before_the_end_of_a_flight_is_no_jump(seed):
     blow = Shock(time=LANDED - 4.0, x=-2.0, y=3.0, z=-4.0, turn=(0.05, -0.04))
