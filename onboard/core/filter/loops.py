@@ -223,16 +223,28 @@ def whiten(
     return 0
 
 
+@part
+def _less_four(row: Array, gain: Array, W: Array, first: int) -> None:
+    """``row -= gain W`` of four innovations from ``first`` on: one way through memory for four."""
+    a, b, c, d = gain[first], gain[first + 1], gain[first + 2], gain[first + 3]
+    w, x, y, z = W[first], W[first + 1], W[first + 2], W[first + 3]
+    for i in range(len(row)):
+        row[i] = row[i] - a * w[i] - b * x[i] - c * y[i] - d * z[i]
+
+
 @compiled("void(f8[:,:,::1], f8[:,:,::1], i8)")
 def take(carried: Array, W: Array, m1: int) -> None:
     """Add gain times innovation to all that is carried, in place."""
     members, _, columns = carried.shape
     r = W.shape[1]
+    fours = r - r % 4
     for b in range(members):
         for i in range(STATES):
-            row = carried[b, i]
-            for a in range(r):
-                f, from_ = W[b, a, m1 + i], W[b, a]
+            row, gain = carried[b, i], W[b, :, m1 + i]
+            for a in range(0, fours, 4):
+                _less_four(row, gain, W[b], a)
+            for a in range(fours, r):
+                f, from_ = gain[a], W[b, a]
                 for c in range(columns):
                     row[c] -= f * from_[c]
 
