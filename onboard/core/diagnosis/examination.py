@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
-from onboard.core.estimate.calibration_model import moved
 from onboard.core.estimate.engine import Engine, through
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
@@ -114,7 +113,7 @@ class Examination(Engine):
         for left in (2, 1, 0):
             self.once(held)
             self._seed = found = solve(self.blocks, self.model)
-            point = moved(self.point, self.model, found.theta)
+            point = self.asked(found.theta)
             settled = point.near(self.point, WORTH_A_PASS)
             if not left or (settled and not blind):
                 break

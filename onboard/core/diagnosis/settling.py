@@ -12,7 +12,6 @@ from onboard.core.diagnosis.jumps import candidate_of
 from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.estimate.calibration_model import moved
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
 
@@ -72,7 +71,7 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
         families,
         t0=full.point.skew_from,
         start=full,
-        point=moved(full.point, model, fit.theta),
+        point=full.asked(fit.theta, model),
         refused=full.refused_velocities(),
     )
     theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
@@ -81,7 +80,7 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
     theta[mine] = fit.theta[theirs]
     known = choice.fitter.covariance(fit)
     covariance[np.ix_(mine, mine)] = known[np.ix_(theirs, theirs)]
-    return final.with_rows(theta, covariance)
+    return final.with_rows(final.about_point(theta), covariance)
 
 
 def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:

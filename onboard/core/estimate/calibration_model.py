@@ -12,11 +12,12 @@ from onboard.core.estimate.limits import (
     DELAY_RANGE_S,
     HEADING_RANGE_RAD,
     LONGEST_WINDOW_S,
+    SHAPE_RANGE,
 )
 from onboard.core.estimate.observability import Needs
-from onboard.core.maths.arrays import Array, vector3
+from onboard.core.maths.arrays import Array, vector3, vector4
 from onboard.core.model.gyro_scale import GyroScale
-from onboard.core.model.linearisation import Linearisation
+from onboard.core.model.linearisation import SHAPES, Linearisation
 from onboard.core.model.nuisances import (
     AttitudeOffset,
     GpsLatency,
@@ -52,7 +53,7 @@ def calibration_model(
     always: tuple[Family, ...] = (
         Six(centre[:3], centre[3:], needs.prior_scale, needs.prior_offset),
         GpsLatency(point.delay),
-        GpsSmoothing(point.window),
+        GpsSmoothing(point.window, shapes=point.shapes),
         ImuDelay(point.attitude_delay),
         HeightLatency(),
         GyroTiming(),
@@ -86,6 +87,7 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         antenna=vector3(theta[_antenna(model)]),
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,
+        shapes=vector4(np.clip(point.shapes + theta[[i[n] for n in SHAPES]], *SHAPE_RANGE)),
     )
 
 

@@ -9,6 +9,7 @@ the sums as it was taken.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,15 +20,17 @@ import numpy as np
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.limits import (
     MOST_AGED,
+    MOST_IDLE,
     MOST_ROUNDS,
     MOST_STATES,
     NEW_SHARE,
     STEADY,
+    WORTH_A_SEARCH,
 )
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
-from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.noise import NoiseLevels, log_prior
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -35,7 +38,8 @@ from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged, total
-from onboard.core.model.linearisation import MOVING, Linearisation
+from onboard.core.model.around import AROUND_SPAN_S
+from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
 
 
@@ -150,7 +154,7 @@ class Engine:
         solution = self._seed
         theta = None if solution is None else solution.theta
         if theta is not None and not ready:
-            theta = self._about_point(theta)
+            theta = self.about_point(theta)
         return Pass(
             self.model,
             self.point,
@@ -161,11 +165,12 @@ class Engine:
             preparations=ready,
         )
 
-    def _about_point(self, theta: Array) -> Array:
+    def about_point(self, theta: Array) -> Array:
         """``theta`` of an older linearisation as unknowns about the present one."""
         out = theta.copy()
+        kept = () if self._shaped else SHAPES
         for name in (*MOVING, "clock_rate"):
-            if name in self.model.index:
+            if name in self.model.index and name not in kept:
                 out[self.model.index[name]] = 0.0
         return out
 
@@ -264,20 +269,44 @@ class Engine:
         search = NoiseSearch(settled=not levels)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
+        highest, best, idle = -math.inf, (self.point, self.noise), 0
         for turn in range(MOST_ROUNDS):
             made = self._new_pass(search.members(self.noise), ready)
             results = self._over(sample, made)
             self._seed = solve([result.block for result in results], self.model)
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
-            before, at = at, moved(self.point, self.model, self._seed.theta)
-            self.noise = search.better(self.noise, made.log_likelihoods(), made.trades)
+            likelihoods = made.log_likelihoods()
+            likely = likelihoods[0] + log_prior(self.noise)
+            idle = idle + 1 if search.settled and likely < highest + WORTH_A_SEARCH else 0
+            if likely > highest:
+                highest, best = likely, (self.point, self.noise)
+            before, at = at, self.asked(self._seed.theta)
+            self.noise = search.better(self.noise, likelihoods, made.trades)
             if at.near(before, STEADY) and search.settled:
+                best = at, self.noise
+                break
+            if idle == MOST_IDLE:
                 break
             if not self.point.stands_for(at):
                 self._move(at, self.noise)
                 ready = Preparations()
-        self._move(at, search.best(self.noise))
+        self._move(*best)
+
+    def asked(self, theta: Array, model: Model | None = None) -> Linearisation:
+        """The linearisation that a solution ``theta`` (m,) of a model, of its own, asks for."""
+        point = moved(self.point, model or self.model, theta)
+        return point if self._shaped else replace(point, shapes=self.point.shapes)
+
+    @property
+    def _shaped(self) -> bool:
+        """Whether the linearisation follows the shapes of the receiver's response.
+
+        Of fixes further apart than is looked around them, shares of what is an epoch apart stand
+        for something else.
+        """
+        steps = [float(np.median(np.diff(b.fixes.t))) for b in self.batches if len(b.fixes) > 1]
+        return bool(steps) and float(np.median(steps)) <= AROUND_SPAN_S
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         shift = self.shift(self.point, point)

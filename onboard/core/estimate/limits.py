@@ -18,6 +18,9 @@ DELAY_RANGE_S: Final = (-0.1, 0.45)
 """Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
 ATTITUDE_DELAY_RANGE_S: Final = (-0.15, 0.15)
 """Lateness of the recorded attitude, s [physics: beyond it streams are not of one vehicle]."""
+SHAPE_RANGE: Final = ((0.0, 0.0, -1.0, 0.0), (1.0, 1.0, 1.0, 1.0))
+"""Of shares of the shapes of a receiver's response: weights, of which one leans to either side
+[physics]."""
 HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 """Error of the recorded heading, rad [physics: past it an EKF does not align]."""
 BEYOND: Final = 3.0
@@ -32,6 +35,9 @@ a level is as uncertain as that by itself, and with it two ways to the same flig
 than a tenth of a sigma (0.19 with 2.0) [probability]."""
 MOST_ROUNDS: Final = 24
 """Passes of a refinement, at the most: a search takes five to ten of them [cost]."""
+MOST_IDLE: Final = 3
+"""Passes with noise levels that stand, none of them worth it by :data:`WORTH_A_SEARCH`, after which
+timing that will not come to rest is taken where it was likeliest [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
 """Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
 worth another pass [cost]."""

@@ -14,7 +14,7 @@ from onboard.core.maths.arrays import Array
 
 
 class NoiseSearch:
-    """Says which levels a filter bank should try next, and which are the best so far."""
+    """Says which levels a filter bank should try next."""
 
     def __init__(self, *, settled: bool = False) -> None:
         """Take whether the levels stand, without a search."""
@@ -54,7 +54,3 @@ class NoiseSearch:
         self.settled = step.gain < WORTH_A_SEARCH
         self._before = levels
         return levels if self.settled else step.levels
-
-    def best(self, levels: NoiseLevels) -> NoiseLevels:
-        """The likeliest levels that a pass has seen, if it ends with ``levels`` to be tried yet."""
-        return levels if self.settled or self._before is None else self._before

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.maths.arrays import Vector3
+from onboard.core.maths.arrays import Vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
@@ -118,6 +118,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             attitude_delay=_finite(point["attitude_delay"]),
             heading=_finite(point.get("heading", 0.0)),
             antenna=_three(point.get("antenna", (0.0, 0.0, 0.0))),
+            shapes=vector4(_finite(x) for x in point.get("shapes", (0.0, 0.0, 0.0, 0.0))),
         ),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),

@@ -79,7 +79,7 @@ def prepare(
     maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
     start, end, measured = _subdivide(epoch_t)
     intervals = maker.intervals(start, end)
-    near = around(maker, epoch_t, point.window, np.array(point.antenna))
+    near = around(maker, epoch_t, point.window, np.array(point.antenna), np.array(point.shapes))
     regressors = model.regressors(intervals, near)
     return Prepared(
         _steps(intervals, regressors),
@@ -124,8 +124,8 @@ def _epochs(
     c: SegmentRegressors,
 ) -> Epochs:
     R_att, near = point.attitude(segment, nodes.now.t)
-    known = nodes.averaged(point.window) + nodes.swing @ segment.lever_arm_b
-    lower = np.einsum("ka,ka->k", R_att[:, 2], nodes.averaged_place(point.window))
+    known = nodes.averaged + nodes.swing @ segment.lever_arm_b
+    lower = np.einsum("ka,ka->k", R_att[:, 2], nodes.averaged_place)
     lower += STANDARD_GRAVITY * point.window**2 / 24.0
     known_height = -lower - R_att[:, 2] @ segment.lever_arm_b
     n, _, m = c.velocity_body.shape

@@ -14,6 +14,8 @@ Mask: TypeAlias = NDArray[np.bool_]
 """Boolean array."""
 Vector3: TypeAlias = tuple[float, float, float]
 """Three numbers of one place or direction, in a record that never changes."""
+Vector4: TypeAlias = tuple[float, float, float, float]
+"""Four numbers of one kind, in such a record."""
 
 
 def vector3(values: Iterable[float]) -> Vector3:
@@ -24,3 +26,13 @@ def vector3(values: Iterable[float]) -> Vector3:
     """
     x, y, z = values
     return (float(x), float(y), float(z))
+
+
+def vector4(values: Iterable[float]) -> Vector4:
+    """Four numbers for a record.
+
+    Raises:
+        ValueError: there are more or fewer.
+    """
+    a, b, c, d = values
+    return (float(a), float(b), float(c), float(d))

@@ -12,13 +12,15 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import rotation_from_vector, skew
+from onboard.core.model.linearisation import SHAPES
 from onboard.core.model.quadrature import (
     NODES_PER_SAMPLE,
     NodeMaker,
     Signals,
     turns_in_a_row,
 )
-from onboard.core.model.smoothing import Gained, weight_of_two
+from onboard.core.model.response import Response
+from onboard.core.model.smoothing import Gained
 
 AROUND_SPAN_S = 0.62
 """Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
@@ -30,72 +32,38 @@ bends by 2 % [cost]."""
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """K epochs and what is around them.
+    """K epochs and what is around them; all but ``R`` in the body axes of the epochs.
 
     Attributes:
         now: signals at the epochs, S = (K,).
         R: (K, 3, 3) body axes of the epoch to those of the segment's first node.
-        force: specific force in the axes of the first node, integrated.
-        antenna: the same at the antenna, whose velocity it is that a receiver averages and reports
-            late.
-        window: over which the receiver averages, s.
+        averaged: (K, 3) response of a receiver to the velocity that the force makes, less that
+            velocity, m/s.
+        averaged_place: (K, 3) the same of the antenna's place, m.
+        f_mean: (K, 3) mean of the force at the antenna: what a reported velocity changes by, m/s^2.
+        slope: (K, 3) derivative of the response, at the antenna, to the square of the span, m/s^3.
+        shapes: (K, 3, 4) how else velocities may be averaged that spread alike, m/s
+            (:mod:`onboard.core.model.response`).
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
-            span that it averages, body axes of the epoch, 1/s.
+            span that it averages, 1/s.
     """
 
     now: Signals
     R: Array
-    force: Gained
-    antenna: Gained
-    window: float
+    averaged: Array
+    averaged_place: Array
+    f_mean: Array
+    slope: Array
+    shapes: Array
     swing: Array
-
-    @property
-    def f_mean(self) -> Array:
-        """(K, 3) mean of the force at the antenna: what the reported velocity changes by, per s."""
-        return self._own(self.antenna.mean(self.now.t, self.window))
-
-    def averaged(self, window: float) -> Array:
-        """(K, 3) ``mean(V) - V`` of the force over ``window`` (s), axes of the epoch, m/s."""
-        return self._own(self.force.averaged(self.now.t, window))
-
-    def averaged_place(self, window: float) -> Array:
-        """(K, 3) ``mean(X) - X`` of the antenna over ``window`` (s), axes of the epoch, m."""
-        return self._own(self.antenna.averaged_place(self.now.t, window))
-
-    def slope(self, window: float) -> Array:
-        """(K, 3) derivative of the same, at the antenna, to ``window^2``, m/s^3."""
-        return self._own(self.antenna.slope(self.now.t, window, 2.0 * AROUND_SPAN_S))
-
-    def shapes(self, window: float) -> Array:
-        """(K, 3, 4) how else velocities may be averaged that spread alike over ``window``, m/s.
-
-        Two moments as far apart as the epochs, of which the newer or the older weighs more, instead
-        of the even mean over the span; what two moments do whichever way they lean; and a
-        first-order lag instead of the even mean.  At the antenna, axes of the epoch.
-        """
-        t, antenna = self.now.t, self.antenna
-        apart = min(float(np.median(np.diff(t))), AROUND_SPAN_S) if len(t) > 1 else 0.0
-        less = weight_of_two(window, apart)
-        if less <= 0.0:
-            return np.zeros((len(t), 3, 4))
-        even = antenna.averaged(t, window)
-        columns = (
-            antenna.paired(t, window, less) - even,
-            antenna.paired(t, window, 1.0 - less) - even,
-            antenna.leaning(t, window),
-            antenna.lagged(t, window) - even,
-        )
-        return np.stack([self._own(x) for x in columns], axis=-1)
-
-    def _own(self, x: Array) -> Array:
-        """In the body axes of the epochs."""
-        out: Array = (x[:, None] @ self.R)[:, 0]
-        return out
 
 
 def around(
-    maker: NodeMaker, epoch: Array, window: float = 0.0, antenna: Array | None = None
+    maker: NodeMaker,
+    epoch: Array,
+    window: float = 0.0,
+    antenna: Array | None = None,
+    shares: Array | None = None,
 ) -> Around:
     """What is around epochs.
 
@@ -104,6 +72,7 @@ def around(
         epoch: (K,) s, in order.
         window: over which the receiver averages, s.
         antenna: (3,) lever arm beyond the segment's own, body axes, m; None: none.
+        shares: (4,) of other shapes than an even mean; None: none.
     """
     followed = _Followed(maker, float(epoch[0]), float(epoch[-1]))
     lever = maker.segment.lever_arm_b + (0.0 if antenna is None else antenna)
@@ -111,7 +80,24 @@ def around(
     there = followed.gained(followed.force + followed.swung(lever))
     now = maker.signals(epoch)
     R, swing = followed.swing(now, window)
-    return Around(now, R, force, there, window, swing)
+
+    def own(x: Array) -> Array:
+        """Of the axes of the first node, (..., K, 3), in those of the epochs."""
+        out: Array = (x[..., None, :] @ R)[..., 0, :]
+        return out
+
+    shares = np.zeros(len(SHAPES)) if shares is None else shares
+    response = Response(there, epoch, window, shares, AROUND_SPAN_S)
+    return Around(
+        now,
+        R,
+        own(force.averaged(epoch, window) + response.shaped),
+        own(there.averaged_place(epoch, window)),
+        own(response.force()),
+        own(response.slope()),
+        np.moveaxis(own(response.shapes), 0, -1),
+        swing,
+    )
 
 
 def lever_velocity(w_b: Array) -> Array:

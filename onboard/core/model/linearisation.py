@@ -8,15 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.segments import Segment
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Vector4
 from onboard.core.maths.frames import rotation_from_euler
 
-MOVING = ("gps_delay", "window_squared", "attitude_delay", "heading")
+SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
+"""How a receiver may weigh what is in its span, beside an even mean."""
+MOVING = ("gps_delay", "window_squared", "attitude_delay", "heading", *SHAPES)
 """Unknowns that are estimated about the linearisation, which follows them."""
 
 LINEAR = ((1e-3, 2e-3, 5e-3, 0.02), 0.01, 0.1, 0.015, 1e-5)
-"""Moves of :data:`MOVING`, scale (1), beta (m/s^2), antenna (m) and clock (s/s) over which unknowns
-are linear well enough to find noise levels, and the point where the sums are to be made [cost]."""
+"""Moves of the first of :data:`MOVING`, scale (1), beta (m/s^2), antenna (m) and clock (s/s) over
+which unknowns are linear well enough to find noise levels, and the point where the sums are to be
+made [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,7 @@ class Linearisation:
         beta: (3,) ``-scale * offset``, m/s^2.
         delay: GPS latency, s.
         window: averaging span of the receiver, s.
+        shapes: (4,) shares of :data:`SHAPES` in how it weighs what is in its span.
         attitude_delay: lateness of the recorded attitude, s.
         heading: how much too large the recorded yaw is, rad.
         antenna: (3,) lever arm beyond the configured one, body axes, m, whose velocity latency and
@@ -45,6 +49,7 @@ class Linearisation:
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     skew: float = 0.0
     skew_from: float = 0.0
+    shapes: Vector4 = (0.0, 0.0, 0.0, 0.0)
 
     def true_time(self, stamp: Array) -> Array:
         """When what a fix with these stamps says was true, s."""
@@ -57,14 +62,17 @@ class Linearisation:
         return out
 
     @property
-    def moving(self) -> tuple[float, float, float, float]:
+    def moving(self) -> tuple[float, ...]:
         """What has been taken in of the unknowns :data:`MOVING`."""
-        return self.delay, self.window**2, self.attitude_delay, self.heading
+        return self.delay, self.window**2, self.attitude_delay, self.heading, *self.shapes
 
     def near(self, other: Linearisation, within: tuple[float, float, float, float]) -> bool:
-        """Whether no unknown has moved by as much as ``within``."""
+        """Whether no unknown has moved by as much as ``within``.
+
+        Shapes may have: where latency and span stay, what they make of a velocity is linear.
+        """
         moves = np.abs(np.subtract(self.moving, other.moving))
-        return bool(np.all(moves < np.array(within)))
+        return bool(np.all(moves[: len(within)] < np.array(within)))
 
     def stands_for(self, other: Linearisation) -> bool:
         """Whether unknowns about this point say where that one is: :data:`LINEAR`."""

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Vector4
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import cross
 from onboard.core.model.around import Around
+from onboard.core.model.linearisation import SHAPES
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
 
 AXIS = "xyz"
 ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
 """Unknowns of the recorded attitude."""
-SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
-"""How a receiver may weigh what is in its span, in the order of the columns."""
 SHAPE = 1.0
 """Prior sigma of the share that is not an even mean: the whole."""
 ANTENNA_SIGMA = 0.05
@@ -107,19 +106,21 @@ class GpsSmoothing(Family):
 
     name = "gps_smoothing"
 
-    def __init__(self, taken: float, sigma: float = 0.2) -> None:
-        """Take the window (s) of the linearisation; ``sigma`` is of ``window^2``, s^2."""
+    def __init__(
+        self, taken: float, sigma: float = 0.2, shapes: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    ) -> None:
+        """Take window (s) and shapes of the linearisation; ``sigma`` is of ``window^2``, s^2."""
         self.unknowns = (
             Unknown("window_squared", "s^2", -(taken**2), sigma),
-            *(Unknown(name, "1", 0.0, SHAPE) for name in SHAPES),
+            *(
+                Unknown(name, "1", -share, SHAPE)
+                for name, share in zip(SHAPES, shapes, strict=True)
+            ),
         )
-        self.taken = taken
 
     def velocity(self, around: Around) -> Direct:
-        """Mean over the span less the value, per s^2 of ``window^2``; the other shapes less it."""
-        shapes = around.shapes(self.taken)
-        body = np.concatenate([around.slope(self.taken)[..., None], shapes], axis=-1)
-        return Direct(body=body)
+        """Slope of the response to ``window^2``; the other shapes less the mean over the span."""
+        return Direct(body=np.concatenate([around.slope[..., None], around.shapes], axis=-1))
 
     def position(self, around: Around) -> Direct:
         """``a / 24``: the mean of a parabola over the span, in whichever shape."""

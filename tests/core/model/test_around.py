@@ -45,7 +45,7 @@ def test_forces_are_averaged_in_the_axes_of_the_epoch(window, recorded):
     v = np.concatenate([np.zeros((3, 1, 3)), np.cumsum(0.5 * (f[:, 1:] + f[:, :-1]), axis=1)], 1)
     v *= s[1] - s[0]
     mean = np.trapezoid(v, s, axis=1) / window - v[:, len(s) // 2]
-    np.testing.assert_allclose(made.averaged(window), mean, atol=1e-4)
+    np.testing.assert_allclose(made.averaged, mean, atol=1e-4)
     np.testing.assert_allclose(made.now.f_b, force(EPOCH), atol=2e-4)
 
 
@@ -62,10 +62,10 @@ def test_vibration_is_averaged_away(frequency, window):
     made = around(nodes, np.arange(0.0033, 18.0, 0.2), window)
     # A sine's mean is at most its swing over half its phase; its integral over the whole of it.
     most = swing / (np.pi * frequency)
-    assert np.abs(made.averaged(window)).max() < most / 2.0 * (1.0 + most / swing)
+    assert np.abs(made.averaged).max() < most / 2.0 * (1.0 + most / swing)
     if window:
         assert np.abs(made.f_mean).max() < most / window
-    assert np.abs(made.slope(window)).max() < most / max(window, RESOLVED_S) ** 2
+    assert np.abs(made.slope).max() < most / max(window, RESOLVED_S) ** 2
 
 
 @pytest.mark.parametrize("window", [0.0, 0.05, 0.1, 0.31, 0.45, 0.8])
@@ -178,7 +178,7 @@ def test_two_moments_that_spread_too_little_are_halves_further_apart():
 
 def test_without_a_span_there_are_no_shapes():
     made = around(maker(100.0), EPOCH, 0.0)
-    assert not made.shapes(0.0).any()
+    assert not made.shapes.any()
 
 
 @pytest.mark.parametrize(("centre", "width"), [(0.0, 0.3), (0.1, 0.05), (-0.2, 0.013)])

@@ -6,7 +6,7 @@ import pytest
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.frames import rotation_from_euler
-from onboard.core.model.linearisation import MOVING, Linearisation
+from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.gps_lever_arm import GpsLeverArm
 
@@ -48,7 +48,7 @@ def test_a_nuisance_gives_way_to_the_effect_with_its_columns():
 def test_the_linearisation_follows_its_unknowns():
     model = calibration_model(Linearisation())
     theta = model.prior.copy()
-    asked = dict(zip(MOVING, (0.03, 0.04, 0.05, -0.2), strict=True))
+    asked = dict(zip(MOVING, (0.03, 0.04, 0.05, -0.2, 0.2, 0.1, -0.3, 0.4), strict=True))
     for name, value in asked.items():
         theta[model.index[name]] = value
     arm = (0.04, -0.03, 0.02)
@@ -57,5 +57,22 @@ def test_the_linearisation_follows_its_unknowns():
     after = moved(point, model, theta)
     assert after.antenna == arm
     assert np.subtract(after.moving, point.moving) == pytest.approx(list(asked.values()))
+    assert after.shapes == pytest.approx((0.2, 0.1, -0.3, 0.4))
     assert not after.near(point, (0.02, 1.0, 1.0, 1.0))
     assert after.near(point, (0.04, 0.05, 0.06, 0.3))
+
+
+def test_no_shape_of_a_response_is_taken_for_more_than_the_whole_or_less_than_nothing():
+    model = calibration_model(Linearisation())
+    theta = model.prior.copy()
+    for name, value in zip(SHAPES, (7.7, -0.3, -2.1, 1.4), strict=True):
+        theta[model.index[name]] = value
+    after = moved(Linearisation(window=0.3, shapes=(0.5, 0.0, 0.0, 0.2)), model, theta)
+    assert after.shapes == (1.0, 0.0, -1.0, 1.0)
+
+
+def test_shapes_alone_ask_for_no_other_linearisation():
+    # What they make of a velocity is linear where latency and span stay.
+    one, other = Linearisation(window=0.3), Linearisation(window=0.3, shapes=(1.0, 0.5, -0.4, 0.3))
+    assert one.near(other, (1e-9, 1e-9, 1e-9, 1e-9))
+    assert one.stands_for(other)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.nuisances import SHAPES
+from onboard.core.model.linearisation import SHAPES, Linearisation
 from onboard.core.physics.effect import SURE, Bearing, Cure, Effect, NuisanceFit
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.core.physics.wording import first, measured
@@ -40,7 +39,8 @@ class GpsSmoothing(Effect):
     @classmethod
     def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
         """No averaging at all, in no shape; the unknown is the square of the span."""
-        return {"window_squared": -(point.window**2), **dict.fromkeys(SHAPES, 0.0)}
+        shapes = {name: -share for name, share in zip(SHAPES, point.shapes, strict=True)}
+        return {"window_squared": -(point.window**2), **shapes}
 
     @classmethod
     def size(cls, found: Finding) -> str:
