@@ -103,6 +103,7 @@ LOOKS: tuple[str, ...] = (
     "headings set anew put right, and force noise by the samples' restlessness, or neither",
     "the receiver's response a mixture of shapes, spans to 1.2 s, no touch-downs, or as it was",
     "attitudes that follow the gyroscope, no rolling, noise as the velocity walks, or as it was",
+    "the receiver's shapes in the linearisation, jumps where half of the best is, or as it was",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
@@ -116,6 +117,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-25",
     "2026-11-25-2",
     "2026-11-25-3",
+    "2026-11-26",
 )
 """Releases that have been judged."""
 
