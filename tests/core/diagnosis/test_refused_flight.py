@@ -167,8 +167,8 @@ def test_a_flight_with_a_failing_receiver_is_never_explained(recordings):
 
     To 132 s the copter holds 52 to 55 degrees of roll while the velocity that is reported goes to
     and fro by 10 m/s; from 124.8 to 131.0, 132.6 to 142 and 162 to 171 s that velocity differs by
-    2 to 20 m/s from the rate of change of the same receiver's position, and at the end of the second
-    of these it comes back by 6 m/s in 0.6 s, until 142.8 s.
+    2 to 20 m/s from the rate of change of the same receiver's position, and until 142.8 s it comes
+    back by 6 m/s in 0.6 s.
     """
     from onboard.answers.explain import explain  # noqa: PLC0415 - not needed without the recordings
 
