@@ -5,7 +5,7 @@ can do.  This one asks a simulator that shares no code with this project, with w
 ``SIM_*`` parameters, of which some change in flight.  Every flight has errors of all six numbers of
 the calibration, gyroscopes whose scales are up to 3 % off and a receiver that is late, so that
 every flight is asked for them, besides one effect or none.  A hash of the answer is printed before
-it flies.
+it flies.  With ``--weather`` there is :mod:`benchmarks.flown_weather` on top.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.flown_sealed import SIGMAS, UNCHECKED, WITHIN, printed
+from benchmarks.flown_weather import weather as weather_of
 from onboard.answers.explain import explain
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.inputs.samples import ImuSample
@@ -220,13 +221,19 @@ def scored(secret: Secret, d: Diagnosis, changed: float | None) -> Score:
 
 
 def lines(
-    seeds: range, *, seconds: float, speedup: float, keep: Path | None = None
+    seeds: range,
+    *,
+    seconds: float,
+    speedup: float,
+    keep: Path | None = None,
+    weather: bool = False,
 ) -> Iterator[str]:
     """A row for each flight, and what they come to; logs stay in the folder ``keep``, if any."""
     total = Score()
     for seed in seeds:
         s = drawn(seed)
-        what = f"{seed} {s.vehicle}"
+        words, air = weather_of(seed, s.vehicle) if weather else ([], {})
+        what = " ".join([f"{seed} {s.vehicle}", *words])
         yield f"{what}, sealed {s.seal}"
         with tempfile.TemporaryDirectory(prefix="sealed-") as folder:
             log = (keep or Path(folder)) / f"{seed}.BIN"
@@ -235,7 +242,7 @@ def lines(
                     fly(
                         s.vehicle,
                         log,
-                        parameters={"SIM_WIND_TURB": 0.0, **UNCHECKED, **s.parameters},
+                        parameters={"SIM_WIND_TURB": 0.0, **UNCHECKED, **s.parameters, **air},
                         seconds=seconds,
                         speedup=speedup,
                         seed=seed,
@@ -250,8 +257,8 @@ def lines(
         at = next(iter(changed.values()), None)
         score = scored(s, found.diagnosis, None if at is None else at - first)
         total.add(score)
-        words = [", ".join(sorted(s.names)) or "nothing", found.diagnosis.verdict.value]
-        yield f"{what}: {'; '.join(words + score.words)}"
+        said = [", ".join(sorted(s.names)) or "nothing", found.diagnosis.verdict.value]
+        yield f"{what}: {'; '.join(said + score.words)}"
     yield str(total)
 
 
@@ -259,6 +266,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Print the rows, or why there are none."""
     options = argparse.ArgumentParser(description="Sensor errors in flights of ArduPilot's SITL.")
     options.add_argument("--keep", type=Path, help="a folder for the logs")
+    options.add_argument("--weather", action="store_true", help="gusts, shaking, noise and more")
     printed(lines, options, arguments)
 
 

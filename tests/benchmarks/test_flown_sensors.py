@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks.flown_sensors import ALWAYS, AXES, EFFECTS, TOLD_S, drawn, scored
+from benchmarks.flown_weather import CONDITIONS, MOST, weather
 from onboard.core.estimate.result import Status
 from onboard.core.physics.catalogue import kind_of
 from onboard.core.physics.finding import Quantity
@@ -31,6 +32,21 @@ def test_every_effect_is_drawn():
     names = set().union(*(drawn(seed).names for seed in range(40)))
     assert len(names) == len(EFFECTS) - 1
     assert not names & ALWAYS
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_seed_has_one_weather_and_it_changes_nothing_that_is_asked(seed):
+    secret = drawn(seed)
+    words, parameters = weather(seed, secret.vehicle)
+    assert (words, parameters) == weather(seed, secret.vehicle)
+    assert 1 <= len(words) <= MOST
+    # A receiver may have another rate; nothing else of what is told is another one.
+    assert set(parameters) & set(secret.parameters) <= {"SIM_GPS1_HZ"}
+
+
+def test_every_weather_is_drawn():
+    words = {word for seed in range(60) for word in weather(seed, "copter")[0]}
+    assert len(words) == len(CONDITIONS)
 
 
 def found(secret, effects, off=0.0):
