@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.maths.arrays import Vector3, vector4
+from onboard.core.maths.arrays import vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
@@ -111,14 +111,14 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
         None if e["device_id"] is None else _finite(e["device_id"]),
         prior,
         Linearisation(
-            scale=_three(point["scale"]),
-            beta=_three(point["beta"]),
+            scale=vector3(map(_finite, point["scale"])),
+            beta=vector3(map(_finite, point["beta"])),
             delay=_finite(point["delay"]),
             window=_finite(point["window"]),
             attitude_delay=_finite(point["attitude_delay"]),
             heading=_finite(point.get("heading", 0.0)),
-            antenna=_three(point.get("antenna", (0.0, 0.0, 0.0))),
-            shapes=vector4(_finite(x) for x in point.get("shapes", (0.0, 0.0, 0.0, 0.0))),
+            antenna=vector3(map(_finite, point.get("antenna", (0.0, 0.0, 0.0)))),
+            shapes=vector4(map(_finite, point.get("shapes", (0.0, 0.0, 0.0, 0.0)))),
         ),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
@@ -131,8 +131,3 @@ def _finite(value: float | str) -> float:
     if not math.isfinite(number):
         raise ValueError("a number that is not finite")
     return number
-
-
-def _three(values: tuple[float, ...]) -> Vector3:
-    x, y, z = values
-    return (_finite(x), _finite(y), _finite(z))

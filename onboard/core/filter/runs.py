@@ -2,9 +2,9 @@
 
 What :class:`~onboard.core.filter.whitening.WhiteningFilter` does to an epoch of which a gate
 refuses nothing, and of which nothing is in the tail of its distribution, epoch after epoch, until
-one is not like that.  Equal to it to rounding, in all 18 states.  numba notices changes of this
-file alone: whoever changes :mod:`~onboard.core.filter.loops` or
-:mod:`~onboard.core.filter.motion` has to touch this one, too.
+one is not like that.  Equal to it to rounding, in all 18 states
+(:mod:`~onboard.core.filter.state`).  numba notices changes of this file alone: whoever changes
+:mod:`~onboard.core.filter.loops` or :mod:`~onboard.core.filter.motion` has to touch this one, too.
 """
 
 from __future__ import annotations

@@ -77,13 +77,13 @@ class Response:
 
     def _less_even(self, which: Sequence[int], window: float, t: Array) -> list[Array]:
         """Some of the shapes less the even mean, each (K, 3)."""
-        v, newer = self._velocity, weight_of_two(window, self._apart)
-        if newer <= 0.0:
+        v, less = self._velocity, weight_of_two(window, self._apart)
+        if less <= 0.0:
             return [np.zeros((len(t), 3)) for _ in which]
         even = v.averaged(t, window)
         shapes: tuple[Callable[[], Array], ...] = (
-            lambda: v.paired(t, window, newer) - even,
-            lambda: v.paired(t, window, 1.0 - newer) - even,
+            lambda: v.paired(t, window, less) - even,
+            lambda: v.paired(t, window, 1.0 - less) - even,
             lambda: v.leaning(t, window),
             lambda: v.lagged(t, window) - even,
         )

@@ -129,7 +129,6 @@ def test_it_is_found_to_the_second(full, off, reach):
     assert jumps.shock_instead(full, found) is None
 
 
-@pytest.mark.slow
 def scan(gain):
     """Moments of a scan of 300 s, and what a jump there explains."""
     return [
@@ -158,6 +157,7 @@ def test_a_jump_is_looked_for_no_further_away_than_it_is_told():
     assert jumps.reach_of_scan(scan(lambda t: 900.0 - t)) == FORGOTTEN_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [11, 12])
 def test_a_blow_just_before_the_end_of_a_flight_is_no_jump(seed):
     blow = Shock(time=LANDED - 4.0, x=-2.0, y=3.0, z=-4.0, turn=(0.05, -0.04))
