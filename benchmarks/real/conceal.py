@@ -23,7 +23,8 @@ import numpy as np
 
 from benchmarks.real.command import building
 from benchmarks.real.concealed import KINDS
-from benchmarks.real.concealed_kind import Kind, about
+from benchmarks.real.concealed_kind import Array, Kind, about
+from benchmarks.real.concealed_response import weighed
 from benchmarks.real.flights import judged, told
 from benchmarks.real.outcomes import LEGEND, Outcome, Said, compared, table
 from benchmarks.real.split import RealFlight
@@ -74,6 +75,13 @@ def said(judge: Judge) -> Said:
     return Said(diagnosis.verdict.value, names, numbers, blind, smallest)
 
 
+def response(untouched: Judge, fix_step: float) -> Array:
+    """(2, K) how the receiver weighs what is around a fix, as the untouched flight says."""
+    engine = untouched.engine
+    point = engine.asked(engine.found().theta)
+    return weighed(point.window, point.shapes, fix_step)
+
+
 def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float, float]]:
     """What the untouched flight says of an effect that was found in the other one only.
 
@@ -110,8 +118,8 @@ def flown(flight: RealFlight, kinds: Sequence[Kind], imu: int = 1) -> list[Outco
         before = said(untouched)
     except (ArithmeticError, LookupError, ValueError) as error:
         return [Outcome(flight.name, k.name, k.wanted, why=str(error)) for k in kinds]
-    span = float(np.sqrt(max(before.numbers["window_squared"][0], 0.0)))
-    ground = about(samples, imu, late=before.numbers["gps_delay"][0], window=span)
+    late = before.numbers["gps_delay"][0]
+    ground = replace(ground, late=late, response=response(untouched, ground.fix_step))
     out = []
     for kind in kinds:
         if not kind.applies(ground):

@@ -114,7 +114,7 @@ def antenna(axis: int, arm: float) -> Kind:
 
 
 def _on_arm(samples: Sequence[Sample], ground: About, r: Array) -> Iterator[Sample]:
-    """Velocity gains ``R (w x r)`` and position ``R r``, as the receiver averages them."""
+    """Velocity gains ``R (w x r)`` and position ``R r``, as the receiver weighs them."""
     attitude = [s for s in samples if isinstance(s, AttitudeSample)]
     rates = [
         s for s in samples if isinstance(s, ImuSample) and s.imu == ground.imu and s.w_b is not None
@@ -122,15 +122,15 @@ def _on_arm(samples: Sequence[Sample], ground: About, r: Array) -> Iterator[Samp
     t_a, t_w = np.array([s.t for s in attitude]), np.array([s.t for s in rates])
     angles = np.unwrap(np.array([(s.roll, s.pitch, s.yaw) for s in attitude]), axis=0)
     w_b = np.array([s.w_b for s in rates])
-    span = np.linspace(-0.5, 0.5, 9) * ground.window
+    span, weights = ground.response
 
     def change(fix: GpsFix) -> GpsFix:
         t = fix.t - ground.late + span
         a = np.stack([np.interp(t, t_a, angles[:, j]) for j in range(3)], axis=-1)
         w = np.stack([np.interp(t, t_w, w_b[:, j]) for j in range(3)], axis=-1)
         R = [from_angles(*row) for row in a]
-        v = np.mean([m @ np.cross(rate, r) for m, rate in zip(R, w, strict=True)], axis=0)
-        p = np.mean([m @ r for m in R], axis=0)
+        v = weights @ np.array([m @ np.cross(rate, r) for m, rate in zip(R, w, strict=True)])
+        p = weights @ np.array([m @ r for m in R])
         return replace(
             fix,
             v_n=fix.v_n + float(v[0]),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real.concealed_response import at_once
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ class About:
         warms_by: range of its temperature in moving flight, K; 0 where it has none.
         fix_step: between fixes, s.
         late: of the GPS against its stamps, s, as the untouched flight says.
-        window: averaging span of the receiver, s, likewise.
+        response: (2, K) moments about that, s, and how the receiver weighs them, likewise.
     """
 
     imu: int
@@ -39,7 +40,7 @@ class About:
     warms_by: float
     fix_step: float
     late: float = 0.0
-    window: float = 0.0
+    response: Array = field(default_factory=at_once)
 
 
 Lay = Callable[[Sequence[Sample], About], Iterable[Sample]]
@@ -67,7 +68,7 @@ class Kind:
     applies: Callable[[About], bool] = lambda _: True
 
 
-def about(samples: Sequence[Sample], imu: int, *, late: float = 0.0, window: float = 0.0) -> About:
+def about(samples: Sequence[Sample], imu: int) -> About:
     """What the samples say of themselves.
 
     Raises:
@@ -97,8 +98,6 @@ def about(samples: Sequence[Sample], imu: int, *, late: float = 0.0, window: flo
         0.5 * (moving[0] + moving[-1]),
         max(degrees) - min(degrees) if degrees else 0.0,
         float(np.median(np.diff([f.t for f in fixes]))),
-        late,
-        window,
     )
 
 
