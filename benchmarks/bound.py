@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
@@ -24,7 +24,6 @@ DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
 GYRO_SCALE, ROLL, PITCH, YAW, ARM = slice(29, 32), 32, 33, 34, slice(35, 38)
 TURNING, SIZE = 38, 39
 """The rate of the smooth error of the heading is the last state."""
-_K = 1.0 / HEADING_TIME_S
 
 PRIOR = (
     (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
@@ -59,8 +58,8 @@ def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
             F[:] = eye
             F[range(10, 17), range(10, 17)] = keep
             F[ATT.stop - 1, TURNING] = step
-            F[TURNING, ATT.stop - 1] = -step * _K**2
-            F[TURNING, TURNING] = 1.0 - 2.0 * step * _K
+            F[TURNING, ATT.stop - 1] = -step / levels.heading_time**2
+            F[TURNING, TURNING] = 1.0 - 2.0 * step / levels.heading_time
             turn = _turn(R, path.w_b[m], rates[m]) * step
             lean = -cross_matrix(R @ f) * step
             push = np.hstack([R * f, R]) * step
@@ -79,7 +78,7 @@ def _start(q: NoiseLevels) -> Array:
         sigma[where] = value
     sigma[PSI] = (0.06, 0.06, 0.2)
     sigma[ATT] = (q.attitude, q.attitude, q.heading)
-    sigma[TURNING] = _K * q.heading
+    sigma[TURNING] = q.heading / q.heading_time
     sigma[COLOUR] = q.velocity_colour
     return np.diag(sigma**2)
 
@@ -93,7 +92,8 @@ def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
     var[V], var[PSI] = q.force_walk**2 * step, q.tilt_walk**2 * step
     var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
     var[ATT] = q.attitude**2 * (1.0 - keep[:3] ** 2)
-    var[TURNING] = 4.0 * _K**3 * q.heading**2 * step
+    var[ATT.stop - 1] = q.heading_walk**2 * step
+    var[TURNING] = 4.0 * q.heading**2 * step / q.heading_time**3
     var[COLOUR] = q.velocity_colour**2 * (1.0 - keep[4] ** 2)
     return np.diag(var), keep
 

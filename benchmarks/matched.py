@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.recorded import Array, Flight
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 from sitl.builtin import rotation
@@ -42,6 +42,8 @@ LEVELS = NoiseLevels(
     bias_walk=4e-5,
     attitude=0.03,
     heading=0.08,
+    heading_time=7.0,
+    heading_walk=5e-4,
     jitter=0.008,
 )
 """A common receiver and common MEMS; none of the values the search for levels begins with."""
@@ -121,14 +123,16 @@ def _mean(x: Array, window_s: float) -> Array:
     )
 
 
-def _smooth(rng: np.random.Generator, n: int, step: float, time: float) -> Array:
-    """(n,) of unit variance: critically damped, driven by white noise, in small steps."""
-    x, u, k = float(rng.standard_normal()), float(rng.standard_normal()) / time, 1.0 / time
-    kicks = 2.0 * k**1.5 * np.sqrt(step) * rng.standard_normal(n)
+def _heading(rng: np.random.Generator, n: int, step: float, q: NoiseLevels) -> Array:
+    """(n,) rad: critically damped, driven by white noise, in small steps; and it walks."""
+    k = 1.0 / q.heading_time
+    x, u = q.heading * rng.standard_normal(), k * q.heading * rng.standard_normal()
+    kicks = 2.0 * q.heading * k**1.5 * np.sqrt(step) * rng.standard_normal(n)
+    walks = q.heading_walk * np.sqrt(step) * rng.standard_normal(n)
     out = np.empty(n)
     for i in range(n):
         u += kicks[i] - (2.0 * k * u + k * k * x) * step
-        x += u * step
+        x += u * step + walks[i]
         out[i] = x
     return out
 
@@ -197,7 +201,8 @@ def _attitude(path: Path, rng: np.random.Generator, q: NoiseLevels) -> Timed:
     nearest = np.clip(np.round((t - START_S) * GPS_HZ), 0, len(epochs) - 1).astype(int)
     white = q.attitude_white * rng.standard_normal((len(epochs), 3))[nearest]
     tilt = q.attitude * _gauss_markov(rng, len(t), 1.0 / IMU_HZ, ATTITUDE_TIME_S)[:, :2]
-    slow = np.column_stack([tilt, q.heading * _smooth(rng, len(t), 1.0 / IMU_HZ, HEADING_TIME_S)])
+    turned = _heading(rng, len(t), 1.0 / IMU_HZ, q)
+    slow = np.column_stack([tilt, turned])
     body = np.array([*TILT_OFFSET * rng.standard_normal(2), 0.0])
     heading = np.array([0.0, 0.0, HEADING_OFFSET * rng.standard_normal()])
     R = path.R_nb[path.imu] @ rotation.from_vector(np.tile(body, (len(t), 1)))

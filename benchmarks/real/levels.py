@@ -29,6 +29,7 @@ SHORT = {
     "bias_walk": "bias",
     "attitude": "att",
     "heading": "head",
+    "heading_time": "for s",
 }
 GATES = ("velocity", "recovery", "height", "tilt", "heading")
 

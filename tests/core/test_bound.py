@@ -34,16 +34,18 @@ def whole(flown):
 
 @pytest.mark.slow
 def test_claims_are_what_physics_allows(flown, whole):
-    flight = draw(flown, 3)
-    scale = flight.truth[1][:3]
-    limit = whole * np.concatenate([scale, 1.0 / scale])
-    c = fed(flight.samples).calibration(1)
-    # The bound takes the gyroscope's axes for those of the accelerometer, and here they are.
-    claimed = c.sigma_with_its_gyroscope / limit
-    # Levels of noise are found from one flight only, and colour may be claimed for chance.
-    assert np.all(claimed > 0.8), claimed
-    assert np.all(claimed < 1.8), claimed
-    assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
+    claimed = []
+    for seed in (3, 4, 5):
+        flight = draw(flown, seed)
+        scale = flight.truth[1][:3]
+        limit = whole * np.concatenate([scale, 1.0 / scale])
+        c = fed(flight.samples).calibration(1)
+        # The bound takes the gyroscope's axes for those of the accelerometer, and here they are.
+        claimed.append(c.sigma_with_its_gyroscope / limit)
+        assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
+    # Levels are found from one flight only, and its blocks may contradict each other by chance.
+    assert np.all(np.min(claimed, axis=0) > 0.8), claimed
+    assert np.all(np.median(claimed, axis=0) < 1.5), claimed
 
 
 @pytest.mark.slow

@@ -36,6 +36,7 @@ from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
+from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged, total
 from onboard.core.model.around import AROUND_SPAN_S
@@ -98,6 +99,7 @@ class Engine:
         self.noise = noise or NoiseLevels()
         self._uses = uses or Uses()
         self.batches: list[Batch] = []
+        self._heading = SteadyHeading()
         self.sample: Sequence[Sequence[Batch]] | None = None
         """Runs of batches on which timing and noise are found; None: the whole buffer."""
         self.aged: list[Block] = []
@@ -186,7 +188,9 @@ class Engine:
 
     def add(self, batch: Batch) -> None:
         """Process a batch."""
-        self.batches.append(batch)
+        fresh = [i for i, before in enumerate([*self.batches, batch]) if before.fresh]
+        run = slice(fresh[-1] if fresh else 0, None)
+        self.batches[run] = self._heading.joined(self.batches[run], batch)
         self._waiting += 1
         self._solution = None
         self._buffered_s += batch.duration

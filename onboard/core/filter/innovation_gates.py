@@ -5,9 +5,10 @@ chi-square distribution that it has if the filter's model is right.
 
 A velocity outside its gate is refused until it has been inside, and steady, for a while.  A height
 that stays outside is no fault but a new reference, and the caller is told so.  The recorded
-attitude comes from a filter that carries it with the gyroscope: it is never wrong for one epoch,
-but it is set anew at times (an alignment in flight, another compass, another core).  So what is
-outside begins anew at once, tilt and heading each for itself, and is not refused.
+attitude comes from a filter that carries it with the gyroscope: it is never wrong for one epoch.
+But it is set anew at times (an alignment in flight, another compass, another core), or pulled
+after a compass that is off by as much as half a radian a second.  So no gate refuses it; what is in
+the tail of its distribution is a move of its own, tilt and heading each for itself.
 """
 
 from __future__ import annotations
@@ -18,9 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.filter.limits import (
-    GATE_HEADING,
     GATE_HEIGHT,
-    GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
     RECEIVER_M_S,
@@ -36,8 +35,6 @@ from onboard.core.maths.arrays import Array
 GATES = (
     ("v", "velocity", GATE_VELOCITY),
     ("h", "height", GATE_HEIGHT),
-    ("t", "tilt", GATE_TILT),
-    ("y", "heading", GATE_HEADING),
 )
 
 
@@ -62,7 +59,7 @@ def _nis_of_any_receiver(E: Array, theta: Array, C: Array, whitener: Array) -> f
 
 
 def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float]:
-    """By what factor the variance of velocity and height is larger than it is taken for.
+    """By what factor the variance of a kind of measurement is larger than it is taken for.
 
     Args:
         kinds: one letter for each of the r innovations, as in
@@ -76,7 +73,7 @@ def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float
     """
     out: dict[str, float] = {}
     squares = innovations * innovations
-    for kind in "vh":
+    for kind in "vhty":
         n = kinds.count(kind)
         if n == 0:
             continue
@@ -94,10 +91,9 @@ class GateRefusal:
     """A measurement that a gate refused.
 
     Attributes:
-        name: ``velocity``, ``height``, ``tilt``, ``heading``, or ``recovery`` for a velocity inside
-            the gate that was outside a moment ago.
-        renewed: whether it is a new reference: a height that has been outside for so long, a tilt
-            or a heading.
+        name: ``velocity``, ``height``, or ``recovery`` for a velocity inside the gate that was
+            outside a moment ago.
+        renewed: whether it is a new reference: a height that has been outside for so long.
     """
 
     name: str
@@ -189,7 +185,7 @@ class InnovationGates:
         if kind == "v":
             self._velocity_off, self._good = True, []
             return GateRefusal(name)
-        return GateRefusal(name, renewed=kind != "h" or self._outlasts(t))
+        return GateRefusal(name, renewed=self._outlasts(t))
 
     def _recovers(self, t: float, innovation: Array) -> bool:
         """True while a receiver that was off has not been right, and steady, for long enough.

@@ -47,8 +47,8 @@ class Process(NamedTuple):
 
     Attributes:
         fall: (MEASURED,) what is added to the states at ``theta = 0``.
-        decay: (MEASURED,) factors that the slow errors decay by.
-        swing: (3,) what the rate of the heading's error adds to it, what that error leaves of the
+        decay: (B, MEASURED) factors that the slow errors decay by.
+        swing: (B, 3) what the rate of the heading's error adds to it, what that error leaves of the
             rate, and what the rate leaves of itself.
         before: (B, STATES) process noise before the transition, unit of the state squared.
         after: (B, STATES) the same after it.
@@ -163,14 +163,15 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     var = diagonal(carried, m1)
     var += process.before
     carried[:, :MEASURED] = F @ carried[:, :ERRORS]
-    added, back, kept = process.swing.tolist()
+    added, back, kept = process.swing.T[:, :, None]
     rate = back * carried[:, HEADING] + kept * carried[:, RATE]
-    carried[:, ERRORS:RATE] *= process.decay[:, None]
+    carried[:, ERRORS:RATE] *= process.decay[:, :, None]
     carried[:, HEADING] += added * carried[:, RATE]
     carried[:, RATE] = rate
     P[..., :MEASURED] = P[..., :ERRORS] @ F.T
+    added, back, kept = added[..., None], back[..., None], kept[..., None]
     rate = back * P[..., HEADING] + kept * P[..., RATE]
-    P[..., ERRORS:RATE] *= process.decay
+    P[..., ERRORS:RATE] *= process.decay[:, None, None]
     P[..., HEADING] += added * P[..., RATE]
     P[..., RATE] = rate
     var += process.after

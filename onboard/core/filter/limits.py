@@ -19,9 +19,12 @@ RECEIVER_M_S: Final = 0.1
 refuse is a fault, and has to be 5.5 of these besides [data sheet: 0.05 m/s is the median error of
 velocity, of the best receivers and at a steady speed]."""
 TAIL: Final = {1: 6.63, 2: 9.21, 3: 11.34}
-"""Normalised innovation squared, by degrees of freedom, past which a velocity or a height is in the
-tail of its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger
-as the figure is, so that it pulls no more than one at the edge does (Huber, 1964)."""
+"""Normalised innovation squared, by degrees of freedom, past which a measurement is in the tail of
+its noise [probability: 1 % of a Gaussian's].  Its variance is then taken for as much larger as the
+figure is, so that it pulls no more than one at the edge does (Huber, 1964)."""
+ANEW: Final = {"t": 30.0 / TAIL[2], "y": 30.0 / TAIL[1]}
+"""By what factor that of the recorded tilt or heading is larger where it counts as set anew: an
+alignment in flight, another compass, another core [probability: 3e-7, 4e-8]."""
 _FAULTY: Final = 2.0 * math.log(1e3)
 ANYTHING: Final = {
     "vvv": _FAULTY + 6.0 * math.log(60.0),
@@ -30,16 +33,8 @@ ANYTHING: Final = {
 }
 """Minus twice the log-likelihood of a measurement that may be anything: one of a thousand is, and
 then it is anywhere within 30 m/s, 100 m [physics]."""
-RENEWED: Final = _FAULTY
-"""The same of an error of the recorded attitude that begins anew: at one epoch of a thousand
-[probability; where it begins is in the covariance]."""
 GATE_HEIGHT: Final = 30.0
 """The same of height [probability: 4e-8 with one degree of freedom; tuned]."""
-GATE_TILT: Final = 30.0
-"""The same of the recorded tilt, past which its error begins anew [probability: 3e-7 with two
-degrees of freedom]."""
-GATE_HEADING: Final = 30.0
-"""The same of the recorded heading [probability: 4e-8 with one degree of freedom]."""
 PATIENCE_S: Final = 3.0
 """s; a height that is refused for longer is a new reference (other satellites), not a fault
 [tuned]."""
@@ -54,9 +49,6 @@ RECOVERY_DRIFT: Final = 0.3
 RENEWED_HEIGHT_VAR: Final = 1e4
 """m^2; what is added to the variance of the height's reference when it is a new one [physics: no
 two references are further apart than 100 m]."""
-RENEWED_ATTITUDE_VAR: Final = 0.3**2
-"""rad^2; the same of the error of the recorded attitude [physics: past it, angles are not small;
-what is further off begins anew again]."""
 
 # Where a filter starts (whitening, passes).
 
@@ -101,11 +93,6 @@ COLOUR_TIME_S: Final = 3.0
 ATTITUDE_TIME_S: Final = 30.0
 """Of the recorded tilt: an EKF learns the accelerometer's bias, and forgets the tilt that it
 took it for, in some tens of seconds [physics]."""
-HEADING_TIME_S: Final = 5.0
-"""Of the smooth error of the recorded heading: an EKF follows its compass, or the course, within
-some seconds [likelihood: of 5, 10 and 20 s the best on three of eight flights that were built on,
-by 10 to 60; on five 10 s is, by 50 to 170.  Of 5, 7, 10 and 20 s the offsets of simulated copters
-err least with 5]."""
 
 STAMP_JITTER_S: Final = 8e-4
 """s; by how much a recorded attitude's stamp may be off beside a constant delay: whole milliseconds
@@ -124,6 +111,8 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "bias_walk": (1e-6, 3e-3),
     "attitude": (0.02, 0.3),
     "heading": (0.05, 0.6),
+    "heading_time": (2.0, 60.0),
+    "heading_walk": (5e-5, 0.03),
     "attitude_white": (3e-5, 0.03),
     "jitter": (3e-4, 0.2),
 }

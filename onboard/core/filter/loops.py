@@ -112,8 +112,8 @@ def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1],"
-    " f8[:,::1])"
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
+    " f8[:,::1], f8[:,::1])"
 )
 def predict(
     carried: Array,
@@ -138,14 +138,16 @@ def predict(
             C[i, m1 + i] += before[b, i]
         _from_the_left(F, C)
         angle, rate = C[HEADING], C[RATE]
+        kept, added = decay[b, MEASURED - 1], swing[b, 0]
+        back, rate_kept = swing[b, 1], swing[b, 2]
         for c in range(columns):
             x, u = angle[c], rate[c]
-            angle[c] = decay[MEASURED - 1] * x + swing[0] * u
-            rate[c] = swing[1] * x + swing[2] * u
+            angle[c] = kept * x + added * u
+            rate[c] = back * x + rate_kept * u
         for i in range(MEASURED - 1):
-            C[ERRORS + i] *= decay[i]
+            C[ERRORS + i] *= decay[b, i]
         for at in range(m1, columns, STATES):
-            _from_the_right(F, decay, swing, C[:, at : at + STATES])
+            _from_the_right(F, decay[b], swing[b], C[:, at : at + STATES])
         for i in range(STATES):
             C[i, m1 + i] += after[b, i]
         _drive(R_nb, stack, C)

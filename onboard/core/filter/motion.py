@@ -73,11 +73,13 @@ def carry(
     walk: Array,
     settled: Array,
     times: Array,
+    heading_time: Array,
     gravity: float,
     earth: int,
 ) -> None:
     """One step of prediction, attitude included."""
-    fall, decay, w = np.zeros(MEASURED), np.ones(MEASURED), np.zeros(3)
+    members = len(walk)
+    fall, decay, w = np.zeros(MEASURED), np.ones((members, MEASURED)), np.zeros(3)
     if earth:
         north, east = mean(carried, 0, theta), mean(carried, 1, theta)
         down = mean(carried, 2, theta)
@@ -90,19 +92,21 @@ def carry(
         w[0] += EARTH_RATE * c
         w[2] -= EARTH_RATE * s
     fall[2], fall[3] = gravity * T, -0.5 * T * T * gravity
-    decay[0] = decay[1] = decay[2] = math.exp(-T / times[0])
-    decay[4] = decay[5] = math.exp(-T / times[1])
-    swing = np.empty(3)
-    x = T / times[2]
-    shrunk = math.exp(-x)
-    decay[6] = (1.0 + x) * shrunk
-    swing[0], swing[1], swing[2] = T * shrunk, -x / times[2] * shrunk, (1.0 - x) * shrunk
+    colour, tilt = math.exp(-T / times[0]), math.exp(-T / times[1])
+    swing = np.empty((members, 3))
     before, after = np.empty(walk.shape), np.empty(walk.shape)
-    for b in range(len(walk)):
+    for b in range(members):
+        x = T / heading_time[b]
+        shrunk = math.exp(-x)
+        decay[b, 0] = decay[b, 1] = decay[b, 2] = colour
+        decay[b, 4] = decay[b, 5] = tilt
+        decay[b, 6] = (1.0 + x) * shrunk
+        swing[b, 0], swing[b, 1] = T * shrunk, -x / heading_time[b] * shrunk
+        swing[b, 2] = (1.0 - x) * shrunk
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
         for i in range(MEASURED - 1):
-            after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[i] * decay[i])
+            after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
     predict(carried, R_nb, T, moved, columns, fall, decay, swing, before, after)
     for i in range(3):
         a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]

@@ -36,8 +36,8 @@ class NoiseLevels:
         bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
         attitude: Gauss-Markov error of the recorded tilt (correlation time
             :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
-        heading: smooth error of the recorded heading (its time:
-            :data:`~onboard.core.filter.limits.HEADING_TIME_S`), rad.
+        heading: smooth error of the recorded heading, rad.
+        heading_time: after which it is another one, s.
         attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
@@ -54,6 +54,8 @@ class NoiseLevels:
     bias_walk: float = 3e-5
     attitude: float = 0.02
     heading: float = 0.06
+    heading_time: float = 5.0
+    heading_walk: float = 3e-4
     attitude_white: float = 5e-4
     jitter: float = 3e-3
 
@@ -77,6 +79,8 @@ ESTIMATED = (
     "bias_walk",
     "attitude",
     "heading",
+    "heading_time",
+    "heading_walk",
     "attitude_white",
     "jitter",
 )

@@ -16,11 +16,6 @@ from onboard.core.filter.kernel import Run
 from onboard.core.filter.limits import (
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
-    GATE_HEADING,
-    GATE_HEIGHT,
-    GATE_TILT,
-    GATE_VELOCITY,
-    HEADING_TIME_S,
     SYMMETRY_UPDATES,
     TAIL,
 )
@@ -31,8 +26,7 @@ from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 
-_TIMES = np.array([COLOUR_TIME_S, ATTITUDE_TIME_S, HEADING_TIME_S])
-_GATES = np.array([GATE_VELOCITY, GATE_HEIGHT, GATE_TILT, GATE_HEADING])
+_TIMES = np.array([COLOUR_TIME_S, ATTITUDE_TIME_S])
 _TAILS = np.array([np.inf, TAIL[1], TAIL[2], TAIL[3]])
 _BELIEVED, _REFUSED = 1, 2
 """What may be known of a velocity before it is looked at; 0: nothing."""
@@ -149,7 +143,7 @@ class OrdinaryFlight:
             levels.reading,
             levels.jitter,
             _TIMES,
-            _GATES,
+            levels.heading_time,
             _TAILS,
             STANDARD_GRAVITY,
             int(made.uses.earth),
@@ -170,6 +164,8 @@ class OrdinaryFlight:
         done = slice(step, after + pending)
         made.t += float(self._ready.steps.duration[done].sum())
         taken = self._taken[:count]
+        if count:
+            made.taken_t = float(self._ready.epochs.t[taken[-1]])
         first = np.concatenate([[0], np.cumsum(self._numbers[taken])])
         velocities, heights = self._offered[taken, 0], self._offered[taken, 1]
         if made.gates is not None and heights.any():

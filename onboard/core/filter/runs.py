@@ -20,10 +20,8 @@ from onboard.core.maths.compiler import compiled, part
 
 
 @part
-def _ordinary(
-    W: Array, theta: Array, offered: Index, judged: int, gates: Array, tails: Array
-) -> bool:
-    """Whether no gate could refuse anything, and nothing is in the tail of its distribution."""
+def _ordinary(W: Array, theta: Array, offered: Index, tails: Array) -> bool:
+    """Whether nothing is in the tail of its distribution: gates are further out."""
     at = 0
     counts = (offered[0], offered[1], 2 * offered[2], offered[2])
     for kind in range(4):
@@ -34,9 +32,7 @@ def _ordinary(
                 x -= W[0, a, c + 1] * theta[c]
             nis += x * x
         at += n
-        if n > 0 and (kind > 0 or judged) and not nis <= gates[kind]:
-            return False
-        if n > 0 and kind < 2 and not nis <= tails[n]:
+        if n > 0 and not nis <= tails[n]:
             return False
     return True
 
@@ -154,7 +150,7 @@ def run(
     white: Array,
     jitter: Array,
     times: Array,
-    gates: Array,
+    heading_time: Array,
     tails: Array,
     gravity: float,
     earth: int,
@@ -196,8 +192,8 @@ def run(
         settled: see there.
         white: see there.
         jitter: see there.
-        times: (3,) of the slow errors of velocity, tilt and heading, s.
-        gates: (4,) limits of velocity, height, tilt and heading.
+        times: (2,) of the slow errors of velocity and tilt, s.
+        heading_time: (B,) of that of the heading, s.
         tails: (4,) by degrees of freedom.
         gravity: m/s^2.
         earth: whether it turns.
@@ -231,6 +227,7 @@ def run(
             walk,
             settled,
             times,
+            heading_time,
             gravity,
             earth,
         )
@@ -252,7 +249,7 @@ def run(
             carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, var
         ):
             return 1
-        if not _ordinary(W, theta, offered[e], 1 - offered[e, 3], gates, tails):
+        if not _ordinary(W, theta, offered[e], tails):
             return 1
         take(carried, W, m1)
         if noisy:

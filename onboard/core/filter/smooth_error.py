@@ -11,32 +11,35 @@ errs by in a second.  With ``k = 1 / time``, the error ``x`` and its rate ``u`` 
 
 from __future__ import annotations
 
-import math
-from typing import Final
-
 import numpy as np
 
-from onboard.core.filter.limits import HEADING_TIME_S
 from onboard.core.maths.arrays import Array
 
-_K: Final = 1.0 / HEADING_TIME_S
-SETTLED_RATE: Final = _K**2
-"""Variance of the rate, 1/s^2, of an error that has a variance of one."""
-RATE_WALK: Final = 4.0 * _K**3
-"""Density of the noise that drives the rate, 1/s^3."""
+
+def settled_rate(time: Array) -> Array:
+    """Variances of the rates, 1/s^2, of errors that have a variance of one, by their times, s."""
+    out: Array = time**-2.0
+    return out
 
 
-def moved(duration: float) -> tuple[float, Array]:
-    """How the error and its rate follow from those before: the exact transition.
+def rate_walk(time: Array) -> Array:
+    """Densities of the noise that drives these rates, 1/s^3."""
+    out: Array = 4.0 * time**-3.0
+    return out
+
+
+def moved(duration: float, time: Array) -> tuple[Array, Array]:
+    """How errors and their rates follow from those before: the exact transition.
 
     Args:
         duration: s.
+        time: (B,) of each error, s.
 
     Returns:
-        What the error leaves of itself; and (3,) what its rate adds to it, what the error leaves of
-        the rate, and what the rate leaves of itself.
+        (B,) what an error leaves of itself; and (B, 3) what its rate adds to it, what the error
+        leaves of the rate, and what the rate leaves of itself.
     """
-    x = _K * duration
-    shrunk = math.exp(-x)
-    swing = np.array([duration * shrunk, -_K * x * shrunk, (1.0 - x) * shrunk])
+    x = duration / time
+    shrunk = np.exp(-x)
+    swing = np.stack([duration * shrunk, -x / time * shrunk, (1.0 - x) * shrunk], axis=-1)
     return (1.0 + x) * shrunk, swing

@@ -12,7 +12,7 @@ from onboard.core.filter.limits import (
     UNKNOWN_HEIGHT_VAR,
 )
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.smooth_error import RATE_WALK, SETTLED_RATE
+from onboard.core.filter.smooth_error import rate_walk, settled_rate
 from onboard.core.filter.state import (
     BIAS,
     CH,
@@ -38,9 +38,10 @@ class Variances:
             squared.
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
         jitter: (B,) of the moment that a velocity is of, s^2.
+        heading_time: (B,) time of the heading's smooth error, s.
     """
 
-    __slots__ = ("_attitude", "jitter", "reading", "settled", "walk")
+    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "walk")
 
     def __init__(self, bank: Sequence[NoiseLevels], *, attitude: bool) -> None:
         """Take the noise levels of each member, and whether the attitude may err at all."""
@@ -50,6 +51,7 @@ class Variances:
         self.settled = np.zeros((B, MEASURED))
         self.reading = np.zeros((B, MEASURED))
         self.jitter = np.array([q.jitter**2 for q in bank])
+        self.heading_time = np.array([q.heading_time for q in bank])
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
@@ -61,8 +63,11 @@ class Variances:
             if attitude:
                 self.walk[i, PSI] = q.tilt_walk**2
                 self.walk[i, BIAS] = q.bias_walk**2
+                self.walk[i, HEADING] = q.heading_walk**2
                 self.settled[i, PSI] = (q.attitude**2, q.attitude**2, q.heading**2)
-                self.walk[i, RATE] = RATE_WALK * q.heading**2
+
+        if attitude:
+            self.walk[:, RATE] = rate_walk(self.heading_time) * self.settled[:, -1]
 
     def of_reading(self, noise: Array, moving: Array) -> Array:
         """(B, MEASURED) of the white noise of what one epoch measures.
@@ -96,7 +101,7 @@ class Variances:
             var[:, PSI] = (tilt_sigma**2, tilt_sigma**2, heading_sigma**2)
             var[:, BIAS] = BIAS_START_RAD_S**2
         var[:, ERRORS:RATE] = self.settled
-        var[:, RATE] = SETTLED_RATE * self.settled[:, -1]
+        var[:, RATE] = settled_rate(self.heading_time) * self.settled[:, -1]
         var[:, V] += colour
         P = np.zeros((B, STATES, STATES))
         P[:, range(STATES), range(STATES)] = var
@@ -115,7 +120,7 @@ class Variances:
 
         Args:
             duration: s.
-            decay: (MEASURED,) factors by which the slow errors have decayed.
+            decay: (B, MEASURED) factors by which the slow errors have decayed.
 
         Returns:
             Two arrays (B, STATES), unit of the state squared.

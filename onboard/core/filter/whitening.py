@@ -17,7 +17,7 @@ linearisation, those of member 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,18 +33,17 @@ from onboard.core.filter.kernel import (
     innovations,
 )
 from onboard.core.filter.limits import (
+    ANEW,
     ANYTHING,
     ATTITUDE_TIME_S,
     COLOUR_TIME_S,
-    RENEWED,
-    RENEWED_ATTITUDE_VAR,
     RENEWED_HEIGHT_VAR,
     SYMMETRY_UPDATES,
 )
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
 from onboard.core.filter.refused import Refused
-from onboard.core.filter.smooth_error import SETTLED_RATE, moved
+from onboard.core.filter.smooth_error import moved
 from onboard.core.filter.state import ATT, BIAS, CH, PSI, RATE, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
@@ -54,7 +53,8 @@ from onboard.core.maths.small_turns import angle_of, turn_by
 
 _NOT_TURNED = np.zeros(3)
 _LETTER = {"velocity": "v", "recovery": "v", "height": "h"}
-_SLOW_ERROR = {"tilt": slice(ATT.start, ATT.stop - 1), "heading": slice(ATT.stop - 1, ATT.stop)}
+_SLOW_ERROR = {"t": slice(ATT.start, ATT.stop - 1), "y": slice(ATT.stop - 1, ATT.stop)}
+_SET_ANEW = {"t": "tilt", "y": "heading"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +93,7 @@ class WhiteningFilter:
         updates: how many there have been.
         R_nb: (3, 3) attitude, body axes to NED.
         t: time on the boot clock, s.
+        taken_t: of the last epoch of which something was taken, s.
         noise_gram: (3,) sum since :meth:`begin_block` of the whitened noise of each body axis
             squared, per unit density (:mod:`onboard.core.filter.regressor_noise`); None while
             several levels are tried, for only the sums that count need it.
@@ -112,6 +113,7 @@ class WhiteningFilter:
         self.carried = np.zeros((B, STATES, self._m1 + matrices * STATES))
         self.R_nb = np.eye(3)
         self.t = float("nan")
+        self.taken_t = self.t
         self.kernel = chosen()
         self.variances = Variances(self.bank, attitude=not self.uses.recorded_attitude)
         self.gates = InnovationGates(self.bank[0]) if self.uses.gates else None
@@ -140,7 +142,7 @@ class WhiteningFilter:
             heading_sigma: of its heading, rad.
         """
         self.R_nb = R_nb
-        self.t = epoch.t
+        self.t = self.taken_t = epoch.t
         down = float(epoch.velocity[2])
         known = not math.isnan(down)
         z = self.kernel.measured(R_nb, epoch, down if known else 0.0, _NOT_TURNED)
@@ -192,8 +194,8 @@ class WhiteningFilter:
             down += more
         fall = np.array([north * T, east * T, down * T, -0.5 * T * T * down, 0.0, 0.0, 0.0])
         cv, tilt = math.exp(-T / COLOUR_TIME_S), math.exp(-T / ATTITUDE_TIME_S)
-        heading, swing = moved(T)
-        decay = np.array([cv, cv, cv, 1.0, tilt, tilt, heading])
+        decay = np.tile([cv, cv, cv, 1.0, tilt, tilt, 1.0], (len(self.bank), 1))
+        decay[:, -1], swing = moved(T, self.variances.heading_time)
         process = Process(fall, decay, swing, *self.variances.over(T, decay))
         self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
@@ -235,38 +237,59 @@ class WhiteningFilter:
                 )
             if refusal is None:
                 if self.gates is not None:
-                    made = self._in_tail(made, z, kinds, white, theta, covariance)
+                    wider = tails(kinds, y - h @ theta, h, covariance)
+                    refused += [_SET_ANEW[k] for k, x in wider.items() if x > ANEW.get(k, np.inf)]
+                    made = self._widened(made, z, kinds, white, wider)
                 self._take(made, kinds, theta)
+                self.taken_t = epoch.t
                 return whitened(made, kinds, epoch.t, theta, refused, off, unlikely)
             if refusal.name not in refused:
                 refused.append(refusal.name)
-            if refusal.name in _SLOW_ERROR:
-                # Wider by so much each time that it is soon inside: no angle is beyond pi.
-                self._renew(refusal.name)
-                unlikely += RENEWED
-                continue
             letter = _LETTER[refusal.name]
             unlikely += self._surprise(z, letter * kinds.count(letter), white, theta)
             if refusal.renewed:
-                self._renew(refusal.name)
+                self._renew_height()
             if letter == "v":
                 n = kinds.count("v")
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
             kinds = kinds.replace(letter, "")
         return nothing(len(self.bank), self.m, epoch.t, refused, off, unlikely)
 
-    def _in_tail(
-        self, made: Whitening, z: Array, kinds: str, white: Array, theta: Array, covariance: Array
+    def _widened(
+        self, made: Whitening, z: Array, kinds: str, white: Array, wider: Mapping[str, float]
     ) -> Whitening:
-        """The same innovations, with more noise for what is in the tail of its distribution."""
-        y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
-        wider = tails(kinds, y - h @ theta, h, covariance)
+        """The same innovations, with more noise for what is in the tail of its distribution.
+
+        Args:
+            made: innovations.
+            z: as in :func:`~onboard.core.filter.kernel.whiten`.
+            kinds: one letter for each, as in :mod:`~onboard.core.filter.readings`.
+            white: (B, MEASURED) variances of their white noise.
+            wider: by what factor the variance of a kind is larger than it is taken for.
+        """
         if not wider:
             return made
         white = white.copy()
         for kind, factor in wider.items():
-            white[:, reading(kind * kinds.count(kind)).number] *= factor
+            if kind in "ty":
+                at = kinds.index(kind)
+                here = slice(at, at + kinds.count(kind))
+                self._move_by_itself(kind, (factor - 1.0) * np.exp(made.log_var[0, here]))
+            else:
+                white[:, reading(kind * kinds.count(kind)).number] *= factor
         return self.kernel.whiten(self.carried, z, reading(kinds), white)
+
+    def _move_by_itself(self, kind: str, more: Array) -> None:
+        """The recorded attitude was set anew since the last epoch, or began to be turned.
+
+        Args:
+            kind: tilt (t) or heading (y).
+            more: (2,) or (1,) variance of what it moved by, rad^2.
+        """
+        var = diagonal(self.carried, self._m1)
+        var[:, _SLOW_ERROR[kind]] += more
+        if kind == "y":
+            var[:, RATE] += float(more[0]) / (self.t - self.taken_t) ** 2
 
     def _surprise(self, z: Array, kinds: str, white: Array, theta: Array) -> Array:
         """What a refused measurement takes off twice the log-likelihood of each member, (B,).
@@ -327,12 +350,6 @@ class WhiteningFilter:
         self.R_nb = turn_by(psi) @ self.R_nb
         self.carried[:, PSI, 0] -= psi
 
-    def _renew(self, reference: str) -> None:
-        """What a reference (height, tilt or heading) differs by is unknown from here on."""
-        var = diagonal(self.carried, self._m1)
-        if reference == "height":
-            var[:, CH] += RENEWED_HEIGHT_VAR
-        else:
-            var[:, _SLOW_ERROR[reference]] += RENEWED_ATTITUDE_VAR
-        if reference == "heading":
-            var[:, RATE] += SETTLED_RATE * RENEWED_ATTITUDE_VAR
+    def _renew_height(self) -> None:
+        """What the reference of heights differs by is unknown from here on."""
+        diagonal(self.carried, self._m1)[:, CH] += RENEWED_HEIGHT_VAR

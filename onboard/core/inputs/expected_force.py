@@ -66,7 +66,7 @@ def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Bat
         felt = _filtered(raw, gain)
         for s in (batch.segment for batch in run):
             made[id(s)] = replace(s, raw_s=felt[np.searchsorted(t, s.t)])
-    return [Batch(made[id(b.segment)], b.fixes, b.trusted, b.fresh) for b in batches]
+    return [replace(b, segment=made[id(b.segment)]) for b in batches]
 
 
 def _runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:

@@ -17,9 +17,9 @@ from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
 CORRECTED_S: Final = (2.0, 2.0, 5.0)
 """s in which an EKF takes back what its gyroscope has turned it too far about north, east and down.
 Tilt: with velocities good to 0.3 m/s five times a second and a gyroscope to 0.015 rad/s, as
-ArduPilot's EKF3 has them, its gain is that of a second-order loop of 1 rad/s.  Heading: that of
-:data:`~onboard.core.filter.limits.HEADING_TIME_S` [physics; from 1.5 to 30 s the calibration of
-simulated vehicles with gyroscopes 3 % off differs by a fifth of a sigma]."""
+ArduPilot's EKF3 has them, its gain is that of a second-order loop of 1 rad/s.  Heading: the usual
+time of its error [physics; from 1.5 to 30 s the calibration of simulated vehicles with gyroscopes
+3 % off differs by a fifth of a sigma]."""
 
 PIECE: Final = 200
 """Attitudes that are summed at once [cost]."""

@@ -150,13 +150,14 @@ def test_a_far_antenna_does_not_make_latency_and_averaging_run_away(seed):
 
 
 @pytest.mark.slow
-def test_averaging_that_an_antenna_could_be_instead_is_named_with_its_confounder():
-    # In a hover's force, 24 r / g of a squared window is an antenna r higher.
-    averaging = replace(PROMPT, smoothing=0.3)
-    # Such a flight is at the edge of what shows it: five of ten seeds are named.
-    said, _ = diagnosed("copter", 61, gps=averaging)
-    (effect,) = said.effects
-    assert effect.name == "gps_smoothing"
-    window = effect.unknowns["window"]
-    assert abs(window.value - 0.3) < max(0.03, 3.0 * window.sigma)
-    assert ("gps_smoothing", "gps_lever_arm") in [a.names for a in said.ambiguous]
+@pytest.mark.parametrize("seed", [60, 61, 62, 63])
+def test_averaging_that_an_antenna_could_be_instead_is_named_or_told_with_its_confounder(seed):
+    # In a hover's force, 24 r / g of a squared window is an antenna r higher: such a flight is at
+    # the edge of what shows it, half of them name it.
+    said, _ = diagnosed("copter", seed, gps=replace(PROMPT, smoothing=0.3))
+    for effect in said.effects:
+        assert effect.name == "gps_smoothing"
+        window = effect.unknowns["window"]
+        assert abs(window.value - 0.3) < max(0.03, 3.0 * window.sigma)
+    confounded = [a.names for a in said.ambiguous]
+    assert said.effects or ("gps_smoothing", "gps_lever_arm") in confounded

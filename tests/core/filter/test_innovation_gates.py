@@ -8,9 +8,8 @@ import pytest
 from onboard.core.filter import innovation_gates
 from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates, tails
 from onboard.core.filter.limits import (
-    GATE_HEADING,
+    ANEW,
     GATE_HEIGHT,
-    GATE_TILT,
     GATE_VELOCITY,
     PATIENCE_S,
     RECEIVER_M_S,
@@ -33,9 +32,7 @@ def judged(gates, t, kinds, y, h=None, C=None, sigma=10.0):
     return gates.judge(t, kinds, E, y, h, NONE, C, np.eye(len(y)) / sigma)
 
 
-@pytest.mark.parametrize(
-    ("kinds", "name"), [("vvv", "velocity"), ("h", "height"), ("tt", "tilt"), ("y", "heading")]
-)
+@pytest.mark.parametrize(("kinds", "name"), [("vvv", "velocity"), ("h", "height")])
 def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name):
     """Innovations drawn from the filter's model, the estimate's own uncertainty included."""
     n = len(kinds)
@@ -55,7 +52,7 @@ def test_false_alarms_come_as_often_as_chi_square_says(monkeypatch, kinds, name)
         h = rng.normal(size=(n, 2))
         y = rng.normal(size=n) + h @ (root @ rng.normal(size=2))
         verdict = judged(gates, 0.0, kinds, y, h, C)
-        assert verdict in (None, GateRefusal(name, renewed=name in ("tilt", "heading")))
+        assert verdict in (None, GateRefusal(name))
         refused += verdict is not None
     assert refused / draws == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / draws))
 
@@ -80,8 +77,8 @@ def test_the_limits_have_the_probabilities_that_are_claimed():
     for free, limit in TAIL.items():
         assert survival(limit, free) == pytest.approx(0.01, rel=0.01)
     assert survival(GATE_HEIGHT, 1) == pytest.approx(4.3e-8, rel=0.05)
-    assert survival(GATE_TILT, 2) == pytest.approx(3e-7, rel=0.05)
-    assert survival(GATE_HEADING, 1) == pytest.approx(4.3e-8, rel=0.05)
+    assert survival(ANEW["t"] * TAIL[2], 2) == pytest.approx(3e-7, rel=0.05)
+    assert survival(ANEW["y"] * TAIL[1], 1) == pytest.approx(4.3e-8, rel=0.05)
 
 
 def test_an_uncertain_estimate_widens_the_gate():
@@ -92,17 +89,25 @@ def test_an_uncertain_estimate_widens_the_gate():
 
 def test_what_is_in_the_tail_is_brought_to_its_edge():
     h, C = np.zeros((7, 2)), np.zeros((2, 2))
-    y = np.array([0.0, 6.0, 0.0, 5.0, 9.0, 9.0, 9.0])
+    y = np.array([0.0, 6.0, 0.0, 5.0, 3.0, 4.0, 9.0])
     wider = tails("vvvhtty", y, h, C)
-    # So much more variance makes the normalised square that of the edge; attitude has no tail.
-    assert wider == {"v": pytest.approx(36.0 / TAIL[3]), "h": pytest.approx(25.0 / TAIL[1])}
-    assert tails("vvvhtty", 0.5 * y, h, C) == {}
+    # So much more variance makes the normalised square that of the edge.
+    assert wider == {
+        "v": pytest.approx(36.0 / TAIL[3]),
+        "h": pytest.approx(25.0 / TAIL[1]),
+        "t": pytest.approx(25.0 / TAIL[2]),
+        "y": pytest.approx(81.0 / TAIL[1]),
+    }
+    assert tails("vvvhtty", 0.2 * y, h, C) == {}
     assert tails("h", y[3:4], np.eye(1, 2), 10.0 * np.eye(2)) == {}
 
 
 def test_the_first_impossible_kind_is_named():
     gates = InnovationGates(LEVELS)
-    y = np.array([0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 9.0])
+    y = np.array([0.0, 9.0, 0.0, 9.0, 0.0, 0.0, 0.0])
+    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("velocity")
+    y[1] = 0.0
+    gates.forget()
     assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("height")
 
 
@@ -138,10 +143,6 @@ def test_a_height_that_stays_off_is_a_new_reference():
     assert not judged(gates, PATIENCE_S + 0.5, "h", y).renewed
 
 
-def test_tilt_and_heading_begin_anew_each_for_itself():
-    gates = InnovationGates(LEVELS)
-    y = np.zeros(7)
-    y[6] = 9.0
-    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("heading", renewed=True)
-    y[4], y[6] = 9.0, 0.0
-    assert judged(gates, 0.0, "vvvhtty", y) == GateRefusal("tilt", renewed=True)
+def test_no_gate_refuses_a_recorded_attitude():
+    y = np.array([0.0, 0.0, 0.0, 0.0, 9.0, 9.0, 99.0])
+    assert judged(InnovationGates(LEVELS), 0.0, "vvvhtty", y) is None

@@ -60,8 +60,8 @@ def step_of(rng, m):
 def process_of(rng, members):
     return Process(
         np.append(rng.normal(size=4), np.zeros(3)),
-        rng.uniform(0.5, 1.0, size=MEASURED),
-        rng.uniform(-1.0, 1.0, size=3),
+        rng.uniform(0.5, 1.0, size=(members, MEASURED)),
+        rng.uniform(-1.0, 1.0, size=(members, 3)),
         *(rng.uniform(0.0, 0.1, size=(2, members, STATES))),
     )
 
@@ -94,10 +94,10 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     rng = np.random.default_rng(seed)
     before = carried(rng, bank[0], m, noise=bank[1])
     R, step, process = turned(rng), step_of(rng, m), process_of(rng, bank[0])
-    F = np.eye(STATES)
-    F[:MEASURED, :ERRORS] = kernel.transition(R, step)
-    F[range(ERRORS, RATE), range(ERRORS, RATE)] = process.decay
-    F[HEADING, RATE], F[RATE, HEADING], F[RATE, RATE] = process.swing
+    F = np.tile(np.eye(STATES), (bank[0], 1, 1))
+    F[:, :MEASURED, :ERRORS] = kernel.transition(R, step)
+    F[:, range(ERRORS, RATE), range(ERRORS, RATE)] = process.decay
+    F[:, HEADING, RATE], F[:, RATE, HEADING], F[:, RATE, RATE] = process.swing.T
     X, P = parts(before, m)
     first, then = (np.stack([np.diag(q) for q in x]) for x in (process.before, process.after))
     grown = np.zeros_like(P)
@@ -106,7 +106,7 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
             grown[0, 1 + axis, :3, :3] = step.duration * np.outer(R[:, axis], R[:, axis])
     P = P.copy()
     P[:, 0] += first
-    P = F @ P @ F.T + grown
+    P = F[:, None] @ P @ np.swapaxes(F, -1, -2)[:, None] + grown
     P[:, 0] += then
     X = F @ X
     X[:, :MEASURED] += kernel.stack_to_ned(R, step.columns)

@@ -1,11 +1,13 @@
 """The whitening filter: the paper's criterion as its special case, and rows that are white."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from onboard.core.filter.innovations import Epoch, steps
-from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, HEADING_TIME_S
-from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
+from onboard.core.filter.noise import ESTIMATED, NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
@@ -37,8 +39,8 @@ GRAVITY = np.array([0.0, 0.0, STANDARD_GRAVITY])
 
 def quiet(velocity):
     """Noise of GPS velocity alone."""
-    none = 1e-12
-    return NoiseLevels(velocity, none, 1.0, 1.0, *(none,) * 8)
+    none = dict.fromkeys(ESTIMATED, 1e-12)
+    return NoiseLevels(**none | {"velocity": velocity, "vertical": 1.0, "height": 1.0})
 
 
 def manoeuvres(t):
@@ -174,8 +176,9 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     v, h = np.array([5.0, 2.0, 0.0]), 100.0
     bias = 0.01 * normal(size=3)
     slow = np.array([levels.attitude, levels.attitude, levels.heading])
+    time = levels.heading_time
     error, colour, wander = slow * normal(size=3), levels.velocity_colour * normal(size=3), 0.0
-    turning = slow[2] / HEADING_TIME_S * normal()  # rad/s, of the error of the heading
+    turning = slow[2] / time * normal()  # rad/s, of the error of the heading
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
     theta = np.ones(1)
@@ -225,8 +228,8 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         error[:2] = keep * error[:2] + np.sqrt(1 - keep**2) * slow[:2] * normal(size=2)
         for _ in range(SUB):
             # Critically damped, and driven: in steps so small that Euler's are good enough.
-            driven = 2.0 * (1.0 / HEADING_TIME_S) ** 1.5 * slow[2] * normal() * np.sqrt(DT)
-            turning += driven - (2.0 * turning / HEADING_TIME_S + error[2] / HEADING_TIME_S**2) * DT
+            driven = 2.0 * (1.0 / time) ** 1.5 * slow[2] * normal() * np.sqrt(DT)
+            turning += driven - (2.0 * turning / time + error[2] / time**2) * DT
             error[2] += turning * DT
         keep = np.exp(-T / COLOUR_TIME_S)
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
@@ -276,7 +279,7 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        NoiseLevels(velocity, *(1e-12, 1.0, 1.0, 1e-12), walk, *(1e-12,) * 6)
+        replace(quiet(velocity), force_walk=walk)
         for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
     )
     made = Pass(

@@ -1,0 +1,133 @@
+"""What the autopilot turns its heading by and its gyroscope does not is taken out of it."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from onboard.core.inputs.reported_attitude import ReportedAttitude
+from onboard.core.inputs.segments import Batch, Fixes, Segment
+from onboard.core.inputs.steady_heading import SteadyHeading
+from onboard.core.maths.frames import euler_from_rotation, rotation_from_euler
+
+LENGTH_S, MARGIN_S, IMU_HZ, ATTITUDE_HZ = 60.0, 0.7, 50.0, 10.0
+ROLL = 0.3
+
+
+def yaw(t):
+    """True heading, rad: turns both ways, at up to 1 rad/s."""
+    return 0.8 * np.sin(0.5 * t) + np.sin(0.6 * t + 1.0)
+
+
+def turning(t):
+    return 0.4 * np.cos(0.5 * t) + 0.6 * np.cos(0.6 * t + 1.0)
+
+
+def cut(error, borders, *, bias=0.0, reported=True):
+    """Batches of a flight whose recorded heading errs by ``error(t)``, rad, as recorded."""
+    out = []
+    for first, last in itertools.pairwise(borders):
+        t = np.arange(first - MARGIN_S, last + MARGIN_S, 1.0 / IMU_HZ)
+        at = np.arange(np.ceil((first - MARGIN_S) * ATTITUDE_HZ), (last + MARGIN_S) * ATTITUDE_HZ)
+        at = at / ATTITUDE_HZ
+        angles = np.stack([np.full(len(at), ROLL), np.zeros(len(at)), yaw(at) + error(at)], axis=1)
+        recorded = ReportedAttitude(angles, (0.0, 0.0, 0.0))
+        # About a vertical that is rolled in the body.
+        w_b = (turning(t) + bias)[:, None] * np.array([0.0, np.sin(ROLL), np.cos(ROLL)])
+        fixes = np.round(np.arange(first, last + 0.01, 0.2), 6)
+        n = len(fixes)
+        segment = Segment(
+            t, w_b, np.zeros((len(t), 3)), at, recorded if reported else recorded[:], np.eye(3)
+        )
+        none = np.zeros(n)
+        out.append(
+            Batch(
+                segment,
+                Fixes(fixes, np.zeros((n, 3)), none, none),
+                np.ones(n, dtype=bool),
+                fresh=not out,
+            )
+        )
+    return out
+
+
+def joined(batches):
+    heading, run = SteadyHeading(), []
+    for batch in batches:
+        run = heading.joined([] if batch.fresh else run, batch)
+    return run
+
+
+def left(run):
+    """Error of every heading of a flight, rad, with its time."""
+    t = np.concatenate([b.segment.t_attitude for b in run])
+    found = np.concatenate([euler_from_rotation(b.segment.R_attitude[:])[2] for b in run])
+    return t, (found - yaw(t) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+TENS = tuple(np.arange(0.0, LENGTH_S + 1.0, 10.0))
+EVENTS = {
+    "set right soon": lambda t: np.where(t < 12.0, 1.2, 0.0),
+    "set right past half a turn": lambda t: np.where(t < 17.0, -2.9, 0.0),
+    "set wrong and right": lambda t: np.where((t > 24.0) & (t < 41.0), 0.7, 0.0),
+    "pulled over for two seconds": lambda t: np.clip(0.5 * (t - 40.0), 0.0, 1.0),
+    "pulled over and back": lambda t: (
+        np.clip(0.4 * (t - 20.0), 0.0, 1.0) - np.clip(0.4 * (t - 28.0), 0.0, 1.0)
+    ),
+    "set anew between two batches": lambda t: np.where(t < 20.05, 0.6, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", EVENTS)
+@pytest.mark.parametrize("reported", [True, False], ids=["angles", "matrices"])
+def test_the_heading_that_was_held_for_longest_is_the_right_one(name, reported):
+    run = joined(cut(EVENTS[name], TENS, reported=reported))
+    _, error = left(run)
+    # What is seen of a pull is what is faster than a gyroscope's errors, sample for sample.
+    assert np.abs(error).max() < 0.01
+
+
+def test_a_heading_that_errs_slowly_is_left_as_it_was():
+    slowly = cut(lambda t: 0.2 * np.sin(0.3 * t), TENS, bias=0.02)
+    run = joined(slowly)
+    assert all(after is before for after, before in zip(run, slowly, strict=True))
+
+
+@given(st.lists(st.floats(2.0, 58.0), min_size=1, max_size=5, unique=True))
+@settings(max_examples=20, deadline=None)
+def test_how_flight_is_cut_does_not_matter(borders):
+    """Fixes are 0.2 s apart, so are borders."""
+    places = sorted({round(5.0 * b) / 5.0 for b in borders})
+    places = [b for a, b in zip([0.0, *places], places, strict=False) if b - a > 1.0]
+    error = EVENTS["pulled over and back"]
+    whole = joined(cut(error, (0.0, LENGTH_S)))[0].segment
+    for batch in joined(cut(error, (0.0, *places, LENGTH_S))):
+        t = batch.segment.t_attitude
+        there = np.searchsorted(whole.t_attitude, t - 1e-6)
+        np.testing.assert_allclose(
+            batch.segment.R_attitude[:], whole.R_attitude[:][there], atol=1e-4
+        )
+
+
+def test_another_flight_begins_anew():
+    first = cut(EVENTS["set right soon"], TENS)
+    heading = SteadyHeading()
+    run = []
+    for batch in first:
+        run = heading.joined(run, batch)
+    alone = replace(first[-1], fresh=True)
+    assert heading.joined([], alone) == [alone]
+
+
+def test_axes_are_turned_about_the_vertical_alone():
+    recorded = cut(EVENTS["set right soon"], TENS)
+    for before, after in zip(recorded, joined(recorded), strict=True):
+        R, turned = before.segment.R_attitude[:], after.segment.R_attitude[:]
+        by = turned @ np.swapaxes(R, -1, -2)
+        about = rotation_from_euler(0.0, 0.0, np.arctan2(by[:, 1, 0], by[:, 0, 0]))
+        np.testing.assert_allclose(by, about, atol=1e-12)
+        assert after.fixes is before.fixes
+        assert after.segment.w_b is before.segment.w_b
