@@ -82,6 +82,12 @@ def response(untouched: Judge, fix_step: float) -> Array:
     return weighed(point.window, point.shapes, fix_step)
 
 
+def headings(untouched: Judge) -> Array:
+    """(2, K) times of fixes, s, and the vehicle's heading there, rad, as the flight says."""
+    states = list(untouched.engine.states)
+    return np.array([[s.t, np.arctan2(s.R_nb[1, 0], s.R_nb[0, 0])] for s in states]).T
+
+
 def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float, float]]:
     """What the untouched flight says of an effect that was found in the other one only.
 
@@ -119,7 +125,12 @@ def flown(flight: RealFlight, kinds: Sequence[Kind], imu: int = 1) -> list[Outco
     except (ArithmeticError, LookupError, ValueError) as error:
         return [Outcome(flight.name, k.name, k.wanted, why=str(error)) for k in kinds]
     late = before.numbers["gps_delay"][0]
-    ground = replace(ground, late=late, response=response(untouched, ground.fix_step))
+    ground = replace(
+        ground,
+        late=late,
+        response=response(untouched, ground.fix_step),
+        heading=headings(untouched),
+    )
     out = []
     for kind in kinds:
         if not kind.applies(ground):

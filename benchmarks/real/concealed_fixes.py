@@ -121,6 +121,11 @@ def _on_arm(samples: Sequence[Sample], ground: About, r: Array) -> Iterator[Samp
     ]
     t_a, t_w = np.array([s.t for s in attitude]), np.array([s.t for s in rates])
     angles = np.unwrap(np.array([(s.roll, s.pitch, s.yaw) for s in attitude]), axis=0)
+    if ground.heading.size:
+        # A recorded heading that is wrong, or set anew, would put the antenna elsewhere each time.
+        at, heading = ground.heading
+        off = np.unwrap(np.interp(at, t_a, angles[:, 2]) - heading)
+        angles[:, 2] -= np.interp(t_a, at, off)
     w_b = np.array([s.w_b for s in rates])
     span, weights = ground.response
 

@@ -31,6 +31,8 @@ class About:
         fix_step: between fixes, s.
         late: of the GPS against its stamps, s, as the untouched flight says.
         response: (2, K) moments about that, s, and how the receiver weighs them, likewise.
+        heading: (2, K) times, s, boot clock, and the vehicle's heading there, rad, likewise;
+            without any it is as recorded.
     """
 
     imu: int
@@ -41,6 +43,7 @@ class About:
     fix_step: float
     late: float = 0.0
     response: Array = field(default_factory=at_once)
+    heading: Array = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 Lay = Callable[[Sequence[Sample], About], Iterable[Sample]]

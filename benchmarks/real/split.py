@@ -104,6 +104,7 @@ LOOKS: tuple[str, ...] = (
     "the receiver's response a mixture of shapes, spans to 1.2 s, no touch-downs, or as it was",
     "attitudes that follow the gyroscope, no rolling, noise as the velocity walks, or as it was",
     "the receiver's shapes in the linearisation, jumps where half of the best is, or as it was",
+    "a heading that is set anew not followed, time and walk of its error found, or as it was",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
