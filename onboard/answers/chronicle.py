@@ -17,15 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.estimate.calibration_record import (
-    claimed_covariance,
-    gyro_sigma,
-    six_information,
-)
+from onboard.core.estimate.calibration_record import claimed_covariance, six_information
 from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
 from onboard.core.estimate.dead_reckoning import free_errors, intervals
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.events import Event, Restarted
+from onboard.core.estimate.gyro_axes import gyro_sigma
 from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.blocks import Block

@@ -94,13 +94,19 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
     if c.score(fitter, before, after) < least() or c.margin(fitter, before, after) <= CLEARLY:
         return False
-    value = after.theta[c.sizes] - fitter.absent[c.sizes]
-    if np.any(np.abs(value) > np.array(c.plausible)):
+    if not believable(fitter, after, c):
         return False
+    value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
         # What is learned over the whole flight lies in between, and nearer to both.
         return True
     return _matters(fitter, before, after)
+
+
+def believable(fitter: Fitter, after: Fit, c: Candidate) -> bool:
+    """Whether an effect of the size that ``after`` has it can be."""
+    value = after.theta[c.sizes] - fitter.absent[c.sizes]
+    return bool(np.all(np.abs(value) <= np.array(c.plausible)))
 
 
 def _matters(fitter: Fitter, before: Fit, after: Fit) -> bool:

@@ -36,6 +36,7 @@ from onboard.core.diagnosis.regimes import (
 )
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fit
+from onboard.core.diagnosis.undecided import in_words, left_open, undecided
 from onboard.core.estimate.calibration_record import too_far
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
@@ -82,7 +83,10 @@ class Judge:
         self.calibrator, self.imu, self.evidence = calibrator, imu, evidence
         self.engine, self.choice = evidence.final, evidence.choice
         self.absent, self.excluded = list(absent), list(excluded)
-        self.calibration: Calibration = calibrator.calibration_with(imu, evidence.final)
+        self.undecided = undecided(evidence.choice, evidence.families)
+        self.calibration: Calibration = calibrator.calibration_with(
+            imu, evidence.final, left_open(self.undecided)
+        )
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
         self.findings = Findings(self.final, evidence.choice, evidence.full.point)
 
@@ -99,7 +103,8 @@ class Judge:
         verdict, note = self._verdict(effects, mismatch, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
         others = of_others(self.choice, self.final.origin.t0)
-        note = " ".join(x for x in (note, others, trim) if x)
+        open_ = in_words(self.undecided, self.calibration)
+        note = " ".join(x for x in (note, open_, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)

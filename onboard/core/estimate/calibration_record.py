@@ -14,10 +14,10 @@ from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
 from onboard.core.estimate.determined import determine, flown_loads, force_moments
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.gyro_axes import gyro_sigma
 from onboard.core.estimate.limits import (
     APART_S,
     CONTRADICTION,
-    GYRO_CROSS_SIGMA,
     LONG_DRIFT_S,
     LONG_DRIFTS,
     OFFSET_FLOOR,
@@ -44,7 +44,6 @@ from onboard.core.maths.accelerometer import (
     parameters_of,
 )
 from onboard.core.maths.arrays import Array, vector3
-from onboard.core.maths.earth import STANDARD_GRAVITY
 
 
 def calibration_of(
@@ -55,6 +54,7 @@ def calibration_of(
     finished: bool,
     rejected: dict[str, int],
     kind: str = "",
+    left_open: Array | None = None,
 ) -> Calibration:
     """Everything about one accelerometer, cheap enough for once a second.
 
@@ -65,6 +65,8 @@ def calibration_of(
         finished: whether no more flight will come.
         rejected: what was refused before it reached the engine, by name.
         kind: of the vehicle, for the advice.
+        left_open: (6, 6) variance of scale and beta that the model itself leaves open; None:
+            nothing.
 
     Raises:
         KeyError: no flight was processed.
@@ -72,7 +74,14 @@ def calibration_of(
     in_force = parameters.six(imu).as_linear()
     residuals = _residuals(engine, _solved(engine, imu), in_force)
     return _record(
-        imu, engine, parameters, residuals, finished=finished, rejected=rejected, kind=kind
+        imu,
+        engine,
+        parameters,
+        residuals,
+        finished=finished,
+        rejected=rejected,
+        kind=kind,
+        left_open=left_open,
     )
 
 
@@ -95,11 +104,17 @@ def _record(
     finished: bool,
     rejected: dict[str, int],
     kind: str,
+    left_open: Array | None = None,
 ) -> Calibration:
     solution, in_force = _solved(engine, imu), parameters.six(imu)
     value, gyro = parameters_of(solution.theta), gyro_sigma(parameters.R_bs)
-    covariance, load = claimed_covariance(solution, gyro), flown_loads(engine.batches)
-    seen = assess(six_information(solution), engine.settings.needs, kind)
+    J = parameters_jacobian(solution.theta)
+    more = np.zeros((6, 6)) if left_open is None else J @ left_open @ J.T
+    covariance, load = claimed_covariance(solution, gyro) + more, flown_loads(engine.batches)
+    information = six_information(solution)
+    # That of a sum of errors, where neither the data nor what is left open knows every direction.
+    information = information @ np.linalg.inv(np.eye(6) + more @ information)
+    seen = assess((information + information.T) / 2.0, engine.settings.needs, kind)
     made = Calibration(
         imu=imu,
         status=Status.INSUFFICIENT if finished else Status.COLLECTING,
@@ -210,25 +225,6 @@ def six_covariance(solution: Solution) -> Array:
 def claimed_covariance(solution: Solution, gyro: Array) -> Array:
     """The same, of what a bench would find: with ``gyro`` (6,) of :func:`gyro_sigma` in it."""
     return six_covariance(solution) + np.diag(gyro**2)
-
-
-def gyro_sigma(R_bs: Array) -> Array:
-    """Sigmas (6,) of scale (1) and offset (m/s^2) by the gyroscope's axes, sensor axes.
-
-    An offset forwards or sideways is told from a tilt by turning: a tilt stays where it is, the
-    offset turns with the vehicle.  What has turned is known from the gyroscope.  One that reads
-    ``e`` of a turn about the vertical as a turn about a level axis takes the vertical for tilted by
-    ``e`` in the body, and the accelerometer seems to have an offset of ``g e``.  At one load both
-    make the same velocity: an ordinary flight does not tell them apart, and navigation is right
-    with their sum.  Where the load varies much, a turn of one against the other is found as
-    :mod:`~onboard.core.physics.effects.mount_tilt`.  A bench, which turns the accelerometer by its
-    faces, finds the offset alone.
-
-    Args:
-        R_bs: (3, 3) board orientation, turns of 90 degrees.
-    """
-    level = np.abs(R_bs[2]) < math.sqrt(0.5)
-    return np.concatenate([np.zeros(3), np.where(level, STANDARD_GRAVITY * GYRO_CROSS_SIGMA, 0.0)])
 
 
 def six_information(solution: Solution) -> Array:

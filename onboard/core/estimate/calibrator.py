@@ -43,6 +43,7 @@ from onboard.core.inputs.samples import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
+from onboard.core.maths.arrays import Array
 
 OF_ACCELEROMETER: Final = {name: imu for imu in range(1, 6) for name in parameter_names(imu).six}
 
@@ -230,8 +231,16 @@ class Calibrator:
         """
         return self.calibration_with(imu, self._engines[imu])
 
-    def calibration_with(self, imu: int, engine: Engine) -> Calibration:
-        """The same by another engine over the same flight (a diagnosis with more physics)."""
+    def calibration_with(
+        self, imu: int, engine: Engine, left_open: Array | None = None
+    ) -> Calibration:
+        """The same by another engine over the same flight (a diagnosis with more physics).
+
+        Args:
+            imu: which accelerometer.
+            engine: has its sums.
+            left_open: (6, 6) variance of scale and beta that the model itself leaves open.
+        """
         rejected = Counter(self._trust.rejected)
         rejected.update(self._assembly.streams.refused(imu))
         rejected.update(self._counts)
@@ -242,6 +251,7 @@ class Calibrator:
             finished=self._finished,
             kind=self.kind,
             rejected={k: n for k, n in rejected.items() if n},
+            left_open=left_open,
         )
 
     def to_bytes(self) -> bytes:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from onboard.core.estimate.calibration_record import gyro_sigma
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Restarted
+from onboard.core.estimate.gyro_axes import gyro_sigma
 from onboard.core.estimate.limits import GYRO_CROSS_SIGMA
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.parameters import ParametersInForce

@@ -1,0 +1,139 @@
+"""What effects that were almost found, or almost not, leave open about scale and offset.
+
+Where an effect is at the edge of what counts as found, two models of the flight are likely, and
+each gives the six with a sigma that knows nothing of the other: a curvature of the scale that was
+just missed put the z scale of a plane ten sigma off.  The variance of a mixture is what its models
+say, and what they differ by (Draper, 1995).
+
+What counts as found is set by how seldom a false name may be said, which is not how likely an
+effect is.  A score is twice a logarithm of a probability ``p`` by chance; at the most, such a ``p``
+stands for odds of ``1 / (-e p ln p)`` (Sellke, Bayarri and Berger, 2001), here times those from
+before the flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+
+from onboard.core.diagnosis.candidates import Candidate, believable
+from onboard.core.diagnosis.hypotheses import Choice
+from onboard.core.diagnosis.limits import CLEARLY
+from onboard.core.diagnosis.selection import Fit, Fitter
+from onboard.core.estimate.result import SIX_NAMES, Calibration
+from onboard.core.maths.accelerometer import SixParameters, parameters_jacobian
+from onboard.core.maths.arrays import Array
+from onboard.core.physics.effect import Effect
+
+PRESENT = 0.01
+"""Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
+order of magnitude; what is at the edge is likelier than not for all between 0.002 and 0.5]."""
+HARDLY = 0.02
+"""Odds from which a model is looked at [cost]."""
+MOST_OF_IT = 0.5
+"""Share of a variance from which it is said what it is about [cost: one sentence]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undecided:
+    """A model that may be right instead of the one that was chosen.
+
+    Attributes:
+        effect: what it has that the reported one has not; or lacks, if that one has it.
+        share: how likely it is, between 0 and 1.
+        moves: (6,) by how much its scale (1) and beta (m/s^2) are larger.
+    """
+
+    effect: str
+    share: float
+    moves: Array
+
+
+def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
+    """The models next to the one that is reported.
+
+    Args:
+        choice: effects that were taken, and others that were not.
+        families: those of the reported model; what was taken and is not there has been decided.
+    """
+    kept = {f.effect for f in families}
+    out = []
+    for chosen in choice.chosen:
+        if chosen.effect in kept:
+            out += _in_the_place_of(choice, chosen)
+    fitter, free = choice.fitter, choice.free
+    before = fitter.fit(free)
+    for c, odds, after in _likely(fitter, free, before, _others(choice)):
+        out.append(Undecided(c.effect, odds / (1.0 + odds), after.theta[:6] - before.theta[:6]))
+    return out
+
+
+def in_words(models: Sequence[Undecided], calibration: Calibration) -> str:
+    """Which of them most of the sigma of a number is about; empty if there is none."""
+    claimed = np.array(calibration.covariance).diagonal()
+    jacobian = parameters_jacobian(SixParameters(calibration.scale, calibration.offset).as_linear())
+    out = []
+    for model in models:
+        moves = jacobian @ model.moves
+        share = model.share * moves**2 / claimed
+        most = int(np.argmax(share))
+        if share[most] > MOST_OF_IT:
+            unit = "" if most < 3 else " m/s^2"
+            more = f"{moves[most]:+.3f}{unit}"
+            out.append(
+                f"Whether there is {model.effect} this flight leaves open: the other way "
+                f"{SIX_NAMES[most]} would be {more}, and its sigma says so."
+            )
+    return " ".join(out)
+
+
+def left_open(models: Sequence[Undecided]) -> Array:
+    """(6, 6) what they add to the covariance of scale and beta."""
+    out = np.zeros((6, 6))
+    for model in models:
+        out += model.share * np.outer(model.moves, model.moves)
+    return out
+
+
+def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
+    """Models without an effect that was chosen, or with another one in its place."""
+    fitter = choice.fitter
+    rest = [i for i in choice.free if i not in chosen.index]
+    before, with_it = fitter.fit(rest), fitter.fit(choice.free)
+    found = [(chosen.effect, 1.0, before)]
+    found += [(c.effect, x, fit) for c, x, fit in _likely(fitter, rest, before, _others(choice))]
+    whole = sum(x for _, x, _ in found) + odds_of(chosen.score(fitter, before, with_it))
+    return [Undecided(name, x / whole, fit.theta[:6] - with_it.theta[:6]) for name, x, fit in found]
+
+
+def _others(choice: Choice) -> list[Candidate]:
+    return [c for c in choice.candidates if c not in choice.chosen]
+
+
+def _likely(
+    fitter: Fitter, free: Sequence[int], before: Fit, some: Sequence[Candidate]
+) -> Iterator[tuple[Candidate, float, Fit]]:
+    """Candidates that could be there beside ``free``, their odds, and the fits with them."""
+    for c in some:
+        columns = [*free, *c.index]
+        quick = fitter.fit(columns, held_out=False)
+        if odds_of(c.score(fitter, before, quick)) < HARDLY:
+            continue
+        after = fitter.fit(columns)
+        odds = odds_of(c.score(fitter, before, after))
+        if (
+            odds >= HARDLY
+            and believable(fitter, after, c)
+            and c.margin(fitter, before, after) > CLEARLY
+        ):
+            yield c, odds, after
+
+
+def odds_of(score: float) -> float:
+    """Odds that an effect is there, at the most, by its score."""
+    before, half = PRESENT / (1.0 - PRESENT), 0.5 * score
+    # From p = 1/e on, a probability speaks for chance.
+    return before if half <= 1.0 else before * exp(min(half - 1.0, 50.0)) / half
