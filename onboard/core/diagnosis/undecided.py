@@ -43,11 +43,13 @@ class Undecided:
 
     Attributes:
         effect: what it has that the reported one has not; or lacks, if that one has it.
+        title: that in a short sentence.
         share: how likely it is, between 0 and 1.
         moves: (6,) by how much its scale (1) and beta (m/s^2) are larger.
     """
 
     effect: str
+    title: str
     share: float
     moves: Array
 
@@ -67,7 +69,8 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
     fitter, free = choice.fitter, choice.free
     before = fitter.fit(free)
     for c, odds, after in _likely(fitter, free, before, _others(choice)):
-        out.append(Undecided(c.effect, odds / (1.0 + odds), after.theta[:6] - before.theta[:6]))
+        moves = after.theta[:6] - before.theta[:6]
+        out.append(Undecided(c.effect, _title(c), odds / (1.0 + odds), moves))
     return out
 
 
@@ -82,10 +85,11 @@ def in_words(models: Sequence[Undecided], calibration: Calibration) -> str:
         most = int(np.argmax(share))
         if share[most] > MOST_OF_IT:
             unit = "" if most < 3 else " m/s^2"
-            more = f"{moves[most]:+.3f}{unit}"
+            way = "larger" if moves[most] > 0.0 else "smaller"
             out.append(
-                f"Whether there is {model.effect} this flight leaves open: the other way "
-                f"{SIX_NAMES[most]} would be {more}, and its sigma says so."
+                f"This flight leaves open whether {_clause(model.title)} ({model.effect}): the "
+                f"other way the {SIX_NAMES[most]} would be {abs(moves[most]):.3f}{unit} {way}, "
+                "which its sigma includes."
             )
     return " ".join(out)
 
@@ -103,10 +107,21 @@ def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in chosen.index]
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
-    found = [(chosen.effect, 1.0, before)]
-    found += [(c.effect, x, fit) for c, x, fit in _likely(fitter, rest, before, _others(choice))]
+    found = [(chosen, 1.0, before), *_likely(fitter, rest, before, _others(choice))]
     whole = sum(x for _, x, _ in found) + odds_of(chosen.score(fitter, before, with_it))
-    return [Undecided(name, x / whole, fit.theta[:6] - with_it.theta[:6]) for name, x, fit in found]
+    return [
+        Undecided(c.effect, _title(c), x / whole, fit.theta[:6] - with_it.theta[:6])
+        for c, x, fit in found
+    ]
+
+
+def _title(c: Candidate) -> str:
+    return c.effect if c.columns is None else c.columns.title
+
+
+def _clause(title: str) -> str:
+    """A sentence as a part of one: names keep their capitals."""
+    return title if title[:2].isupper() else title[:1].lower() + title[1:]
 
 
 def _others(choice: Choice) -> list[Candidate]:
