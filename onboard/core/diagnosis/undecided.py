@@ -30,9 +30,10 @@ from onboard.core.physics.effect import Effect
 
 PRESENT = 0.01
 """Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
-order of magnitude; what is at the edge is likelier than not for all between 0.002 and 0.5]."""
-HARDLY = 0.02
-"""Odds from which a model is looked at [cost]."""
+order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
+HARDLY = 0.05
+"""Odds from which a model is looked at: what one flight of twenty is like is outside of the 95 %
+that two sigma stand for [probability]."""
 MOST_OF_IT = 0.5
 """Share of a variance from which it is said what it is about [cost: one sentence]."""
 
