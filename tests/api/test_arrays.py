@@ -45,7 +45,7 @@ def test_columns_of_ones_own_give_the_flight_within_its_sigmas(asked):
         apart = np.abs(getattr(own, name) - getattr(of_file, name))
         less_known = getattr(own, f"{name}_sigma")
         # What is not told is in the difference, so it is held against the wider claim of the two.
-        assert np.all(apart < less_known)
+        assert np.all(apart < 2.0 * less_known)
         # Together: how much blocks contradict each other moves single sigmas by some per cent.
         assert np.prod(less_known) > np.prod(getattr(of_file, f"{name}_sigma"))
     assert own.timing["gps_delay_s"].value == pytest.approx(0.12, abs=0.02)

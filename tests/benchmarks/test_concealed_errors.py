@@ -9,6 +9,7 @@ import pytest
 from benchmarks.real import concealed, concealed_attitude, concealed_fixes, concealed_force
 from benchmarks.real.concealed_attitude import from_angles
 from benchmarks.real.concealed_kind import About, Kind, about
+from benchmarks.real.concealed_response import weighed
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
 
 G = 9.80665
@@ -52,7 +53,7 @@ def flight(*, scale: float = 0.98, offset: float = 0.2) -> list[Sample]:
 
 
 SAMPLES = flight()
-GROUND = about(SAMPLES, 1, late=LATE_S)
+GROUND = replace(about(SAMPLES, 1), late=LATE_S)
 
 
 def laid(kind: Kind, samples: Sequence[Sample] = SAMPLES, ground: About = GROUND) -> list[Sample]:
@@ -201,12 +202,49 @@ def test_a_lever_arm_is_the_derivative_of_where_the_antenna_is() -> None:
 
 
 def test_a_receiver_that_averages_averages_the_arm_as_well() -> None:
-    ground = replace(GROUND, window=0.3)
+    ground = replace(GROUND, response=weighed(0.3, (0.0, 0.0, 0.0, 0.0), 0.2))
     made = fixes(laid(concealed_fixes.antenna(2, -0.4), ground=ground))
     arm = np.array([0.0, 0.0, -0.4])
     for old, new in zip(fixes(SAMPLES)[2:-2], made[2:-2], strict=True):
         ends = [from_angles(*angles(old.t - LATE_S + s)) @ arm for s in (-0.15, 0.15)]
         assert new.v_n - old.v_n == pytest.approx(float((ends[1] - ends[0])[0]) / 0.3, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [
+        (0.0,) * 4,
+        (1.0, 0.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 1.0),
+        (0.3, 0.1, -0.5, 0.4),
+    ],
+)
+def test_every_shape_spreads_as_the_span_says_about_its_mean(shares: tuple[float, ...]) -> None:
+    moments, weights = weighed(0.4, shares, 0.2)
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights @ moments == pytest.approx(0.0, abs=1e-9)
+    assert weights @ moments**2 == pytest.approx(0.4**2 / 12.0, rel=2e-3)
+
+
+def test_newer_moments_weigh_more_in_the_shape_that_says_so() -> None:
+    moments, weights = weighed(0.2, (1.0, 0.0, 0.0, 0.0), 0.2)
+    assert weights[np.argmax(moments)] > 0.5
+    assert np.ptp(moments) == pytest.approx(0.2)
+    lagging = weighed(0.2, (0.0, 0.0, 0.0, 1.0), 0.2)[0]
+    assert abs(lagging.min()) > 1.5 * lagging.max()  # what is long ago has a tail
+
+
+def test_an_antenna_swings_with_the_heading_that_the_flight_has() -> None:
+    """A recorded heading that is off turns what is recorded, not where the antenna is."""
+    off = [replace(s, yaw=s.yaw + 0.5) if isinstance(s, AttitudeSample) else s for s in SAMPLES]
+    at = np.array([s.t for s in SAMPLES if isinstance(s, AttitudeSample)])
+    true = np.array([s.yaw for s in SAMPLES if isinstance(s, AttitudeSample)])
+    ground = replace(GROUND, heading=np.array([at, true]))
+    kind = concealed_fixes.antenna(0, 0.5)
+    straight, turned = fixes(laid(kind)), fixes(laid(kind, off, ground))
+    for a, b in zip(straight[2:-2], turned[2:-2], strict=True):
+        assert (a.v_n, a.v_e) == pytest.approx((b.v_n, b.v_e), abs=1e-6)
 
 
 def test_a_fault_lasts_ten_seconds() -> None:
