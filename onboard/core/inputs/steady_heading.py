@@ -25,8 +25,13 @@ from onboard.core.maths.frames import (
 )
 
 PULLED_RAD_S: Final = 0.1
-"""rad/s.  What is slower is the gyroscope's (a bias of 0.01 rad/s, 3 % of a turn of 3 rad/s) or an
-EKF's that follows its compass: the filter's own model of the heading has room for it [physics]."""
+"""rad/s.  What is slower is a gyroscope's bias (0.01 rad/s), or an EKF's that follows its compass:
+the filter's own model of the heading has room for it [physics]."""
+GYRO_SHARE: Final = 0.03
+"""Of a turn, by which a gyroscope may be off besides [data sheets of older sensors]."""
+STAMPED_S: Final = 5e-3
+"""s by which stamps of two attitudes may be off together, so that a turn is off by as much of its
+rate: six sigma of :data:`~onboard.core.filter.limits.STAMP_JITTER_S` [physics]."""
 LOOKED_AT_S: Final = 60.0
 """s from the start of an uninterrupted flight in which the right heading is looked for: twice what
 a compass is off for after a take-off [physics]."""
@@ -84,18 +89,33 @@ def pulls(segment: Segment) -> tuple[Array, Array]:
     Returns:
         Their times (j,), s, and by how much since the attitude before (j,), rad.
     """
-    t, R = segment.t_attitude, segment.R_attitude[:]
+    t = segment.t_attitude
     if len(t) < 2 or len(segment.t) < 2:
         return np.zeros(0), np.zeros(0)
-    step = np.diff(segment.t)[:, None]
-    angle = np.cumsum(0.5 * step * (segment.w_b[1:] + segment.w_b[:-1]), axis=0)
-    angle = np.vstack([np.zeros(3), angle])
-    reached = np.stack([np.interp(t, segment.t, angle[:, k]) for k in range(3)], axis=1)
-    expected = R[:-1] @ rotation_from_vector(np.diff(reached, axis=0))
+    R, step = segment.R_attitude[:], np.diff(t)
+    turns, way, missing = _turns(segment, t)
+    expected = R[:-1] @ rotation_from_vector(turns)
     missed = vector_from_rotation(R[1:] @ np.swapaxes(expected, -1, -2))[:, 2]
+    allowed = PULLED_RAD_S * step + GYRO_SHARE * way + STAMPED_S * way / step + missing
     known = (t[:-1] >= segment.t[0]) & (t[1:] <= segment.t[-1])
-    pulled = known & (np.abs(missed) > PULLED_RAD_S * np.diff(t))
+    pulled = known & (np.abs(missed) > allowed)
     return t[1:][pulled], missed[pulled]
+
+
+def _turns(segment: Segment, t: Array) -> tuple[Array, Array, Array]:
+    """What a gyroscope turns by between times ``t`` (k,), s.
+
+    Returns:
+        (k - 1, 3) that, rad; (k - 1,) the way there, rad; (k - 1,) by how much its samples may miss
+        it, rad: where the rate changes from one to the next, a quarter of a triangle.
+    """
+    h, w = np.diff(segment.t), segment.w_b
+    size = np.linalg.norm(w, axis=1)
+    change = np.linalg.norm(np.diff(w, axis=0), axis=1)
+    rates = np.column_stack([0.5 * (w[1:] + w[:-1]), 0.5 * (size[1:] + size[:-1]), 0.25 * change])
+    sums = np.vstack([np.zeros(5), np.cumsum(rates * h[:, None], axis=0)])
+    made = np.diff([np.interp(t, segment.t, sums[:, k]) for k in range(5)], axis=1).T
+    return made[:, :3], made[:, 3], made[:, 4]
 
 
 def _turned(batch: Batch, off: Array) -> Batch:

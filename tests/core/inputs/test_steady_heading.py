@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from onboard.core.inputs.reported_attitude import ReportedAttitude
 from onboard.core.inputs.segments import Batch, Fixes, Segment
-from onboard.core.inputs.steady_heading import SteadyHeading
+from onboard.core.inputs.steady_heading import SteadyHeading, pulls
 from onboard.core.maths.frames import euler_from_rotation, rotation_from_euler
 
 LENGTH_S, MARGIN_S, IMU_HZ, ATTITUDE_HZ = 60.0, 0.7, 50.0, 10.0
@@ -94,6 +94,31 @@ def test_a_heading_that_errs_slowly_is_left_as_it_was():
     slowly = cut(lambda t: 0.2 * np.sin(0.3 * t), TENS, bias=0.02)
     run = joined(slowly)
     assert all(after is before for after, before in zip(run, slowly, strict=True))
+
+
+def test_quick_turns_of_a_gyroscope_that_is_off_are_no_pulls():
+    """A scale of 2 %, stamps off by two milliseconds, and a tenth of the samples: all at once."""
+
+    def rolling(t, late):
+        return 6.0 * np.sin(2.0 * np.pi * 0.7 * (t - late)) / (2.0 * np.pi * 0.7)
+
+    rng = np.random.default_rng(3)
+    t = np.arange(0.0, 30.0, 0.01)
+    at = np.arange(1.0, 29.0, 0.04)
+    zero, ahead = np.zeros(len(at)), np.full(len(at), 0.5)
+    angles = np.stack([rolling(at, 1e-3 * rng.uniform(-1.0, 1.0, len(at))), ahead, zero], axis=1)
+    rate = 1.02 * 6.0 * np.cos(2.0 * np.pi * 0.7 * t)
+    w_b = np.stack([rate, np.zeros(len(t)), np.zeros(len(t))], axis=1)
+    for each in (1, 10):
+        segment = Segment(
+            t[::each],
+            w_b[::each],
+            np.zeros((len(t[::each]), 3)),
+            at,
+            ReportedAttitude(angles, (0.0, 0.0, 0.0)),
+            np.eye(3),
+        )
+        assert len(pulls(segment)[0]) == 0
 
 
 @given(st.lists(st.floats(2.0, 58.0), min_size=1, max_size=5, unique=True))
