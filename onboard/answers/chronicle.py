@@ -27,7 +27,7 @@ from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.maths.accelerometer import parameters_of
+from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
 
 Array = NDArray[np.float64]
 
@@ -116,6 +116,7 @@ class Chronicle:
         self._pieces: list[_Piece] = []
         self._piece: _Piece | None = None
         self._engines: dict[int, Engine] = {}
+        self._left_open: dict[int, Array] = {}
         self._held: dict[int, list[tuple[float, Array]]] = {}
         self._spans: list[Span] = []
         self._speed = (array("d"), array("d"))
@@ -156,9 +157,15 @@ class Chronicle:
         self._begin_anew()
         return events
 
-    def take(self, imu: int, engine: Engine) -> None:
-        """The engine whose sums gave the answer for one accelerometer."""
-        self._engines[imu] = engine
+    def take(self, imu: int, engine: Engine, left_open: Array) -> None:
+        """What gave the answer for one accelerometer.
+
+        Args:
+            imu: which.
+            engine: has its sums.
+            left_open: (6, 6) variance of scale and beta that the model itself leaves open.
+        """
+        self._engines[imu], self._left_open[imu] = engine, left_open
 
     # What a report asks
 
@@ -247,7 +254,7 @@ class Chronicle:
 
     def _course(self, imu: int, engine: Engine) -> Course:
         """Solutions of the sums up to some of the blocks, the last of all of them."""
-        blocks = engine.all_blocks
+        blocks, more = engine.all_blocks, self._left_open.get(imu, np.zeros((6, 6)))
         times = [
             math.nan if piece is None else float(piece.time(np.array(p.end)))
             for p, piece in zip(blocks, self._places([p.start for p in blocks]), strict=True)
@@ -259,11 +266,13 @@ class Chronicle:
             solution = engine.solution() if i == last else None
             solution = solution or solve(blocks[: i + 1], engine.model)
             seen = assess(six_information(solution), engine.settings.needs)
+            J = parameters_jacobian(solution.theta)
+            covariance = claimed_covariance(solution, gyro) + J @ more @ J.T
             rows.append(
                 (
                     np.array([times[i]]),
                     parameters_of(solution.theta),
-                    np.sqrt(np.diag(claimed_covariance(solution, gyro))),
+                    np.sqrt(np.diag(covariance)),
                     self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
                 )

@@ -140,7 +140,7 @@ class Recorded:
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
         self._engines[imu] = found.engine
         if self.chronicle is not None:
-            self.chronicle.take(imu, found.engine)
+            self.chronicle.take(imu, found.engine, found.left_open)
         return given
 
 

@@ -31,7 +31,7 @@ def flight(request, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp(request.param) / "flight.tlog"
     spec = FlightSpec(
         vehicle="plane",
-        duration=100.0,
+        duration=160.0,
         imus=(TRUE, OTHER),
         effects=HIDDEN[request.param],
         rates={"RAW_IMU": 25.0, "ATTITUDE": 25.0},

@@ -84,8 +84,9 @@ class Judge:
         self.engine, self.choice = evidence.final, evidence.choice
         self.absent, self.excluded = list(absent), list(excluded)
         self.undecided = undecided(evidence.choice, evidence.families)
+        self.left_open = left_open(self.undecided)
         self.calibration: Calibration = calibrator.calibration_with(
-            imu, evidence.final, left_open(self.undecided)
+            imu, evidence.final, self.left_open
         )
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
         self.findings = Findings(self.final, evidence.choice, evidence.full.point)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import exp
+from math import exp, log
 
 import numpy as np
 
@@ -31,9 +31,9 @@ from onboard.core.physics.effect import Effect
 PRESENT = 0.01
 """Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
 order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
-HARDLY = 0.05
-"""Odds from which a model is looked at: what one flight of twenty is like is outside of the 95 %
-that two sigma stand for [probability]."""
+HARDLY = log(0.05)
+"""Log odds from which a model is looked at: what one flight of twenty is like is outside of the
+95 % that two sigma stand for [probability]."""
 MOST_OF_IT = 0.5
 """Share of a variance from which it is said what it is about [cost: one sentence]."""
 
@@ -71,7 +71,7 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
     before = fitter.fit(free)
     for c, odds, after in _likely(fitter, free, before, _others(choice)):
         moves = after.theta[:6] - before.theta[:6]
-        out.append(Undecided(c.effect, _title(c), odds / (1.0 + odds), moves))
+        out.append(Undecided(c.effect, _title(c), 1.0 / (1.0 + exp(-odds)), moves))
     return out
 
 
@@ -108,11 +108,13 @@ def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in chosen.index]
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
-    found = [(chosen, 1.0, before), *_likely(fitter, rest, before, _others(choice))]
-    whole = sum(x for _, x, _ in found) + odds_of(chosen.score(fitter, before, with_it))
+    found = [(chosen, 0.0, before), *_likely(fitter, rest, before, _others(choice))]
+    own = log_odds(chosen.score(fitter, before, with_it))
+    most = max(own, *(odds for _, odds, _ in found))
+    whole = exp(own - most) + sum(exp(odds - most) for _, odds, _ in found)
     return [
-        Undecided(c.effect, _title(c), x / whole, fit.theta[:6] - with_it.theta[:6])
-        for c, x, fit in found
+        Undecided(c.effect, _title(c), exp(odds - most) / whole, fit.theta[:6] - with_it.theta[:6])
+        for c, odds, fit in found
     ]
 
 
@@ -132,14 +134,14 @@ def _others(choice: Choice) -> list[Candidate]:
 def _likely(
     fitter: Fitter, free: Sequence[int], before: Fit, some: Sequence[Candidate]
 ) -> Iterator[tuple[Candidate, float, Fit]]:
-    """Candidates that could be there beside ``free``, their odds, and the fits with them."""
+    """Candidates that could be there beside ``free``, their log odds, and the fits with them."""
     for c in some:
         columns = [*free, *c.index]
         quick = fitter.fit(columns, held_out=False)
-        if odds_of(c.score(fitter, before, quick)) < HARDLY:
+        if log_odds(c.score(fitter, before, quick)) < HARDLY:
             continue
         after = fitter.fit(columns)
-        odds = odds_of(c.score(fitter, before, after))
+        odds = log_odds(c.score(fitter, before, after))
         if (
             odds >= HARDLY
             and believable(fitter, after, c)
@@ -148,8 +150,8 @@ def _likely(
             yield c, odds, after
 
 
-def odds_of(score: float) -> float:
-    """Odds that an effect is there, at the most, by its score."""
-    before, half = PRESENT / (1.0 - PRESENT), 0.5 * score
+def log_odds(score: float) -> float:
+    """Logarithm of the odds that an effect is there, at the most, by its score."""
+    before, half = log(PRESENT / (1.0 - PRESENT)), 0.5 * score
     # From p = 1/e on, a probability speaks for chance.
-    return before if half <= 1.0 else before * exp(min(half - 1.0, 50.0)) / half
+    return before if half <= 1.0 else before + half - 1.0 - log(half)

@@ -9,7 +9,7 @@ from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.score import least
-from onboard.core.diagnosis.undecided import PRESENT, left_open, odds_of, undecided
+from onboard.core.diagnosis.undecided import PRESENT, left_open, log_odds, undecided
 from tests.core.diagnosis.problems import Columns, Problem, drawn
 
 ALIKE = 0.95
@@ -53,21 +53,21 @@ def at_the_edge():
 
 
 def test_what_counts_as_found_is_likely_and_what_chance_does_is_not():
-    assert odds_of(least()) > 5.0
+    assert log_odds(least()) > np.log(5.0)
     scores = np.linspace(0.0, 60.0, 601)
-    odds = np.array([odds_of(s) for s in scores])
+    odds = np.exp([log_odds(s) for s in scores])
     assert np.all(np.diff(odds) >= 0.0)
     # Sellke, Bayarri and Berger: p = 0.05 is odds of 2.5 to 1, 0.001 of 53 to 1.
     even = PRESENT / (1.0 - PRESENT)
-    assert odds_of(-2.0 * np.log(0.05)) / even == pytest.approx(2.46, abs=0.01)
-    assert odds_of(-2.0 * np.log(0.001)) / even == pytest.approx(53.3, abs=0.1)
+    assert np.exp(log_odds(-2.0 * np.log(0.05))) / even == pytest.approx(2.46, abs=0.01)
+    assert np.exp(log_odds(-2.0 * np.log(0.001))) / even == pytest.approx(53.3, abs=0.1)
 
 
 def test_a_model_has_the_share_of_its_odds():
     for problem, score in at_the_edge():
         choice, _ = decided(problem, found=False)
         (model,) = undecided(choice, ())
-        assert model.share == pytest.approx(odds_of(score) / (1.0 + odds_of(score)))
+        assert model.share == pytest.approx(1.0 / (1.0 + np.exp(-log_odds(score))))
 
 
 @pytest.mark.parametrize("size", [0.0, 5.0], ids=["nothing", "plain to see"])
@@ -108,6 +108,19 @@ def test_an_effect_in_the_place_of_another_is_a_model_too():
     assert models["other"].share > 0.05
     assert sum(m.share for m in models.values()) < 1.0
     assert np.all(np.linalg.eigvalsh(left_open(list(models.values()))) > -1e-12)
+
+
+def test_what_is_plain_to_see_leaves_no_other_one_open():
+    """Scores of hundreds, of which a logarithm can still tell which is larger."""
+    rng = np.random.default_rng(5)
+    made = drawn(rng, [Columns("effect", 1), Columns("other", 1)], np.zeros(8))
+    h = made.h.copy()
+    h[:, :, 7] = 0.7 * h[:, :, 6] + 0.7 * h[:, :, 7]
+    problem = Problem(made.model, h, made.y + 5.0 * h[:, :, 6])
+    mine = Candidate("effect", problem.columns("effect"), (10.0,))
+    other = Candidate("other", problem.columns("other"), (10.0,))
+    choice = Choice(problem.fitter(), list(range(6)), [mine, other], [mine])
+    assert max(m.share for m in undecided(choice, (Family(),))) < 1e-9
 
 
 @pytest.mark.slow
