@@ -27,7 +27,7 @@ from onboard.core.estimate.observability import Observability, assess
 from onboard.core.estimate.solution import solve
 from onboard.core.inputs.blocks import Block
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
+from onboard.core.maths.accelerometer import parameters_of
 
 Array = NDArray[np.float64]
 
@@ -198,7 +198,7 @@ class Chronicle:
             before,
             after,
             self._innovation(engine),
-            self._observability(engine),
+            self._observability(imu, engine),
         )
 
     # How
@@ -254,7 +254,7 @@ class Chronicle:
 
     def _course(self, imu: int, engine: Engine) -> Course:
         """Solutions of the sums up to some of the blocks, the last of all of them."""
-        blocks, more = engine.all_blocks, self._left_open.get(imu, np.zeros((6, 6)))
+        blocks, more = engine.all_blocks, self._left_open.get(imu)
         times = [
             math.nan if piece is None else float(piece.time(np.array(p.end)))
             for p, piece in zip(blocks, self._places([p.start for p in blocks]), strict=True)
@@ -265,14 +265,12 @@ class Chronicle:
         for i in np.unique(np.linspace(0, last, MOST_POINTS).round().astype(int)):
             solution = engine.solution() if i == last else None
             solution = solution or solve(blocks[: i + 1], engine.model)
-            seen = assess(six_information(solution), engine.settings.needs)
-            J = parameters_jacobian(solution.theta)
-            covariance = claimed_covariance(solution, gyro) + J @ more @ J.T
+            seen = assess(six_information(solution, more), engine.settings.needs)
             rows.append(
                 (
                     np.array([times[i]]),
                     parameters_of(solution.theta),
-                    np.sqrt(np.diag(covariance)),
+                    np.sqrt(np.diag(claimed_covariance(solution, gyro, more))),
                     self._in_force(imu, times[i]),
                     np.array(seen.coverage.per_parameter),
                 )
@@ -280,11 +278,12 @@ class Chronicle:
         t, *six = (np.array(column) for column in zip(*rows, strict=True))
         return Course(t[:, 0], *six)
 
-    def _observability(self, engine: Engine) -> Observability | None:
+    def _observability(self, imu: int, engine: Engine) -> Observability | None:
         solution = engine.solution()
         if solution is None:
             return None
-        return assess(six_information(solution), engine.settings.needs, self.calibrator.kind)
+        known = six_information(solution, self._left_open.get(imu))
+        return assess(known, engine.settings.needs, self.calibrator.kind)
 
     def _in_force(self, imu: int, t: float) -> Array:
         """(6,) what the autopilot used then; what was first reported, before that."""

@@ -14,6 +14,10 @@ NEIGHBOURS: Final = 4
 WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
 """Moves of delay (s), squared window (s^2), attitude delay (s) and heading (rad) that are worth
 another pass."""
+MOST_EFFECTS: Final = 5
+"""Effects beside each other: more are a search without end."""
+SPACINGS_S: Final = (2.0, 0.5)
+"""Spacing of the two rounds of a search, s: the likelihood bends over a second."""
 FURTHEST: Final = 3
 """Times that a search goes on beyond its edge."""
 ONCE_MORE: Final = 12

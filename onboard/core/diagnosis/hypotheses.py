@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted
-from onboard.core.diagnosis.limits import CLEARLY, MOST_EFFECTS
+from onboard.core.diagnosis.effort import MOST_EFFECTS
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.limits import FEWEST_BLOCKS

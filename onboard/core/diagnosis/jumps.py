@@ -15,9 +15,9 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, ONCE_MORE
+from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, ONCE_MORE, SPACINGS_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S, SPACINGS_S
+from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.diagnosis.shocks import Shock

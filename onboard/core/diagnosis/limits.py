@@ -31,15 +31,17 @@ MATTERS_OFFSET: Final = 0.02
 """Move of an offset that is worth an effect, m/s^2 [use]."""
 MATTERS_HELD_OUT: Final = 0.03
 """Fall of the held-out residual that is worth an effect [use]."""
-MOST_EFFECTS: Final = 5
-"""Effects beside each other: more are a search without end [cost]."""
+PRESENT: Final = 0.01
+"""Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
+order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
+HARDLY: Final = 0.05
+"""Odds from which a model next to the reported one is counted: what one flight of twenty is like is
+outside of the 95 % that two sigma stand for [probability]."""
 
 # Jumps (jumps, selection).
 
 SETTLED_S: Final = 35.0
 """s on the boot clock after which an EKF has settled: before that its attitude jumps [tuned]."""
-SPACINGS_S: Final = (2.0, 0.5)
-"""Spacing of the two rounds of a search, s [cost: the likelihood bends over a second]."""
 SEARCHED: Final = 0.1
 """Of a flight without a jump, that one is searched for in vain: it is decided later, with noise
 that is found with it in the model [cost]."""

@@ -21,21 +21,12 @@ import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate, believable
 from onboard.core.diagnosis.hypotheses import Choice
-from onboard.core.diagnosis.limits import CLEARLY
+from onboard.core.diagnosis.limits import CLEARLY, HARDLY, PRESENT
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.core.maths.accelerometer import SixParameters, parameters_jacobian
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
-
-PRESENT = 0.01
-"""Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
-order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
-HARDLY = log(0.05)
-"""Log odds from which a model is looked at: what one flight of twenty is like is outside of the
-95 % that two sigma stand for [probability]."""
-MOST_OF_IT = 0.5
-"""Share of a variance from which it is said what it is about [cost: one sentence]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +75,7 @@ def in_words(models: Sequence[Undecided], calibration: Calibration) -> str:
         moves = jacobian @ model.moves
         share = model.share * moves**2 / claimed
         most = int(np.argmax(share))
-        if share[most] > MOST_OF_IT:
+        if share[most] > 0.5:  # most of it
             unit = "" if most < 3 else " m/s^2"
             way = "larger" if moves[most] > 0.0 else "smaller"
             out.append(
@@ -138,12 +129,12 @@ def _likely(
     for c in some:
         columns = [*free, *c.index]
         quick = fitter.fit(columns, held_out=False)
-        if log_odds(c.score(fitter, before, quick)) < HARDLY:
+        if log_odds(c.score(fitter, before, quick)) < log(HARDLY):
             continue
         after = fitter.fit(columns)
         odds = log_odds(c.score(fitter, before, after))
         if (
-            odds >= HARDLY
+            odds >= log(HARDLY)
             and believable(fitter, after, c)
             and c.margin(fitter, before, after) > CLEARLY
         ):

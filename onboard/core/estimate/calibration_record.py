@@ -108,13 +108,8 @@ def _record(
 ) -> Calibration:
     solution, in_force = _solved(engine, imu), parameters.six(imu)
     value, gyro = parameters_of(solution.theta), gyro_sigma(parameters.R_bs)
-    J = parameters_jacobian(solution.theta)
-    more = np.zeros((6, 6)) if left_open is None else J @ left_open @ J.T
-    covariance, load = claimed_covariance(solution, gyro) + more, flown_loads(engine.batches)
-    information = six_information(solution)
-    # That of a sum of errors, where neither the data nor what is left open knows every direction.
-    information = information @ np.linalg.inv(np.eye(6) + more @ information)
-    seen = assess((information + information.T) / 2.0, engine.settings.needs, kind)
+    covariance, load = claimed_covariance(solution, gyro, left_open), flown_loads(engine.batches)
+    seen = assess(six_information(solution, left_open), engine.settings.needs, kind)
     made = Calibration(
         imu=imu,
         status=Status.INSUFFICIENT if finished else Status.COLLECTING,
@@ -222,12 +217,27 @@ def six_covariance(solution: Solution) -> Array:
     return out
 
 
-def claimed_covariance(solution: Solution, gyro: Array) -> Array:
-    """The same, of what a bench would find: with ``gyro`` (6,) of :func:`gyro_sigma` in it."""
-    return six_covariance(solution) + np.diag(gyro**2)
+def claimed_covariance(solution: Solution, gyro: Array, left_open: Array | None = None) -> Array:
+    """The same, of what a bench would find.
+
+    Args:
+        solution: of the sums.
+        gyro: (6,) of :func:`~onboard.core.estimate.gyro_axes.gyro_sigma`.
+        left_open: as for :func:`calibration_of`.
+    """
+    return six_covariance(solution) + np.diag(gyro**2) + _of_parameters(solution, left_open)
 
 
-def six_information(solution: Solution) -> Array:
+def _of_parameters(solution: Solution, left_open: Array | None) -> Array:
+    """(6, 6) a variance of scale and beta as one of scale and offset; None: nothing."""
+    if left_open is None:
+        return np.zeros((6, 6))
+    J = parameters_jacobian(solution.theta)
+    out: Array = J @ left_open @ J.T
+    return out
+
+
+def six_information(solution: Solution, left_open: Array | None = None) -> Array:
     """Information (6, 6) on scale and offset from the data alone, nuisances eliminated."""
     N = solution.information
     nuisance = np.linalg.inv(solution.covariance)[6:, 6:]
@@ -236,6 +246,8 @@ def six_information(solution: Solution) -> Array:
     S = N[:6, :6] - cross @ np.linalg.solve(nuisance, cross.T)
     back = np.linalg.inv(parameters_jacobian(solution.theta))
     out: Array = back.T @ S @ back
+    # Of a sum of errors, where neither the data nor what is left open knows every direction.
+    out = out @ np.linalg.inv(np.eye(6) + _of_parameters(solution, left_open) @ out)
     return (out + out.T) / 2
 
 

@@ -38,6 +38,7 @@ class NoiseLevels:
             :data:`~onboard.core.filter.limits.ATTITUDE_TIME_S`), rad.
         heading: smooth error of the recorded heading, rad.
         heading_time: after which it is another one, s.
+        heading_walk: random walk of it, by a compass's noise, rad/sqrt(s).
         attitude_white: white noise of the recorded attitude beside what the jitter of its stamps
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as

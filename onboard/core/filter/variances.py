@@ -65,7 +65,6 @@ class Variances:
                 self.walk[i, BIAS] = q.bias_walk**2
                 self.walk[i, HEADING] = q.heading_walk**2
                 self.settled[i, PSI] = (q.attitude**2, q.attitude**2, q.heading**2)
-
         if attitude:
             self.walk[:, RATE] = rate_walk(self.heading_time) * self.settled[:, -1]
 

@@ -107,3 +107,19 @@ SPECTRUM_BINS: Final = 3
 FLOOR_BINS: Final = 21
 """The same where the least of it is looked for: the least of many is too small by chance, by a
 tenth [cost]."""
+
+# What an autopilot turns its heading by (steady_heading).
+
+PULLED_RAD_S: Final = 0.1
+"""rad/s.  What is slower is a gyroscope's bias (0.01 rad/s), or an EKF's that follows its compass:
+the filter's own model of the heading has room for it [physics]."""
+GYRO_SHARE: Final = 0.03
+"""Of a turn, by which a gyroscope may be off besides [data sheet: older sensors]."""
+STAMPED_S: Final = 5e-3
+"""s by which stamps of two attitudes may be off together, so that a turn is off by as much of its
+rate: six sigma of :data:`~onboard.core.filter.limits.STAMP_JITTER_S` [physics]."""
+HEADING_LOOKED_AT_S: Final = 60.0
+"""s from the start of an uninterrupted flight in which the right heading is looked for: twice what
+a compass is off for after a take-off [physics]."""
+HEADING_EVERY_S: Final = 0.1
+"""s between the moments whose median is taken [cost]."""

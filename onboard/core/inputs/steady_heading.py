@@ -11,10 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
+from onboard.core.inputs.limits import (
+    GYRO_SHARE,
+    HEADING_EVERY_S,
+    HEADING_LOOKED_AT_S,
+    PULLED_RAD_S,
+    STAMPED_S,
+)
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
 from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
@@ -23,20 +29,6 @@ from onboard.core.maths.frames import (
     rotation_from_vector,
     vector_from_rotation,
 )
-
-PULLED_RAD_S: Final = 0.1
-"""rad/s.  What is slower is a gyroscope's bias (0.01 rad/s), or an EKF's that follows its compass:
-the filter's own model of the heading has room for it [physics]."""
-GYRO_SHARE: Final = 0.03
-"""Of a turn, by which a gyroscope may be off besides [data sheets of older sensors]."""
-STAMPED_S: Final = 5e-3
-"""s by which stamps of two attitudes may be off together, so that a turn is off by as much of its
-rate: six sigma of :data:`~onboard.core.filter.limits.STAMP_JITTER_S` [physics]."""
-LOOKED_AT_S: Final = 60.0
-"""s from the start of an uninterrupted flight in which the right heading is looked for: twice what
-a compass is off for after a take-off [physics]."""
-EVERY_S: Final = 0.1
-"""s between the moments whose median is taken [cost]."""
 
 
 class SteadyHeading:
@@ -63,9 +55,8 @@ class SteadyHeading:
             self._start, self._t, self._sums, self._right = first, np.zeros(0), np.zeros(1), 0.0
         t, by = pulls(batch.segment)
         now, later = (t > first) & (t <= last), t > last
-        at_first = self._sums[-1]
         self._t = np.append(self._t, t[now])
-        self._sums = np.append(self._sums, at_first + np.cumsum(by[now]))
+        self._sums = np.append(self._sums, self._sums[-1] + np.cumsum(by[now]))
         before, self._right = self._right, self._right_until(last)
         # Samples reach over the last fix: what happens there is counted with the next batch.
         times = np.append(self._t, t[later])
@@ -77,9 +68,9 @@ class SteadyHeading:
 
     def _right_until(self, last: float) -> float:
         """What the heading was pulled by for most of the time."""
-        if last - self._start > LOOKED_AT_S or len(self._t) == 0:
+        if last - self._start > HEADING_LOOKED_AT_S or len(self._t) == 0:
             return self._right
-        at = np.arange(self._start, last, EVERY_S)
+        at = np.arange(self._start, last, HEADING_EVERY_S)
         return float(np.median(self._sums[np.searchsorted(self._t, at, side="right")]))
 
 

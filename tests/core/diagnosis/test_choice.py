@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.candidates import Candidate, accepted, smallest
+from onboard.core.diagnosis.effort import MOST_EFFECTS
 from onboard.core.diagnosis.hypotheses import choose, confounders_of
-from onboard.core.diagnosis.limits import MOST_EFFECTS
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.pool import Pool
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares

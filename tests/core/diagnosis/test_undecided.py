@@ -7,9 +7,10 @@ from benchmarks.concealing import Secret
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.hypotheses import Choice
+from onboard.core.diagnosis.limits import PRESENT
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.score import least
-from onboard.core.diagnosis.undecided import PRESENT, left_open, log_odds, undecided
+from onboard.core.diagnosis.undecided import left_open, log_odds, undecided
 from tests.core.diagnosis.problems import Columns, Problem, drawn
 
 ALIKE = 0.95
