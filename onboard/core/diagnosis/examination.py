@@ -22,7 +22,7 @@ from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.regressors import Family
+from onboard.core.model.regressors import Family, Unknown
 from onboard.core.physics.effect import Effect
 
 VELOCITY = ("velocity", "recovery")
@@ -81,6 +81,27 @@ class Examination(Engine):
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
         self.sample = _sampled(self.batches)
+        self._seed = self._known_to(origin)
+
+    def _known_to(self, origin: Engine) -> Solution | None:
+        """What another engine knows, as a solution of this one's model: gates begin with it.
+
+        Gates that know nothing let in what the first seconds happen to bring.  With noise as small
+        as the flight's own, hundreds of good epochs are then refused, and the sums are of the rest.
+        """
+        solution = origin.known
+        if solution is None:
+            return None
+        theirs = [origin.model.index[u.name] for u in self._shared_with(origin)]
+        mine = [self.model.index[u.name] for u in self._shared_with(origin)]
+        theta, covariance = self.model.prior.copy(), np.diag(self.model.prior_sigma**2)
+        theta[mine] = solution.theta[theirs]
+        theta -= self.shift(origin.point, self.point)
+        covariance[np.ix_(mine, mine)] = solution.covariance[np.ix_(theirs, theirs)]
+        return replace(solution, theta=theta, covariance=covariance)
+
+    def _shared_with(self, origin: Engine) -> list[Unknown]:
+        return [u for u in self.model.unknowns if u.name in origin.model.index]
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""

@@ -385,6 +385,11 @@ class Engine:
             self._solution = solve(self.all_blocks, self.model)
         return self._solution
 
+    @property
+    def known(self) -> Solution | None:
+        """What is known without going through anything that waits."""
+        return self._seed if self._waiting else self.solution() or self._seed
+
     def total_rows(self) -> float:
         """Rows behind the solution."""
         return total(self.all_blocks).rows if self.all_blocks else 0.0

@@ -11,6 +11,7 @@ from onboard.core.inputs.limits import (
     LEAST_JITTER_S,
     NO_GRID_S,
     REWEIGHTINGS,
+    UNEVEN,
     WHOLE_MS,
 )
 from onboard.core.maths.arrays import Array
@@ -20,9 +21,10 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
     """De-jittered epoch times on the boot clock.
 
     Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
-    own time the stamps are its clock plus a straight line (offset and drift); without it the
-    epoch numbers are recovered from the commonest interval.  A line is fitted robustly over the
-    batch; stamps that are even already stay as they are.
+    own time the stamps are its clock plus a straight line (offset and drift); without it, or where
+    it is less even than they are, the epoch numbers are recovered from the
+    commonest interval.  A line is fitted robustly over the batch; stamps that are even already stay
+    as they are.
 
     Args:
         t: (n,) stamps, s, increasing.
@@ -45,9 +47,27 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
 
 def _clock(t: Array, t_receiver: Array | None) -> Array | None:
     """(n,) receiver time since the first epoch, s; None if the stamps show none."""
-    if t_receiver is not None and np.all(np.diff(t_receiver) > 0):
-        since: Array = t_receiver - t_receiver[0]
-        return since
+    own, counted = _own_time(t_receiver), _counted(t)
+    if own is None or counted is None:
+        return counted if own is None else own
+    its = _counted(own)
+    if its is None or _scatter(own - its) <= UNEVEN * _scatter(t - counted):
+        return own
+    # What a receiver measures at a time that its own clock has right arrives at best as evenly: the
+    # wait of a message comes on top.  This time is another one, or it was rounded.
+    return counted
+
+
+def _own_time(t_receiver: Array | None) -> Array | None:
+    """(n,) s since the first epoch by the receiver; None where it stands still between fixes."""
+    if t_receiver is None or not np.all(np.diff(t_receiver) > 0):
+        return None
+    since: Array = t_receiver - t_receiver[0]
+    return since
+
+
+def _counted(t: Array) -> Array | None:
+    """(n,) s since the first epoch by the numbers of whole periods; None if there is none."""
     period = float(np.median(np.diff(t)))
     if period <= 0.0:
         return None
@@ -58,6 +78,11 @@ def _clock(t: Array, t_receiver: Array | None) -> Array | None:
     whole = round(period * 1e3)
     counted: Array = count * (whole * 1e-3 if abs(period * 1e3 - whole) < WHOLE_MS else period)
     return counted
+
+
+def _scatter(offset: Array) -> float:
+    """Standard deviation, s, at least of what is even."""
+    return max(float(np.std(offset)), EVEN_ALREADY_S)
 
 
 def _robust_line(x: Array, y: Array) -> Array:

@@ -86,6 +86,10 @@ WHOLE_MS: Final = 0.3
 [data sheet]."""
 EVEN_ALREADY_S: Final = 2e-3
 """s; stamps that jitter by less are left alone [physics: they are whole milliseconds]."""
+UNEVEN: Final = 2.0
+"""Times the scatter of the stamps, by which epochs may scatter in receiver time: where that is true
+it is none of the stamps', and twenty of either show four times the variance by chance once in a
+thousand [probability]."""
 NO_GRID_S: Final = 0.3
 """s; more is no jitter: gaps that are no whole periods, or a clock that was set [physics]."""
 CRYSTAL: Final = 2e-4

@@ -199,6 +199,11 @@ class SlowTrack:
         self._rows.drop(min(i, max(len(self._rows) - 2, 0)))
 
 
+def _reported(fix: GpsFix) -> tuple[float | None, ...]:
+    """What a receiver has measured of where it is and how it moves."""
+    return fix.latitude, fix.longitude, fix.altitude, fix.v_n, fix.v_e, fix.v_d
+
+
 class FixTrack:
     """GPS fixes: repeats dropped, times put on the receiver's own even grid."""
 
@@ -227,7 +232,9 @@ class FixTrack:
         """Keep a new fix; False for the repeats that a faster stream sends between fixes."""
         if self._fixes:
             before = self._fixes[-1][0]
-            same = fix.t_receiver is not None and fix.t_receiver == before.t_receiver
+            # Of a receiver whose time is coarse several fixes have the same one.
+            at_once = fix.t_receiver is not None and fix.t_receiver == before.t_receiver
+            same = at_once and _reported(fix) == _reported(before)
             if same or not fix.t > before.t:
                 self.refused["gps_repeated" if same or fix.t == before.t else "gps_late"] += 1
                 return False

@@ -318,6 +318,12 @@ def test_fixes_repeated_or_late_are_dropped_by_name():
     assert track.refused == Counter(gps_repeated=2, gps_late=1)
 
 
+def test_fixes_of_one_receiver_time_that_say_another_thing_are_no_repeats():
+    track, moved = FixTrack(), replace(fix(1.1, 5.0), v_n=1.3)
+    taken = [track.add(f, trusted=True) for f in (fix(1.0, 5.0), moved, replace(moved, t=1.2))]
+    assert taken == [True, True, False]
+
+
 def test_the_last_fix_of_a_batch_is_the_first_of_the_next_at_the_same_time():
     rng = np.random.default_rng(3)
     track, seen = FixTrack(), []

@@ -202,6 +202,21 @@ def test_receiver_time_carries_the_grid_through_gaps():
     assert np.ptp(error) < 5e-3
 
 
+def test_a_receiver_time_that_is_rounded_does_not_move_epochs_that_are_even():
+    boot = 10.0 + 0.5 * np.arange(40)
+    rounded = np.floor((boot + 0.013) / 0.2) * 0.2  # half a second apart, by 0.4 and 0.6 in turn
+    assert np.array_equal(even_times(boot, rounded), boot)
+    stamps = boot + np.random.default_rng(1).uniform(0.0, 0.02, len(boot))
+    assert np.ptp(even_times(stamps, rounded) - boot) < 4e-3
+
+
+def test_epochs_that_a_receiver_does_not_measure_evenly_are_where_it_says():
+    rng = np.random.default_rng(5)
+    receiver = 0.2 * np.arange(60) + rng.choice([0.0, 0.07], 60)
+    stamps = 33.0 + receiver + rng.uniform(0.0, 0.02, 60)
+    assert np.std(even_times(stamps, receiver) - receiver) < 2e-3
+
+
 def test_even_stamps_stay_as_they_are():
     stamps = 10.0 + 0.2 * np.arange(50)
     assert np.array_equal(even_times(stamps, None), stamps)
