@@ -274,6 +274,7 @@ class Engine:
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
         highest, best, idle = -math.inf, (self.point, self.noise), 0
+        elsewhere = False
         for turn in range(MOST_ROUNDS):
             made = self._new_pass(search.members(self.noise), ready)
             results = self._over(sample, made)
@@ -286,13 +287,14 @@ class Engine:
             if likely > highest:
                 highest, best = likely, (self.point, self.noise)
             before, at = at, self.asked(self._seed.theta)
-            self.noise = search.better(self.noise, likelihoods, made.trades)
+            self.noise = search.better(self.noise, likelihoods, made.trades, elsewhere=elsewhere)
             if at.near(before, STEADY) and search.settled:
                 best = at, self.noise
                 break
             if idle == MOST_IDLE:
                 break
-            if not self.point.stands_for(at):
+            elsewhere = not self.point.stands_for(at)
+            if elsewhere:
                 self._move(at, self.noise)
                 ready = Preparations()
         self._move(*best)

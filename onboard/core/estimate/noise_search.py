@@ -20,6 +20,7 @@ class NoiseSearch:
         """Take whether the levels stand, without a search."""
         self._before: NoiseLevels | None = None
         self._way: list[NoiseLevels] = []
+        self._failed = False
         self.settled = settled
         """Whether another step is expected to gain too little to be worth its pass."""
 
@@ -31,7 +32,12 @@ class NoiseSearch:
         return (levels, *self._way, *neighbours(levels))
 
     def better(
-        self, levels: NoiseLevels, log_likelihoods: Sequence[float], trades: Array
+        self,
+        levels: NoiseLevels,
+        log_likelihoods: Sequence[float],
+        trades: Array,
+        *,
+        elsewhere: bool = False,
     ) -> NoiseLevels:
         """Levels to go on with, from what the bank of :meth:`members` has shown.
 
@@ -39,6 +45,8 @@ class NoiseSearch:
             levels: those of the first member.
             log_likelihoods: of the B members.
             trades: (B, B) as in :class:`~onboard.core.filter.passes.Pass`.
+            elsewhere: whether this pass was about another linearisation than the one before, whose
+                slopes have told the step.
         """
         if self.settled:
             return levels
@@ -47,8 +55,11 @@ class NoiseSearch:
         likely = rise[:near] + [log_prior(tried) for tried in (levels, *self._way)]
         best = int(np.argmax(likely))
         if best:
-            # The step was too long.  If no part of it was any good, then no other step will be.
-            self.settled, self._before = best == 1, None
+            # The step was too long.  If no part of it was any good, then no other step will be,
+            # unless it was told about a linearisation that is left: then another one may, once.
+            nothing = best == 1
+            self.settled = nothing and (self._failed or not elsewhere)
+            self._failed, self._before = nothing, None
             return self._way[best - 1]
         step = scoring_step(levels, rise[near:], trades[near:, near:])
         self.settled = step.gain < WORTH_A_SEARCH

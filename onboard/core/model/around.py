@@ -21,6 +21,7 @@ from onboard.core.model.quadrature import (
 )
 from onboard.core.model.response import Response
 from onboard.core.model.smoothing import Gained
+from onboard.core.model.spread import Spread, place_weights, velocity_weights
 
 AROUND_SPAN_S = 0.62
 """Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
@@ -46,6 +47,7 @@ class Around:
             (:mod:`onboard.core.model.response`).
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
             span that it averages, 1/s.
+        spread: what a receiver makes of accelerations; None if it averages over nothing.
     """
 
     now: Signals
@@ -56,6 +58,7 @@ class Around:
     slope: Array
     shapes: Array
     swing: Array
+    spread: Spread | None = None
 
 
 def around(
@@ -97,6 +100,7 @@ def around(
         own(response.slope()),
         np.moveaxis(own(response.shapes), 0, -1),
         swing,
+        followed.spread(epoch, R, window, response.apart, shares) if window > 0.0 else None,
     )
 
 
@@ -121,9 +125,9 @@ class _Followed:
         self._start = first - AROUND_SPAN_S - self._step
         count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 1
         t = np.linspace(self._start, self._start + count * self._step, 2 * count + 1)
-        fine = maker.signals(t)
+        fine, self._t = maker.signals(t), t[::2]
         if maker.recorded:
-            self._R = maker.recorded_attitude(t[::2])
+            self._R = maker.recorded_attitude(self._t)
         else:
             self._R = turns_in_a_row(fine.w_b[None], np.full(1, self._step))[0]
         self.force = (self._R @ fine.f_b[::2, :, None])[..., 0]
@@ -149,6 +153,29 @@ class _Followed:
         w = self._maker.signals(0.5 * (t + node)).w_b
         out: Array = self._R[i] @ rotation_from_vector(w * (t - node)[:, None])
         return out
+
+    def spread(
+        self, epoch: Array, R_epoch: Array, window: float, apart: float, shares: Array
+    ) -> Spread:
+        """What a receiver makes of other accelerations, looked at as coarsely as manoeuvres allow.
+
+        Args:
+            epoch: (K,) s.
+            R_epoch: (K, 3, 3) attitude at the epochs.
+            window: over which it averages, s.
+            apart: epochs, s.
+            shares: (4,) of other shapes than an even mean.
+        """
+        each = max(1, int(AROUND_SPAN_S / FEWEST_PAIRS / self._step))
+        t, step = self._t[::each], each * self._step
+        since = t - epoch[:, None]
+        return Spread(
+            self._maker.signals(t),
+            self._R[::each],
+            R_epoch,
+            velocity_weights(since, step, window, apart, shares),
+            place_weights(since, step, window),
+        )
 
     def swing(self, now: Signals, window: float) -> tuple[Array, Array]:
         """Attitude at the epochs, and the mean of ``d R / dt`` over the span, in their axes.

@@ -29,6 +29,7 @@ class Six(Family):
     """Scale and ``beta = -scale * offset`` of the accelerometer: ``f_s = scale raw + beta``."""
 
     name = "six"
+    spread = False
 
     def __init__(
         self,

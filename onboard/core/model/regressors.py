@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,10 +63,13 @@ class Family:
         name: of the family, unique in a model.
         unknowns: in the order of their regressors.
         instead_of: name of a nuisance that has the same regressors and gives way to this family.
+        spread: whether a receiver averages what its acceleration gains; not where that is in the
+            response to the linearisation's force already, or a straight line.
     """
 
     name: str = ""
     instead_of: str = ""
+    spread: ClassVar[bool] = True
     unknowns: tuple[Unknown, ...] = ()
 
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
@@ -198,6 +202,10 @@ class Model:
             a = family.acceleration(intervals.signals)
             if a is not None:
                 force1[..., s], force2[..., s] = intervals.integrals(a)
+                if family.spread and around.spread is not None:
+                    there = family.acceleration(around.spread.nodes)
+                    if there is not None:
+                        direct["vb"][..., s], direct["pb"][..., s] = around.spread.of(there)
             w = family.rate(intervals.signals)
             if w is not None:
                 turn[..., s] = intervals.integrals(w)[0]
@@ -207,7 +215,7 @@ class Model:
                 ("a", family.attitude(around)),
             ):
                 if d.body is not None:
-                    direct[key + "b"][..., s] = d.body
+                    direct[key + "b"][..., s] += d.body
                 if d.ned is not None:
                     direct[key + "n"][..., s] = d.ned
                 if d.along_velocity is not None:

@@ -32,6 +32,7 @@ class Response:
     Attributes:
         shapes: (4, K, 3) the other shapes less the even mean over the span, m/s.
         shaped: (K, 3) what their shares make of it, m/s.
+        apart: from one epoch to the next, s, as far as the velocity is known.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class Response:
         """
         self._velocity, self._t, self._window, self._shares = velocity, t, window, shares
         self._longest = 2.0 * reach
-        self._apart = min(float(np.median(np.diff(t))), reach) if len(t) > 1 else 0.0
+        self.apart = min(float(np.median(np.diff(t))), reach) if len(t) > 1 else 0.0
         self.shapes: Array = np.stack(self._less_even(range(len(shares)), window, t))
         self.shaped: Array = np.tensordot(shares, self.shapes, axes=1)
 
@@ -77,7 +78,7 @@ class Response:
 
     def _less_even(self, which: Sequence[int], window: float, t: Array) -> list[Array]:
         """Some of the shapes less the even mean, each (K, 3)."""
-        v, less = self._velocity, weight_of_two(window, self._apart)
+        v, less = self._velocity, weight_of_two(window, self.apart)
         if less <= 0.0:
             return [np.zeros((len(t), 3)) for _ in which]
         even = v.averaged(t, window)
