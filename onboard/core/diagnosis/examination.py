@@ -130,7 +130,7 @@ class Examination(Engine):
             covariance: (m, m) of it.
         """
         held = None if theta is None or covariance is None else (theta, covariance)
-        blind = held is None
+        blind = held is None and self._seed is None
         for left in (2, 1, 0):
             self.once(held)
             self._seed = found = solve(self.blocks, self.model)

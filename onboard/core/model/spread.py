@@ -61,22 +61,20 @@ def velocity_weights(since: Array, step: float, window: float, apart: float, h: 
     """(K, n) s: integrals of ``k`` over the ``step`` (s) about each node.
 
     Args:
-        since: (K, n) from the epoch to the node, s.
+        since: (K, n) from the epoch to the node, s, in order.
         step: from node to node, s.
         window: span, s.
         apart: epochs, s.
         h: (4,) shares of the shapes beside the even mean.
     """
     gains = _gains(window, apart, h)
-
-    def left(x: Array) -> Array:
-        """What of the integral is beyond ``x``."""
-        out = np.zeros_like(x)
-        for share, mean_beyond in gains:
-            out += share * (mean_beyond(x) - np.maximum(-x, 0.0))
-        return out
-
-    out: Array = left(since - 0.5 * step) - left(since + 0.5 * step)
+    ends = np.concatenate([since - 0.5 * step, since[:, -1:] + 0.5 * step], axis=1)
+    ahead = np.maximum(-ends, 0.0)
+    # What of the integral is beyond either end of a step.
+    beyond = sum(
+        (share * (mean_beyond(ends) - ahead) for share, mean_beyond in gains), np.zeros_like(ends)
+    )
+    out: Array = beyond[:, :-1] - beyond[:, 1:]
     return out
 
 
