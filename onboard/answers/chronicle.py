@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from onboard.core.estimate.calibration_record import claimed_covariance, six_information
 from onboard.core.estimate.calibrator import OF_ACCELEROMETER, Calibrator
-from onboard.core.estimate.dead_reckoning import free_errors, intervals
+from onboard.core.estimate.dead_reckoning import free_errors
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.events import Event, Restarted
 from onboard.core.estimate.gyro_axes import gyro_sigma
@@ -298,7 +298,7 @@ class Chronicle:
             raise KeyError(imu)
         held = self.calibrator.parameters.six(imu)
         sixes = (held.as_linear(), solution.theta[:6])
-        chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
+        chain = engine.intervals.of([(c.segment, c.fixes) for c in engine.batches], engine.point)
         states = list(engine.states)
         known = {id(piece): run for piece, run in self._runs([s.t for s in states])}
         times, errors = [np.zeros(0)], [np.zeros((2, 0))]

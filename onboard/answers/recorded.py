@@ -138,6 +138,7 @@ class Recorded:
             plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+        found.engine.let_epochs_go()  # a report asks for its sums and states
         self._engines[imu] = found.engine
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine, found.left_open)

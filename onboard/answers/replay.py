@@ -256,7 +256,10 @@ def read(
     if imu is not None and imu not in vehicle.imus:
         there = ", ".join(map(str, vehicle.imus))
         raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
-    return Reading(recordings, vehicle)
+    # Of those that were opened here nothing is read again: of a day's flight, places are much.
+    given = [isinstance(p, Recording) for p in paths]
+    kept = (r if mine else r.closed() for r, mine in zip(recordings, given, strict=True))
+    return Reading(tuple(kept), vehicle)
 
 
 def _refuse_repetition(recordings: Sequence[Recording]) -> None:

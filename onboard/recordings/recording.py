@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +49,14 @@ class Recording:
     def pieces(self) -> Iterator[Piece]:
         """The same, with samples together between those that they must not reach over."""
         return self.read() if self.gather is None else self.gather()
+
+    def closed(self) -> Recording:
+        """The same without its samples, and without what it takes to find them."""
+        return replace(self, read=_nothing, gather=None)
+
+
+def _nothing() -> Iterator[Sample]:
+    return iter(())
 
 
 def elapsed_s(t: NDArray[np.float64]) -> float:

@@ -12,6 +12,7 @@ from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.errors import RecordingError, UsageError
+from onboard.recordings.opening import open_recording
 from tests.cli.results import CALIBRATED
 from tests.recordings.dataflash_writer import DataflashWriter, modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
@@ -71,6 +72,16 @@ def test_every_accelerometer_gets_an_answer(tmp_path):
     assert result.duration_s == pytest.approx(1.96)
     assert listener.finished == [len(listener.samples)]
     assert {type(s) for s in listener.samples} >= {ImuSample, GpsFix, ParameterValue}
+
+
+def test_of_a_file_that_was_read_no_places_are_kept_and_a_recording_stays_open(tmp_path):
+    path = saved(tmp_path, "a.BIN", modern_log(2))
+    (closed,) = replay([path], Listener()).recordings
+    assert list(closed.samples()) == list(closed.pieces()) == []
+    given = open_recording(path)
+    assert replay([given], Listener()).recordings == (given,)
+    assert closed.duration_s == given.duration_s
+    assert len(list(given.samples())) > 100
 
 
 def test_one_accelerometer_on_request_and_none_that_is_not_there(tmp_path):

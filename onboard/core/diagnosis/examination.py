@@ -76,7 +76,7 @@ class Examination(Engine):
             more=(*families, *self.carried),
             observer=self if traced else None,
         )
-        self._like = like
+        self._refused_by: Engine | None = like
         self.batches = list(like.batches if batches is None else batches)
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
@@ -117,6 +117,7 @@ class Examination(Engine):
         """A pass begins: its epochs are kept, those of the one before are not."""
         room = sum(len(batch.fixes) for batch in self.batches)
         self.traces, self._refused = Traces(room, self.model.size), None
+        self._refused_by = None
 
     def take(self, result: PassResult) -> None:
         """Keep the epochs of a batch that has gone through."""
@@ -193,8 +194,8 @@ class Examination(Engine):
         """Those that the gates have refused in the last pass, or in that of the one it is like."""
         if self._refused is not None:
             return self._refused
-        if not len(self.traces) and isinstance(self._like, Examination):
-            return self._like.refused_velocities()
+        if isinstance(self._refused_by, Examination):
+            return self._refused_by.refused_velocities()
         named = [(i, n) for i, x in self.traces.refused.items() for n in x if n in VELOCITY]
         stamps = self.point.stamp(self.traces.t[[i for i, _ in named]])
         return Refused(zip(stamps.tolist(), (n for _, n in named), strict=True))
@@ -203,6 +204,11 @@ class Examination(Engine):
         """Keep of them only which velocities were refused: of a day's flight they are much."""
         self._refused = self.refused_velocities()
         self.traces = Traces()
+
+    def let_sums_go(self) -> None:
+        """Keep nothing of the last pass but what was refused: another one's sums are asked."""
+        self.blocks = []
+        self.states.clear()
 
     @property
     def absent(self) -> Array:

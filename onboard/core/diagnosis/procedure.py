@@ -67,6 +67,8 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     clear = cleared(calibrator, engine, flight, origin)
     companions = _companions(calibrator, imu, clear, latest=latest)
     full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
+    if full is not clear.full:
+        clear.full.let_sums_go()
     rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
     final, families = settled(full, choice, families, named_only=clear.clipped)

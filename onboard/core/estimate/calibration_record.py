@@ -11,7 +11,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_model import beyond_range
 from onboard.core.estimate.certificate import certify
-from onboard.core.estimate.dead_reckoning import Drift, free_drift, intervals
+from onboard.core.estimate.dead_reckoning import Drift, free_drift
 from onboard.core.estimate.determined import determine, flown_loads, force_moments
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.gyro_axes import gyro_sigma
@@ -374,7 +374,7 @@ def _certificate(engine: Engine) -> Certificate | None:
 
 def _drifts(engine: Engine, before: Array, after: Array) -> tuple[Drift | None, Drift | None]:
     """Free drift over a long and a short horizon; ``before``, ``after`` (6,) are scale, beta."""
-    chain = intervals([(c.segment, c.fixes) for c in engine.batches], engine.point)
+    chain = engine.intervals.of([(c.segment, c.fixes) for c in engine.batches], engine.point)
     states = list(engine.states)
     return (
         free_drift(chain, states, (before, after), horizon_s=LONG_DRIFT_S, most=LONG_DRIFTS),

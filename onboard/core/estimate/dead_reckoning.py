@@ -15,7 +15,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from onboard.core.estimate.limits import FEWEST_INTERVALS, LONG_DRIFTS, SAME_EPOCH_S, WHOLE_SHARE
+from onboard.core.estimate.limits import (
+    FEWEST_INTERVALS,
+    LONG_DRIFTS,
+    MOST_KNOWN,
+    SAME_EPOCH_S,
+    WHOLE_SHARE,
+)
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -202,6 +208,40 @@ def intervals(pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> 
                 getattr(out, f.name)[first : first + len(made)] = getattr(made, f.name)
             first += len(made)
     return out
+
+
+class KnownIntervals:
+    """Integrals of batches of flight, kept for the next time that the same are asked for.
+
+    In flight an answer is worked out every now and then, and all but a batch or two are the ones of
+    before; a report asks for what the answer has asked for.  Of hours nothing is kept.
+    """
+
+    __slots__ = ("_known", "_point")
+
+    def __init__(self) -> None:
+        self._point: Linearisation | None = None
+        self._known: dict[tuple[int, int], tuple[Segment, Fixes, Chain]] = {}
+
+    def __deepcopy__(self, memo: object) -> KnownIntervals:
+        return KnownIntervals()  # whoever copies a flight asks once
+
+    def of(self, pieces: Sequence[tuple[Segment, Fixes]], point: Linearisation) -> Chain:
+        """The same as :func:`intervals`."""
+        before = self._known if point == self._point else {}
+        self._point, self._known = point, {}
+        if not 0 < len(pieces) <= MOST_KNOWN:
+            return intervals(pieces, point)
+        for segment, fixes in pieces:
+            key = id(segment), id(fixes)
+            # With what it is made of: of an object that is gone another may have the number.
+            self._known[key] = before.get(key) or (
+                segment,
+                fixes,
+                intervals([(segment, fixes)], point),
+            )
+        chains = [chain for _, _, chain in self._known.values()]
+        return Chain(*(np.concatenate([getattr(c, f.name) for c in chains]) for f in fields(Chain)))
 
 
 def _of_piece(segment: Segment, fixes: Fixes, point: Linearisation) -> Chain:

@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
+from onboard.core.estimate.dead_reckoning import KnownIntervals
 from onboard.core.estimate.limits import (
     MOST_AGED,
     MOST_IDLE,
@@ -108,6 +109,7 @@ class Engine:
         self.refused_untuned: Counter[str] = Counter()
         """What the gates refused with the levels from which those that hold were found."""
         self.states = StateLog(MOST_STATES)
+        self.intervals = KnownIntervals()
         self.trusted_s = 0.0
         self.left_brisk_s = 0.0
         """Of :attr:`brisk_s` what has left the buffer."""

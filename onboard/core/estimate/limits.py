@@ -45,6 +45,9 @@ NEW_SHARE: Final = 0.05
 """Share of a flight that must be new for another refinement at its end [cost]."""
 MOST_STATES: Final = 12000
 """Epochs whose state is kept for certificates: 20 minutes at 10 Hz [cost]."""
+MOST_KNOWN: Final = 64
+"""Batches of flight, at the most, whose integrals are kept for the next answer: ten minutes, a
+megabyte at five fixes a second [cost]."""
 MOST_AGED: Final = 24
 """Blocks of flight that has left the buffer: enough for folds and clusters [cost]."""
 

@@ -44,7 +44,10 @@ class Pool:
         if not np.any(ratio > least):
             return cls(least)
         centres = np.geomspace(least, float(ratio.max()), CENTRES)
-        chances = [_log_likelihood(ratio, count, centres, f, least) for f in FREEDOMS]
+        above = ratio > least
+        seen = ratio[above] / centres[:, None]
+        inside, below = _Counts(count[above]), _Counts(count[~above])
+        chances = [_log_likelihood(seen, inside, below, centres, f, least) for f in FREEDOMS]
         i, j = np.unravel_index(int(np.argmax(chances)), (len(FREEDOMS), CENTRES))
         return cls(float(centres[j]), FREEDOMS[i])
 
@@ -60,29 +63,36 @@ BELOW = np.geomspace(1e-3, 1.0, 24)
 """Shares of the least centre at which the density below it is summed."""
 
 
+class _Counts:
+    """How many blocks count, (k,), and what of a density depends on nothing else."""
+
+    __slots__ = ("_front", "half", "n")
+
+    def __init__(self, n: Array) -> None:
+        self.n, self.half = n, 0.5 * n
+        self._front = -np.array([math.lgamma(h) for h in self.half])
+
+    def log_density(self, u: Array, freedom: float) -> Array:
+        """Of Fisher's F with these and ``freedom`` degrees; of chi-square over n without end."""
+        n, half, front = self.n, self.half, self._front
+        if math.isinf(freedom):
+            front = front + half * np.log(half)
+            tail = half * u
+        else:
+            front = front + np.array([math.lgamma(h + 0.5 * freedom) for h in half])
+            front += half * np.log(n / freedom) - math.lgamma(0.5 * freedom)
+            tail = (half + 0.5 * freedom) * np.log1p(n * u / freedom)
+        out: Array = front + (half - 1.0) * np.log(u) - tail
+        return out
+
+
 def _log_likelihood(
-    ratio: Array, count: Array, centres: Array, freedom: float, least: float
+    seen: Array, inside: _Counts, below: _Counts, centres: Array, freedom: float, least: float
 ) -> Array:
-    """Of ratios (k,), with each of the centres (c,): (c,)."""
-    above = ratio > least
-    inside = _log_density(ratio[above] / centres[:, None], count[above], freedom)
-    out: Array = np.sum(inside - np.log(centres)[:, None], axis=1)
+    """Of ratios above ``least``, over each of the centres, (c, j), and of those below it: (c,)."""
+    density = inside.log_density(seen, freedom)
+    out: Array = np.sum(density - np.log(centres)[:, None], axis=1)
     u = BELOW[:, None] * (least / centres)[:, None, None]
-    under = np.trapezoid(np.exp(_log_density(u, count[~above], freedom)) * u, np.log(BELOW), axis=1)
+    under = np.trapezoid(np.exp(below.log_density(u, freedom)) * u, np.log(BELOW), axis=1)
     out += np.log(np.maximum(under, TINY)).sum(axis=1)
-    return out
-
-
-def _log_density(u: Array, n: Array, freedom: float) -> Array:
-    """Of Fisher's F with ``n`` and ``freedom`` degrees; of chi-square over ``n`` without end."""
-    half = 0.5 * n
-    front = -np.array([math.lgamma(h) for h in half])
-    if math.isinf(freedom):
-        front += half * np.log(half)
-        tail = half * u
-    else:
-        front += np.array([math.lgamma(h + 0.5 * freedom) for h in half])
-        front += half * np.log(n / freedom) - math.lgamma(0.5 * freedom)
-        tail = (half + 0.5 * freedom) * np.log1p(n * u / freedom)
-    out: Array = front + (half - 1.0) * np.log(u) - tail
     return out

@@ -41,5 +41,7 @@ def moved(duration: float, time: Array) -> tuple[Array, Array]:
     """
     x = duration / time
     shrunk = np.exp(-x)
-    swing = np.stack([duration * shrunk, -x / time * shrunk, (1.0 - x) * shrunk], axis=-1)
+    swing = np.empty((len(time), 3))
+    swing[:, 0], swing[:, 1] = duration * shrunk, -x / time * shrunk
+    swing[:, 2] = (1.0 - x) * shrunk
     return (1.0 + x) * shrunk, swing

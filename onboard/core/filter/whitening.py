@@ -44,7 +44,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.readings import kinds_of, reading
 from onboard.core.filter.refused import Refused
 from onboard.core.filter.smooth_error import moved
-from onboard.core.filter.state import ATT, BIAS, CH, PSI, RATE, STATES, H, V
+from onboard.core.filter.state import ATT, BIAS, CH, MEASURED, PSI, RATE, STATES, H, V
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
 from onboard.core.maths.arrays import Array
@@ -194,7 +194,8 @@ class WhiteningFilter:
             down += more
         fall = np.array([north * T, east * T, down * T, -0.5 * T * T * down, 0.0, 0.0, 0.0])
         cv, tilt = math.exp(-T / COLOUR_TIME_S), math.exp(-T / ATTITUDE_TIME_S)
-        decay = np.tile([cv, cv, cv, 1.0, tilt, tilt, 1.0], (len(self.bank), 1))
+        decay = np.empty((len(self.bank), MEASURED))
+        decay[:] = (cv, cv, cv, 1.0, tilt, tilt, 1.0)
         decay[:, -1], swing = moved(T, self.variances.heading_time)
         process = Process(fall, decay, swing, *self.variances.over(T, decay))
         self.kernel.predict(self.carried, R, step, process)

@@ -13,6 +13,7 @@ from onboard.core.inputs.gyroscopes import rates_at
 from onboard.core.inputs.limits import (
     AFTER_S,
     AHEAD_S,
+    ATTITUDE_MARGIN_S,
     FEWEST_FIXES,
     FEWEST_SAMPLES,
     IMU_GAP_S,
@@ -194,12 +195,14 @@ class Assembly:
         cut = _needed(t, fixes.t)
         t, rows = t[cut], rows[cut]
         # Not views: they would keep the temperature of every sample alive.
-        w_b, raw_s = rows[:, :3].copy(), rows[:, 3:6].copy()
+        t, w_b, raw_s = t.copy(), rows[:, :3].copy(), rows[:, 3:6].copy()
         lag = parameters.gyro_lag
         if abs(lag) > LEAST_LAG_S:
             shifted = np.clip(t + lag, t[0], t[-1])
             w_b = np.stack([np.interp(shifted, t, w_b[:, j]) for j in range(3)], axis=-1)
-        t_attitude, angles = self.streams.recorded.arrays()
+        t_attitude, angles = self.streams.recorded.around(
+            float(t[0]) - ATTITUDE_MARGIN_S, float(t[-1]) + ATTITUDE_MARGIN_S
+        )
         slow = self.streams.slow_arrays(imu)
         if np.all(np.isfinite(rows[:, 6])):
             few = slice(None, None, TEMPERATURE_EVERY)

@@ -30,6 +30,10 @@ KEPT_S: Final = 0.3
 SLOW_KEPT_S: Final = 1.0
 """s; and those of slow signals so much longer still [cost]."""
 
+ATTITUDE_MARGIN_S: Final = 0.3
+"""s; the recorded attitude is kept for so much longer than the samples to either side: it is asked
+for within them, early or late by its own delay [physics: 0.15 at the most]."""
+
 # Cutting (assembly).
 
 IMU_GAP_S: Final = 0.25

@@ -193,6 +193,13 @@ class SlowTrack:
         t, x = self._rows.arrays()
         return t.copy(), x.copy()
 
+    def around(self, first: float, last: float) -> tuple[Array, Array]:
+        """The same of what is between two times, s, and one value to either side."""
+        t, x = self._rows.arrays()
+        begin = max(int(np.searchsorted(t, first)) - 1, 0)
+        end = int(np.searchsorted(t, last, side="right")) + 1
+        return t[begin:end].copy(), x[begin:end].copy()
+
     def drop_before(self, t: float) -> None:
         """Forget what is older than ``t``, but keep the last two values."""
         i = int(np.searchsorted(self._rows.arrays()[0], t))

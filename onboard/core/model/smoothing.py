@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
@@ -53,28 +54,41 @@ class Gained:
         np.cumsum(0.5 * step * (a[:-1] + a[1:]), axis=0, out=v[1:])
         x[1:] = np.cumsum(step * v[:-1] + step**2 / 6.0 * (2.0 * a[:-1] + a[1:]), axis=0)
 
-    def _gained(self, t: Array, shift: float) -> tuple[Array, Array]:
-        """Velocity gained since the first node, m/s, and place, m, at ``t + shift``: (k, 3)."""
+    def _compiled(self, t: Array, shift: float) -> tuple[Array, Array] | None:
+        """Velocity and place at ``t + shift``, (k, 3) each, by compiled loops if there are some."""
         loops = compiled_loops()
-        if loops is not None:
-            velocity, place = np.empty((len(t), 3)), np.empty((len(t), 3))
-            nodes = self._start, self._step, self._a, self._v, self._x
-            loops.gained(*nodes, plain(t), shift, velocity, place)
-            return velocity, place
+        if loops is None:
+            return None
+        velocity, place = np.empty((len(t), 3)), np.empty((len(t), 3))
+        nodes = self._start, self._step, self._a, self._v, self._x
+        loops.gained(*nodes, plain(t), shift, velocity, place)
+        return velocity, place
+
+    def _since_node(self, t: Array, shift: float) -> tuple[NDArray[np.intp], Array, Array, Array]:
+        """The node before ``t + shift``, s since then (k, 1), the force there and its slope."""
         since = t + shift - self._start
         i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
         s = (since - i * self._step)[:, None]
-        a, slope = self._a[i], (self._a[i + 1] - self._a[i]) / self._step
-        velocity = self._v[i] + s * (a + 0.5 * s * slope)
-        return velocity, self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
+        a = self._a[i]
+        return i, s, a, (self._a[i + 1] - a) / self._step
 
     def velocity(self, t: Array, shift: float = 0.0) -> Array:
         """(k, 3) gained since the first node until times ``t + shift`` (k,), m/s."""
-        return self._gained(t, shift)[0]
+        found = self._compiled(t, shift)
+        if found is not None:
+            return found[0]
+        i, s, a, slope = self._since_node(t, shift)
+        velocity: Array = self._v[i] + s * (a + 0.5 * s * slope)
+        return velocity
 
     def place(self, t: Array, shift: float = 0.0) -> Array:
         """(k, 3) its integral, m."""
-        return self._gained(t, shift)[1]
+        found = self._compiled(t, shift)
+        if found is not None:
+            return found[1]
+        i, s, a, slope = self._since_node(t, shift)
+        place: Array = self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
+        return place
 
     def mean(self, t: Array, width: float) -> Array:
         """Mean of the force over ``width`` (s) about times ``t`` (k,): (k, 3), m/s^2.
@@ -139,10 +153,7 @@ class Gained:
         lag = window / SPREAD
         if lag <= 0.0:
             return np.zeros((len(t), 3))
-        since = t + lag - self._start
-        i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
-        s = (since - i * self._step)[:, None]
-        a, slope = self._a[i], (self._a[i + 1] - self._a[i]) / self._step
+        i, s, a, slope = self._since_node(t, lag)
         kept = np.exp(-s / lag)
         force = kept * self._lagged_force(lag)[i] + (1.0 - kept) * (a - lag * slope) + slope * s
         out: Array = self.velocity(t, lag) - lag * force - self.velocity(t)

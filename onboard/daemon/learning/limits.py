@@ -32,8 +32,8 @@ asked for, and a slow link brings one in two seconds [data]."""
 
 # How often is computed
 
-SOLVING_SHARE: Final = 0.003
-"""Of a core: after a solution that took 0.06 s, the next one is due 20 s later, which is every
+SOLVING_SHARE: Final = 0.0015
+"""Of a core: after a solution that took 0.03 s, the next one is due 20 s later, which is every
 second batch [cost]."""
 IN_FLIGHT_SHARE: Final = 0.02
 """Of a core: after a diagnosis in flight that took 5 s, the next one is due 250 s later [cost]."""

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from onboard.core.estimate import dead_reckoning
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.dead_reckoning import free_drift, free_errors, intervals
+from onboard.core.estimate.dead_reckoning import (
+    Chain,
+    KnownIntervals,
+    free_drift,
+    free_errors,
+    intervals,
+)
+from onboard.core.inputs.segments import Fixes, Segment
+from onboard.core.model.linearisation import Linearisation
 from onboard.mavlink.decode import Decoder
 from sitl import recording
 from sitl.builtin.truth import ImuTruth
@@ -37,6 +47,43 @@ def flight():
     in_force = np.concatenate([scale, -scale * np.array(held.offset)])
     # The filter's attitude belongs to its own estimate, and so does the drift that is least.
     return chain, list(engine.states), in_force, engine.solution().theta[:6]
+
+
+def test_integrals_that_are_known_are_those_that_are_made():
+    pieces, point = [piece(start) for start in (0.0, 9.0, 18.0)], Linearisation()
+    known = KnownIntervals()
+    for these in (pieces[:2], pieces, pieces[1:], pieces):
+        for at in (point, replace(point, delay=0.15), point):
+            made, again = known.of(these, at), intervals(these, at)
+            for f in fields(Chain):
+                assert np.array_equal(getattr(made, f.name), getattr(again, f.name))
+
+
+def test_integrals_are_made_once(monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        dead_reckoning, "intervals", lambda some, point: made.append(some) or intervals(some, point)
+    )
+    pieces, known = [piece(start) for start in (0.0, 9.0, 18.0)], KnownIntervals()
+    for count in (1, 2, 2, 3):
+        known.of(pieces[:count], Linearisation())
+    assert [list(some) for some in made] == [[one] for one in pieces]
+
+
+def piece(start):
+    """Ten seconds of a turn, and fixes inside."""
+    t = start + np.arange(0.0, 12.0, 0.02)
+    ones = np.ones((len(t), 3))
+    segment = Segment(
+        t,
+        0.1 * ones * np.sin(t)[:, None],
+        ones * [0.0, 0.0, -9.8],
+        t,
+        np.broadcast_to(np.eye(3), (len(t), 3, 3)),
+        np.eye(3),
+    )
+    at = start + np.arange(1.4, 10.4, 0.2)
+    return segment, Fixes(at, np.zeros((len(at), 3)), np.zeros(len(at)), np.zeros(len(at)))
 
 
 def windows(errors):

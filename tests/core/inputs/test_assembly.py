@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.assembly import Assembly, AssemblySettings
-from onboard.core.inputs.limits import AFTER_S, AHEAD_S, IMU_GAP_S, REACH_S
+from onboard.core.inputs.limits import (
+    AFTER_S,
+    AHEAD_S,
+    ATTITUDE_MARGIN_S,
+    IMU_GAP_S,
+    REACH_S,
+)
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 
@@ -76,6 +82,17 @@ def test_a_batch_has_every_sample_that_its_fixes_need(case):
         wanted = needed[(needed >= first) & (needed < last)]
         assert np.all(np.isin(wanted[wanted <= t[-1]], t))
         assert t[0] <= batch.fixes.t[0] - REACH_S + 0.1 + 1.0 / RATE
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_batch_has_the_attitudes_around_its_samples_and_hardly_more(case):
+    batches, imu, _, _ = flown(**case)
+    for batch in batches:
+        t, t_attitude = batch.segment.t, batch.segment.t_attitude
+        asked = imu[(imu >= t[0] - ATTITUDE_MARGIN_S) & (imu <= t[-1] + ATTITUDE_MARGIN_S)]
+        assert np.all(np.isin(asked, t_attitude))
+        assert len(t_attitude) <= len(asked) + 2
+        assert len(batch.segment.R_attitude) == len(t_attitude)
 
 
 @pytest.mark.parametrize("case", CASES)
