@@ -77,6 +77,19 @@ def full(request):
     return Examination(engine, testable, t0=t0, batches=engine.batches).with_noise()
 
 
+def test_another_examination_of_a_flight_begins_with_what_this_one_knows(full):
+    known = full.found()
+    jump = BiasStep(Origin(0.0)).at(full.point.skew_from + AT)
+    other = full.beside([jump])
+    at = [other.model.index[u.name] for u in full.model.unknowns]
+    np.testing.assert_array_equal(other.known.theta[at], known.theta)
+    np.testing.assert_array_equal(other.known.covariance[np.ix_(at, at)], known.covariance)
+    # Of the jump it knows what is known of any.
+    mine = other.indices(jump)
+    own = np.diag(other.known.covariance)[mine]
+    np.testing.assert_allclose(own, other.model.prior_sigma[mine] ** 2)
+
+
 def gains(full, times):
     return np.array(onsets.gains(full, (), [BiasStep(Origin(0.0)).at(float(t)) for t in times]))
 
