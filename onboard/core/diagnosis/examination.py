@@ -22,7 +22,7 @@ from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.regressors import Family, Unknown
+from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import Effect
 
 VELOCITY = ("velocity", "recovery")
@@ -92,16 +92,8 @@ class Examination(Engine):
         solution = origin.known
         if solution is None:
             return None
-        theirs = [origin.model.index[u.name] for u in self._shared_with(origin)]
-        mine = [self.model.index[u.name] for u in self._shared_with(origin)]
-        theta, covariance = self.model.prior.copy(), np.diag(self.model.prior_sigma**2)
-        theta[mine] = solution.theta[theirs]
-        theta -= self.shift(origin.point, self.point)
-        covariance[np.ix_(mine, mine)] = solution.covariance[np.ix_(theirs, theirs)]
-        return replace(solution, theta=theta, covariance=covariance)
-
-    def _shared_with(self, origin: Engine) -> list[Unknown]:
-        return [u for u in self.model.unknowns if u.name in origin.model.index]
+        known = self.model.taken_over(origin.model, solution.theta, solution.covariance)
+        return replace(solution, theta=known[0], covariance=known[1])
 
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
@@ -172,7 +164,6 @@ class Examination(Engine):
         """
         made = Examination(self, self._own, t0=self.point.skew_from, start=self, traced=False)
         made.noise = replace(self.noise, attitude=LIMITS["attitude"][1])
-        made._seed = self._seed
         made.once()
         return made
 

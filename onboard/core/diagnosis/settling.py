@@ -74,12 +74,8 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
         point=full.asked(fit.theta, model),
         refused=full.refused_velocities(),
     )
-    theta, covariance = final.model.prior.copy(), np.diag(final.model.prior_sigma**2)
-    mine = [i for i, u in enumerate(final.model.unknowns) if u.name in model.index]
-    theirs = [model.index[final.model.unknowns[i].name] for i in mine]
-    theta[mine] = fit.theta[theirs]
     known = choice.fitter.covariance(fit)
-    covariance[np.ix_(mine, mine)] = known[np.ix_(theirs, theirs)]
+    theta, covariance = final.model.taken_over(model, fit.theta, known)
     return final.with_rows(final.about_point(theta), covariance)
 
 

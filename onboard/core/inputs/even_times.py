@@ -48,10 +48,10 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
 def _clock(t: Array, t_receiver: Array | None) -> Array | None:
     """(n,) receiver time since the first epoch, s; None if the stamps show none."""
     own, counted = _own_time(t_receiver), _counted(t)
-    if own is None or counted is None:
-        return counted if own is None else own
+    if own is None:
+        return counted
     its = _counted(own)
-    if its is None or _scatter(own - its) <= UNEVEN * _scatter(t - counted):
+    if counted is None or its is None or _scatter(own - its) <= UNEVEN * _scatter(t - counted):
         return own
     # What a receiver measures at a time that its own clock has right arrives at best as evenly: the
     # wait of a message comes on top.  This time is another one, or it was rounded.

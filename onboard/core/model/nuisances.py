@@ -29,7 +29,7 @@ class Six(Family):
     """Scale and ``beta = -scale * offset`` of the accelerometer: ``f_s = scale raw + beta``."""
 
     name = "six"
-    spread = False
+    is_averaged = False
 
     def __init__(
         self,

@@ -63,13 +63,13 @@ class Family:
         name: of the family, unique in a model.
         unknowns: in the order of their regressors.
         instead_of: name of a nuisance that has the same regressors and gives way to this family.
-        spread: whether a receiver averages what its acceleration gains; not where that is in the
-            response to the linearisation's force already, or a straight line.
+        is_averaged: whether a receiver averages what its acceleration gains; not where that is in
+            the response to the linearisation's force already, or a straight line.
     """
 
     name: str = ""
     instead_of: str = ""
-    spread: ClassVar[bool] = True
+    is_averaged: ClassVar[bool] = True
     unknowns: tuple[Unknown, ...] = ()
 
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
@@ -175,6 +175,24 @@ class Model:
         self.prior = np.array([u.prior for u in self.unknowns])
         self.prior_sigma = np.array([u.prior_sigma for u in self.unknowns])
 
+    def taken_over(self, other: Model, theta: Array, covariance: Array) -> tuple[Array, Array]:
+        """An estimate of another model's unknowns as one of these, by their names.
+
+        Args:
+            other: the model, of k unknowns.
+            theta: (k,) estimate.
+            covariance: (k, k) of it.
+
+        Returns:
+            (m,) and (m, m); what the other model does not have is as its prior has it.
+        """
+        mine = [i for i, u in enumerate(self.unknowns) if u.name in other.index]
+        theirs = [other.index[self.unknowns[i].name] for i in mine]
+        out, spread = self.prior.copy(), np.diag(self.prior_sigma**2)
+        out[mine] = theta[theirs]
+        spread[np.ix_(mine, mine)] = covariance[np.ix_(theirs, theirs)]
+        return out, spread
+
     def remembering(self, segment: Segment, before: Mapping[str, Signal]) -> Segment:
         """The segment with what families remember among its slow signals.
 
@@ -202,7 +220,7 @@ class Model:
             a = family.acceleration(intervals.signals)
             if a is not None:
                 force1[..., s], force2[..., s] = intervals.integrals(a)
-                if family.spread and around.spread is not None:
+                if family.is_averaged and around.spread is not None:
                     there = family.acceleration(around.spread.nodes)
                     if there is not None:
                         direct["vb"][..., s], direct["pb"][..., s] = around.spread.of(there)

@@ -33,6 +33,11 @@ def weight_of_two(window: float, apart: float) -> float:
     return 0.5 - math.sqrt(max(0.25 - spread**2, 0.0))
 
 
+def between_two(window: float, older: float) -> float:
+    """How far apart two moments are, s, that spread like ``window`` with this weight of either."""
+    return window / SPREAD / math.sqrt(older * (1.0 - older))
+
+
 class Gained:
     """An acceleration, straight lines between equidistant nodes, integrated twice and exactly.
 
@@ -131,7 +136,7 @@ class Gained:
             window: s.
             older: weight of the older one, between 0 and 1.
         """
-        apart = window / SPREAD / math.sqrt(older * (1.0 - older))
+        apart = between_two(window, older)
         newest, oldest = self.velocity(t, older * apart), self.velocity(t, (older - 1.0) * apart)
         out: Array = (1.0 - older) * newest + older * oldest - self.velocity(t)
         return out

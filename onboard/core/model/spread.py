@@ -13,7 +13,6 @@ Left out, a tilt of two degrees is found a twentieth too small behind a receiver
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
-from onboard.core.model.smoothing import SPREAD, weight_of_two
+from onboard.core.model.smoothing import SPREAD, between_two, weight_of_two
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +97,7 @@ def _gains(window: float, apart: float, h: Array) -> list[tuple[float, MeanBeyon
         return out
 
     def two(older: float) -> MeanBeyond:
-        between = window / SPREAD / math.sqrt(older * (1.0 - older))
+        between = between_two(window, older)
 
         def beyond(x: Array) -> Array:
             newest = np.maximum(older * between - x, 0.0)

@@ -25,7 +25,7 @@ class Gravity(Effect):
     cure = "none: the autopilot integrates with 9.80665 everywhere"
     apart = "fly steep banked turns: an offset turns with the body, gravity does not"
     keys = ("delta_g",)
-    spread = False
+    is_averaged = False
     # Poles to equator, and 5 km up, it is between 0.03 more and 0.045 less than the standard.
     plausible = (0.045,)
     unknowns = (Unknown("delta_g", "m/s^2", 0.0, 0.06),)
