@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +21,7 @@ from onboard.answers.replay_document import RecordingDocument, ReplayDocument, i
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage
 from onboard.core.inputs.blocks import Block, Piece
+from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
@@ -32,6 +33,8 @@ Progress = Callable[[float], None]
 """Told the share of the work that is done, 0 ... 1, now and then."""
 
 PROGRESS_EVERY = 1024
+TIMES_LOOKED_AT = 1000
+"""Of a stream, that tell how fast it is."""
 DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
 
 
@@ -287,6 +290,7 @@ class Vehicle:
 
     def __init__(self) -> None:
         self._samples: Counter[int] = Counter()
+        self._first_times: defaultdict[int, list[float]] = defaultdict(list)
         self._fixes = 0
         self.standing_s = 0.0
         """Time on the ground, s."""
@@ -301,17 +305,22 @@ class Vehicle:
         """
         if isinstance(sample, Block):
             for columns in sample.imus:
-                self._samples[columns.imu] += len(columns.t)
+                self._count(columns.imu, columns.t.tolist())
             for other in sample.others:
                 self.check(other, recording)
         elif isinstance(sample, ImuSample):
-            self._samples[sample.imu] += 1
+            self._count(sample.imu, (sample.t,))
         elif isinstance(sample, GpsFix):
             self._fixes += 1
         elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
             self._parameters[sample.name] = sample.value
             if sample.name in DEVICE_IDS and sample.value:
                 self._check_device(sample, recording)
+
+    def _count(self, imu: int, times: Sequence[float]) -> None:
+        self._samples[imu] += len(times)
+        if len(self._first_times[imu]) < TIMES_LOOKED_AT:
+            self._first_times[imu] += times
 
     def _check_device(self, sample: ParameterValue, recording: Recording) -> None:
         imu = DEVICE_IDS[sample.name]
@@ -338,12 +347,18 @@ class Vehicle:
     def silence(self, imu: int) -> str:
         """Why an accelerometer has no answer."""
         samples = f"accelerometer {imu}: {self._samples[imu]} samples"
+        if self._slow(imu):
+            return f"{samples}, fewer than 5 a second; 25 are good"
         if self.standing_s > 0.0:
             return (
                 f"{samples}, none of them in the air with trusted GPS; "
                 f"the {self.standing_s:.0f} s on the ground are not used"
             )
-        return f"{samples}, never at 10 a second or more together with attitude and trusted GPS"
+        return f"{samples}, never together with attitude and trusted GPS"
+
+    def _slow(self, imu: int) -> bool:
+        steps = np.diff(self._first_times[imu])
+        return len(steps) > 0 and SLOWEST_IMU_HZ * float(np.median(steps)) > 1.0
 
     def unanswered(self, imu: int) -> Calibration:
         """What to say of an accelerometer of which the estimator could make nothing."""
@@ -354,11 +369,11 @@ class Vehicle:
             in_force,
             self.silence(imu),
             parameters_known=all(name in self._parameters for name in names.six),
-            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do()),
+            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do(imu)),
         )
 
-    def _to_do(self) -> str:
-        if self.standing_s > 0.0:
+    def _to_do(self, imu: int) -> str:
+        if self.standing_s > 0.0 and not self._slow(imu):
             return "fly: fast, with hard braking and turns both ways"
         return "record it at 25 Hz or more, with attitude and GPS"
 

@@ -38,6 +38,12 @@ for within them, early or late by its own delay [physics: 0.15 at the most]."""
 
 IMU_GAP_S: Final = 0.25
 """s; attitude changes too much over a longer gap to be interpolated [physics]."""
+ONE_LOST: Final = 2.2
+"""Steps of a stream at which one sample is missing: no gap of a slow one, whose own steps are as
+long as that [data sheet: stamps of 5 Hz jitter by a tenth of a step]."""
+SLOWEST_IMU_HZ: Final = 4.5
+"""Inertial samples a second: five, less what stamps jitter by.  The six are as far off then as
+their sigmas say; with three z is 3.5 sigma off on planes [tuned: see docs/benchmarks.md]."""
 FEWEST_SAMPLES: Final = 8
 """Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
 FEWEST_FIXES: Final = 3
