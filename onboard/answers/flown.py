@@ -22,6 +22,7 @@ from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.samples import (
+    FIX_3D,
     AirData,
     Battery,
     GpsFix,
@@ -311,7 +312,7 @@ def _mean(group: list[ImuSample]) -> ImuSample:
 
 def _counts(sample: Sample) -> TypeGuard[GpsFix]:
     """Whether it is a fix in three dimensions."""
-    return isinstance(sample, GpsFix) and sample.fix_type >= 3
+    return isinstance(sample, GpsFix) and sample.fix_type >= FIX_3D
 
 
 def _said_to_stand(samples: list[Sample]) -> Mask:

@@ -17,7 +17,7 @@ import numpy as np
 
 from onboard.answers.match import SAME, Match
 from onboard.answers.sensor_level import SIMULATED_PERIOD_S
-from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
+from onboard.core.inputs.samples import FIX_3D, AttitudeSample, GpsFix, ImuSample
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.wind_profile import LOWEST_M, TOP_M
 from onboard.core.vehicle.limits import APART
@@ -184,7 +184,7 @@ def courses(path: str | Path) -> Courses:
     """
     fixes, imu, attitude = [], [], []
     for s in open_recording(path).samples():
-        if isinstance(s, GpsFix) and s.fix_type >= 3:
+        if isinstance(s, GpsFix) and s.fix_type >= FIX_3D:
             fixes.append((s.t, s.v_n, s.v_e, s.v_d or 0.0))
         elif isinstance(s, ImuSample) and s.imu == 1:
             imu.append((s.t, *s.f_b))

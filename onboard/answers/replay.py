@@ -22,7 +22,7 @@ from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage
 from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
-from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
 from onboard.errors import RecordingError, UsageError
@@ -291,7 +291,7 @@ class Vehicle:
     def __init__(self) -> None:
         self._samples: Counter[int] = Counter()
         self._first_times: defaultdict[int, list[float]] = defaultdict(list)
-        self._fixes = 0
+        self._fixes = self._placed = 0
         self.standing_s = 0.0
         """Time on the ground, s."""
         self._parameters: dict[str, float] = {}
@@ -312,6 +312,7 @@ class Vehicle:
             self._count(sample.imu, (sample.t,))
         elif isinstance(sample, GpsFix):
             self._fixes += 1
+            self._placed += sample.fix_type >= FIX_3D
         elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
             self._parameters[sample.name] = sample.value
             if sample.name in DEVICE_IDS and sample.value:
@@ -349,6 +350,8 @@ class Vehicle:
         samples = f"accelerometer {imu}: {self._samples[imu]} samples"
         if self._slow(imu):
             return f"{samples}, fewer than 5 a second; 25 are good"
+        if not self._placed:
+            return f"{samples}, and {'no fix of the GPS receiver' if self._fixes else 'no GPS'}"
         if self.standing_s > 0.0:
             return (
                 f"{samples}, none of them in the air with trusted GPS; "

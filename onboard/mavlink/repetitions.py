@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, Sample
+from onboard.core.inputs.samples import FIX_3D, AttitudeSample, GpsFix, ImuSample, Sample
 from onboard.mavlink import limits
 
-FIX_3D = 3
 Key: TypeAlias = tuple[str, int, str]
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from onboard.core.inputs.samples import FIX_3D
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.recordings.arrays import Arrays, read_arrays
 from onboard.recordings.dataflash_formats import Records
@@ -37,7 +38,6 @@ LEAP_S = 18.0
 WEEK_S = 604_800.0
 EARLIEST_UNIX_S = 1_262_304_000.0
 """2010: no autopilot of which there is a log flew before; a clock that says so is not set."""
-FIX_3D = 3
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
 WANTED = (

@@ -1,4 +1,4 @@
-"""Streams that are slow, and recordings that show nothing: what is said of them, and to do."""
+"""Streams that are slow or missing: what is said of them, and to do."""
 
 from __future__ import annotations
 
@@ -44,3 +44,11 @@ def test_without_flight_it_is_not_the_stream_that_is_blamed(tmp_path):
     write_tlog(spec, tmp_path / "flight.tlog")
     given = replay([tmp_path / "flight.tlog"], Recorded()).answers[0].calibration
     assert "a second" not in given.note
+
+
+def test_without_a_receiver_it_is_the_receiver_that_is_missing(tmp_path):
+    rates = {"GPS_RAW_INT": 0.0, "GLOBAL_POSITION_INT": 0.0}
+    spec = FlightSpec(vehicle="copter", duration=30.0, imus=(TRUE,), rates=rates, seed=11)
+    write_tlog(spec, tmp_path / "flight.tlog")
+    given = replay([tmp_path / "flight.tlog"], Recorded()).answers[0].calibration
+    assert given.note.endswith("no GPS")

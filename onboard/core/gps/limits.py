@@ -13,6 +13,7 @@ from typing import Final
 
 from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
+from onboard.core.inputs.samples import FIX_3D
 
 RECOVERY: Final[Mapping[Distrust, float]] = MappingProxyType(
     {
@@ -84,7 +85,7 @@ class TrustLimits:
         recovery: s that a reason is held after the report that denies it.
     """
 
-    fix_type: int = 3
+    fix_type: int = FIX_3D
     satellites: int = 6
     hdop: float = 2.5
     speed_accuracy: float = 1.5

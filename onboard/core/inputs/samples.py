@@ -52,6 +52,10 @@ class AttitudeSample:
     yaw: float
 
 
+FIX_3D = 3
+"""GPS_FIX_TYPE from which a receiver knows where it is, and how high."""
+
+
 @dataclass(frozen=True, slots=True)
 class GpsFix:
     """One report of a GPS receiver.  Repeats of a fix are passed on; the core drops them.
