@@ -181,7 +181,6 @@ LOSSES = (
     _all("neither height nor vertical velocity", _changed(_no_height), _changed(_no_vertical)),
     _all("inertial data at 25 Hz", _thinned(ImuSample, 25.0)),
     _all("inertial data at 10 Hz", _thinned(ImuSample, 10.0)),
-    _all("inertial data at 5 Hz", _thinned(ImuSample, 5.0)),
     _all("vibration aliased into samples", _vibrating),
     _all("no EKF status", _without(EkfHealth)),
     _all("neither EKF status nor armed state", _without(EkfHealth, VehicleState)),

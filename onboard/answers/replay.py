@@ -20,6 +20,7 @@ from onboard.answers.recorded import unanswered
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration, Coverage
+from onboard.core.inputs.assembly import mean_step
 from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue, Sample
@@ -349,7 +350,7 @@ class Vehicle:
         """Why an accelerometer has no answer."""
         samples = f"accelerometer {imu}: {self._samples[imu]} samples"
         if self._slow(imu):
-            return f"{samples}, fewer than 5 a second; 25 are good"
+            return f"{samples}, fewer than {SLOWEST_IMU_HZ:g} a second; 25 are good"
         if not self._placed:
             return f"{samples}, and {'no fix of the GPS receiver' if self._fixes else 'no GPS'}"
         if self.standing_s > 0.0:
@@ -360,8 +361,7 @@ class Vehicle:
         return f"{samples}, never together with attitude and trusted GPS"
 
     def _slow(self, imu: int) -> bool:
-        steps = np.diff(self._first_times[imu])
-        return len(steps) > 0 and SLOWEST_IMU_HZ * float(np.median(steps)) > 1.0
+        return SLOWEST_IMU_HZ * mean_step(np.array(self._first_times[imu])) > 1.0
 
     def unanswered(self, imu: int) -> Calibration:
         """What to say of an accelerometer of which the estimator could make nothing."""

@@ -21,8 +21,8 @@ def asked(folder, rate, seconds):
 
 
 @pytest.mark.slow
-def test_five_samples_a_second_cost_sigmas_and_no_truth(tmp_path):
-    given = asked(tmp_path, 5.0, 160.0)
+def test_eight_samples_a_second_cost_sigmas_and_no_truth(tmp_path):
+    given = asked(tmp_path, 8.0, 160.0)
     for value, true, sigma in zip(
         (*given.scale, *given.offset),
         (*TRUE.scale, *TRUE.offset),
@@ -35,7 +35,7 @@ def test_five_samples_a_second_cost_sigmas_and_no_truth(tmp_path):
 
 def test_fewer_are_said_to_be_too_few(tmp_path):
     given = asked(tmp_path, 3.0, 60.0)
-    assert "fewer than 5 a second" in given.note
+    assert "fewer than 7.5 a second" in given.note
     assert "record it at 25 Hz or more" in given.coverage.advice
 
 

@@ -20,7 +20,6 @@ from onboard.core.inputs.limits import (
     KEPT_S,
     LEAST_LAG_S,
     LEAST_WAITING_S,
-    ONE_LOST,
     REACH_MARGIN_S,
     REACH_S,
     SLOWEST_IMU_HZ,
@@ -156,15 +155,12 @@ class Assembly:
         stamps, rows = live[imu].arrays()
         if len(stamps) < FEWEST_SAMPLES or len(self.streams.recorded) < 2:
             return []
-        # The median: a gap does not make the rest of the stream slow.
-        every = float(np.median(np.diff(stamps)))
-        if self._settings.slowest_imu_hz * every > 1.0:
+        if self._settings.slowest_imu_hz * mean_step(stamps) > 1.0:
             return []
-        gap = max(IMU_GAP_S, ONE_LOST * every)
         t = stamps - parameters.imu_delay
         out: list[Batch] = []
-        for needed, inside in _pieces(t, fixes.t, gap):
-            gyro, turning = _with_rates(imu, live, stamps[needed], rows[needed], parameters, gap)
+        for needed, inside in _pieces(t, fixes.t):
+            gyro, turning = _with_rates(imu, live, stamps[needed], rows[needed], parameters)
             # Another gyroscope has another bias: the filter's belongs to the one before.
             same = self._gyro.get(imu, gyro) == gyro
             fresh = not same or self._continues.get(imu) != float(fixes.t[inside[0]])
@@ -242,11 +238,15 @@ def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:
     return still(fixes.v_n, rows[during, :3])
 
 
-def _pieces(
-    t: Array, epochs: Array, gap: float
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def mean_step(t: Array) -> float:
+    """Mean time between samples at ``t`` (n,), s; a gap does not make the rest of them slow."""
+    steps = np.diff(t)
+    return float(np.mean(steps[steps <= IMU_GAP_S])) if np.any(steps <= IMU_GAP_S) else np.inf
+
+
+def _pieces(t: Array, epochs: Array) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Pieces without inertial gaps: indices of the samples needed, and of the fixes inside."""
-    breaks = np.flatnonzero(np.diff(t) > gap) + 1
+    breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1
     for piece in np.split(np.arange(len(t)), breaks):
         if len(piece) < FEWEST_SAMPLES:
             continue
@@ -268,18 +268,13 @@ def _needed(t: Array, epochs: Array) -> slice:
 
 
 def _with_rates(
-    imu: int,
-    live: dict[int, ImuTrack],
-    at: Array,
-    rows: Array,
-    parameters: ParametersInForce,
-    gap: float,
+    imu: int, live: dict[int, ImuTrack], at: Array, rows: Array, parameters: ParametersInForce
 ) -> tuple[int, Array]:
     """Whose gyroscope it is, and rows with its rates instead of the accelerometer's own."""
     first = min(live)
     if imu == first or parameters.one_chip(imu):
         return imu, rows
-    w = rates_at(live[first], at, gap)
+    w = rates_at(live[first], at, IMU_GAP_S)
     return (imu, rows) if w is None else (first, np.hstack([w, rows[:, 3:]]))
 
 

@@ -9,9 +9,12 @@ from onboard.core.inputs.limits import (
     EVEN_ALREADY_S,
     FEWEST_EVEN,
     LEAST_JITTER_S,
+    MISSED,
+    MOST_MISSED,
     NO_GRID_S,
     REWEIGHTINGS,
     UNEVEN,
+    WAITED_S,
     WHOLE_MS,
 )
 from onboard.core.maths.arrays import Array
@@ -22,9 +25,8 @@ def even_times(t: Array, t_receiver: Array | None) -> Array:
 
     Epochs are even in receiver time; their arrival stamps jitter by 10-20 ms.  With the receiver's
     own time the stamps are its clock plus a straight line (offset and drift); without it, or where
-    it is less even than they are, the epoch numbers are recovered from the
-    commonest interval.  A line is fitted robustly over the batch; stamps that are even already stay
-    as they are.
+    it is less even than they are, the epochs are numbered by the likeliest even grid.  A line is
+    fitted robustly over the batch; stamps that are even already stay as they are.
 
     Args:
         t: (n,) stamps, s, increasing.
@@ -68,16 +70,41 @@ def _own_time(t_receiver: Array | None) -> Array | None:
 
 def _counted(t: Array) -> Array | None:
     """(n,) s since the first epoch by the numbers of whole periods; None if there is none."""
-    period = float(np.median(np.diff(t)))
-    if period <= 0.0:
+    count = _numbers(t - t[0])
+    if count is None:
         return None
-    count = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(np.diff(t) / period)))])
-    # The median of jittered intervals is off by a millisecond, which adds up over a batch:
+    # A period that is told from few epochs is off by a millisecond, which adds up over a batch:
     # good enough to number the epochs, not to say when they were.
     period = float(np.polyfit(count, t - t[0], 1)[0])
     whole = round(period * 1e3)
     counted: Array = count * (whole * 1e-3 if abs(period * 1e3 - whole) < WHOLE_MS else period)
     return counted
+
+
+def _numbers(since: Array) -> Array | None:
+    """(n,) number of each epoch, from 0 on; None if there is no grid.
+
+    Messages wait by up to half a period (a receiver's ten a second come 64 and 136 ms after one
+    another where a log is written every 40), and some are lost.  Of all numbers of epochs that may
+    be missing the likeliest: each has a period, and stamps scatter about its grid.
+    """
+    n = len(since)
+    if since[-1] <= 0.0:
+        return None
+    missing = np.arange(min(n, MOST_MISSED) + 1)
+    phase = np.outer((n - 1 + missing) / since[-1], since)
+    middle = np.angle(np.exp(2j * np.pi * phase).mean(axis=1)) / (2.0 * np.pi)
+    phase -= middle[:, None]
+    count = np.round(phase)
+    period = since[-1] / (n - 1 + missing)
+    scatter = np.maximum((phase - count).std(axis=1) * period, WAITED_S)
+    likely = -n * np.log(scatter) - missing * MISSED
+    likely[np.any(np.diff(count, axis=1) < 1.0, axis=1)] = -np.inf
+    best = int(np.argmax(likely))
+    if not np.isfinite(likely[best]):
+        return None
+    numbers: Array = count[best] - count[best, 0]
+    return numbers
 
 
 def _scatter(offset: Array) -> float:

@@ -7,6 +7,7 @@ those of standing still in :mod:`onboard.core.inputs.airborne`.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 LONGEST_FIX_GAP_S: Final = 2.5
@@ -38,12 +39,10 @@ for within them, early or late by its own delay [physics: 0.15 at the most]."""
 
 IMU_GAP_S: Final = 0.25
 """s; attitude changes too much over a longer gap to be interpolated [physics]."""
-ONE_LOST: Final = 2.2
-"""Steps of a stream at which one sample is missing: no gap of a slow one, whose own steps are as
-long as that [data sheet: stamps of 5 Hz jitter by a tenth of a step]."""
-SLOWEST_IMU_HZ: Final = 4.5
-"""Inertial samples a second: five, less what stamps jitter by.  The six are as far off then as
-their sigmas say; with three z is 3.5 sigma off on planes [tuned: see docs/benchmarks.md]."""
+SLOWEST_IMU_HZ: Final = 7.5
+"""Inertial samples a second: a log at 10 Hz of an autopilot that looks at its samples 25 times a
+second has 8.3 of them.  Of five a second, flights of 45 s are off by more than their sigmas say
+[tuned: see docs/benchmarks.md]."""
 FEWEST_SAMPLES: Final = 8
 """Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
 FEWEST_FIXES: Final = 3
@@ -94,6 +93,14 @@ FEWEST_EVEN: Final = 5
 WHOLE_MS: Final = 0.3
 """ms; a period this near to a whole millisecond is one: receivers run at 1, 2, 4, 5, 8, 10 Hz
 [data sheet]."""
+WAITED_S: Final = 5e-3
+"""s; an autopilot's loop and its bus let messages wait by this at least: stamps that are nearer to
+a grid say no more for it [physics]."""
+MISSED: Final = math.log(20.0)
+"""Of a missing epoch, what it takes off the log-likelihood: one of twenty is lost on a bad link
+[probability]."""
+MOST_MISSED: Final = 100
+"""Epochs of a batch that may be missing, and no more than are there [cost]."""
 EVEN_ALREADY_S: Final = 2e-3
 """s; stamps that jitter by less are left alone [physics: they are whole milliseconds]."""
 UNEVEN: Final = 2.0

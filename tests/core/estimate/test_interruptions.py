@@ -349,6 +349,26 @@ def test_jittered_stamps_come_back_to_the_receivers_grid(own_time):
     assert np.all(np.diff(even) > 0.0)
 
 
+@pytest.mark.parametrize("phase", np.arange(0.0, 0.04, 0.005))
+@pytest.mark.parametrize("lost", [0.0, 0.03, 0.2])
+def test_messages_that_wait_for_a_slow_loop_are_numbered_right(phase, lost):
+    """Ten a second, in a log written every 40 ms: 80 and 120 ms after one another, or with luck."""
+    rng = np.random.default_rng(int(1e3 * phase))
+    epoch = phase + 0.1 * np.flatnonzero(rng.random(91) >= lost)
+    stamp = np.ceil(epoch / 0.04) * 0.04 + rng.uniform(0.0, 0.004, len(epoch))
+    steps = np.diff(even_times(stamp, None)) / 0.1
+    assert steps == pytest.approx(np.diff(epoch) / 0.1, abs=1e-3)
+
+
+def test_epochs_that_come_in_pairs_are_not_three_of_which_one_is_lost():
+    epoch = 0.1 * np.arange(90)
+    stamp = epoch + np.where(np.arange(90) % 2, -0.018, 0.018)  # 64 and 136 ms in turn
+    # 64 ms is the commonest step, by one, and 136 are two of them.
+    assert np.diff(even_times(stamp, None)) == pytest.approx(
+        np.full(89, 0.1), abs=3e-5
+    )  # a crystal
+
+
 def test_a_slow_track_refuses_what_is_late_and_keeps_two():
     track = SlowTrack()
     assert track.add(1.0, (0.0,))
