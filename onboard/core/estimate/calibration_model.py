@@ -16,6 +16,7 @@ from onboard.core.estimate.limits import (
 )
 from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array, vector3, vector4
+from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.linearisation import SHAPES, Linearisation
 from onboard.core.model.nuisances import (
@@ -91,16 +92,21 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
     )
 
 
-def beyond_range(point: Linearisation, model: Model, theta: Array, covariance: Array) -> list[str]:
+def beyond_range(
+    point: Linearisation, model: Model, theta: Array, covariance: Array, *, shaped: bool = True
+) -> list[str]:
     """What would have to be further off than it is looked for, by :data:`BEYOND` of its sigmas.
 
     Its clipped value is then none that the flight asks for, and everything else makes up for it.
+    Where the shape of the receiver's averaging is not followed, an even mean stands for it; past
+    what is looked around a fix on one side, what else it may be is none of that.
 
     Args:
         point: the linearisation that the estimate is about.
         model: its model.
         theta: (m,) estimate.
         covariance: (m, m) of it.
+        shaped: whether the linearisation follows the shape of the receiver's averaging.
 
     Returns:
         In words; empty if all is where the flight wants it.
@@ -111,7 +117,7 @@ def beyond_range(point: Linearisation, model: Model, theta: Array, covariance: A
             "the receiver's averaging",
             "window_squared",
             point.window**2,
-            (-np.inf, LONGEST_WINDOW_S**2),
+            (-np.inf, (LONGEST_WINDOW_S if shaped else AROUND_SPAN_S) ** 2),
         ),
         (
             "the lateness of the attitude",

@@ -310,7 +310,7 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
         )
     if beyond := too_far(engine, solution):
         return (
-            f"{' and '.join(beyond)} would have to be further off than on any vehicle: something "
+            f"{' and '.join(beyond)} would have to be further off than can be told: something "
             "is missing from the model, see onboard explain"
         )
     return ""
@@ -318,7 +318,8 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
 
 def too_far(engine: Engine, solution: Solution) -> list[str]:
     """What the flight wants further off than anything of it can be, in words."""
-    return beyond_range(engine.point, engine.model, solution.theta, solution.covariance)
+    found = solution.theta, solution.covariance
+    return beyond_range(engine.point, engine.model, *found, shaped=engine.shaped)
 
 
 def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Calibration:

@@ -172,7 +172,7 @@ class Engine:
     def about_point(self, theta: Array) -> Array:
         """``theta`` of an older linearisation as unknowns about the present one."""
         out = theta.copy()
-        kept = () if self._shaped else SHAPES
+        kept = () if self.shaped else SHAPES
         for name in (*MOVING, "clock_rate"):
             if name in self.model.index and name not in kept:
                 out[self.model.index[name]] = 0.0
@@ -304,10 +304,10 @@ class Engine:
     def asked(self, theta: Array, model: Model | None = None) -> Linearisation:
         """The linearisation that a solution ``theta`` (m,) of a model, of its own, asks for."""
         point = moved(self.point, model or self.model, theta)
-        return point if self._shaped else replace(point, shapes=self.point.shapes)
+        return point if self.shaped else replace(point, shapes=self.point.shapes)
 
     @property
-    def _shaped(self) -> bool:
+    def shaped(self) -> bool:
         """Whether the linearisation follows the shapes of the receiver's response.
 
         Of fixes further apart than is looked around them, shares of what is an epoch apart stand
