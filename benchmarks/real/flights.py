@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,13 @@ AT_LIMIT = 0.01
 """A level is at a limit within this share of it."""
 
 
+STANDS_S = 2.0
+"""Stretches in which it is asked whether a vehicle stands, s."""
+FEWEST_STANDS, FEWEST_STANDING = 3, 10
+"""Of such stretches, and of samples in each."""
+STANDING_M_S2, STANDING_RAD_S = 0.06, 0.01
+"""Scatter of force and rates of a sensor at rest: a few times a data sheet's; of one whose motors
+run, or that somebody carries, it is ten times as much."""
 NO_CHAIN = intervals((), Linearisation())
 
 
@@ -68,6 +75,9 @@ class Fit:
         batches: the flight itself.
         chain: integrals between epochs.
         states: filter states at epochs.
+        beside: what the effects that were said add to the force.
+        rest: (3,) the force on the ground with the parameters in force, sensor axes, m/s^2; NaN
+            where the vehicle was not seen standing.
     """
 
     flight: str
@@ -98,6 +108,7 @@ class Fit:
     chain: Chain = NO_CHAIN
     states: tuple[EpochState, ...] = ()
     beside: Beside = NOTHING
+    rest: Array = field(default_factory=lambda: np.full(3, np.nan))
 
     @property
     def failed(self) -> bool:
@@ -177,6 +188,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         chain=intervals([(b.segment, b.fixes) for b in engine.batches], engine.point),
         states=tuple(engine.states),
         beside=beside(engine, MOVING_M_S, flight.ends_s),
+        rest=recorded.calibrator.parameters.R_bs.T @ resting_force(samples, imu),
     )
 
 
@@ -214,6 +226,25 @@ def moving_force(samples: Sequence[Sample], imu: int, until: float = np.inf) -> 
         return np.full(3, np.nan)
     mean: Array = np.array([s.f_b for s in rows])[moving].mean(axis=0)
     return mean
+
+
+def resting_force(samples: Sequence[Sample], imu: int) -> Array:
+    """(3,) median of the reported force where nothing moves, body axes, m/s^2; NaN: nowhere."""
+    rows = [s for s in samples if isinstance(s, ImuSample) and s.imu == imu]
+    t = np.array([s.t for s in rows])
+    f, w = np.array([s.f_b for s in rows]), np.array([s.w_b for s in rows])
+    still = [
+        f[part].mean(axis=0)
+        for part in np.split(np.arange(len(t)), np.flatnonzero(np.diff(t // STANDS_S)) + 1)
+        if len(part) > FEWEST_STANDING
+        and np.ptp(t[part]) > 0.8 * STANDS_S
+        and f[part].std(axis=0).max() < STANDING_M_S2
+        and w[part].std(axis=0).max() < STANDING_RAD_S
+    ]
+    if len(still) < FEWEST_STANDS:
+        return np.full(3, np.nan)
+    out: Array = np.median(still, axis=0)
+    return out
 
 
 def fits(flights: Sequence[RealFlight], jobs: int = 1) -> list[Fit]:

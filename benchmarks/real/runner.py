@@ -1,6 +1,6 @@
 """All parts in one run, side by side, for a person and as JSON to compare before and after.
 
-Each accelerometer is estimated once, for levels, pairs and repeats.
+Each accelerometer is estimated once, for levels, rest, pairs and repeats.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.real import conceal, levels, outcomes, pairs, repeats
+from benchmarks.real import conceal, levels, outcomes, pairs, repeats, rest
 from benchmarks.real.flights import Fit, fits
 from benchmarks.real.pairs import Agreement, Pair
 from benchmarks.real.split import (
@@ -29,7 +29,7 @@ from benchmarks.real.split import (
 )
 
 SCHEMA = "onboard.benchmarks.real/1"
-CONTENTS = ("levels", "pairs", "repeats", "conceal")
+CONTENTS = ("levels", "rest", "pairs", "repeats", "conceal")
 BULKY = ("chain", "states")
 """Of a fit, what is no result."""
 
@@ -41,6 +41,7 @@ class Results:
     part: Part
     made: tuple[Fit, ...] = ()
     shares: tuple[levels.Share, ...] = ()
+    rests: tuple[rest.Rest, ...] = ()
     pairs: tuple[Pair, ...] = ()
     agreements: tuple[Agreement, ...] = ()
     scatter: tuple[repeats.Scatter, ...] = ()
@@ -56,6 +57,7 @@ class Results:
                 _json(f) | {"at_limit": list(f.at_limit), "clipped": f.clipped} for f in self.made
             ],
             "criteria": _json(self.shares),
+            "rest": [_json(r) | {"off": r.off} for r in self.rests],
             "pairs": [_json(p) | {"chi_square": p.chi_square} for p in self.pairs],
             "agreements": _json(self.agreements),
             "repeats": {"scatter": _json(self.scatter), "left_out": _json(self.left_out)},
@@ -99,7 +101,7 @@ def run(
         jobs: processes.
     """
     made: tuple[Fit, ...] = ()
-    if set(contents) & {"levels", "pairs", "repeats"}:
+    if set(contents) - {"conceal"}:
         made = tuple(fits(flights, jobs))
     scatter, left_out = repeats.run(made) if "repeats" in contents else ([], [])
     concealed: list[outcomes.Outcome] = []
@@ -110,6 +112,7 @@ def run(
         part,
         made,
         tuple(levels.run(made)) if "levels" in contents else (),
+        tuple(rest.run(made)) if "rest" in contents else (),
         tuple(pairs.run(made)) if "pairs" in contents else (),
         tuple(pairs.agreements(made)) if "pairs" in contents else (),
         tuple(scatter),
@@ -123,6 +126,9 @@ def show(found: Results, contents: Sequence[str]) -> None:
     if "levels" in contents:
         print("\n### Levels")
         levels.show(found.made)
+    if "rest" in contents:
+        print("\n### At rest, more than gravity, m/s^2")
+        print(rest.table(found.rests))
     if "pairs" in contents:
         print("\n### Pairs of accelerometers in flight, m/s^2")
         print(pairs.table(found.pairs, found.agreements))

@@ -1,0 +1,101 @@
+"""At rest an accelerometer feels gravity and nothing else: a truth that no flight has seen.
+
+The estimator uses no ground.  Before take-off and after landing the vehicle stands, and whatever
+its attitude, ``|scale (raw - offset)|`` has to be the gravity with which the flight was estimated:
+neither GPS, attitude, timing nor the vehicle's motion are in it.  It asks for one number of six, in
+the direction in which the vehicle stands, which is what a hover shows best.  An accelerometer that
+warms up, and one that vibration shifts in flight, rest at something else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.real.command import fit_and_show
+from benchmarks.real.flights import Fit
+from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.arrays import vector3
+from onboard.core.maths.earth import STANDARD_GRAVITY
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What an accelerometer reads more than gravity where it stands, m/s^2.
+
+    Attributes:
+        flight: its name.
+        imu: accelerometer.
+        in_force: with the parameters in force.
+        estimate: with those that were estimated in flight.
+        sigma: of that, as the estimate claims.
+    """
+
+    flight: str
+    imu: int
+    in_force: float
+    estimate: float
+    sigma: float
+
+    @property
+    def off(self) -> float:
+        """In sigmas."""
+        return self.estimate / self.sigma
+
+
+def run(made: Sequence[Fit]) -> list[Rest]:
+    """Of every accelerometer that was seen standing."""
+    return [rest_of(f) for f in made if not f.failed and np.all(np.isfinite(f.rest))]
+
+
+def rest_of(fit: Fit) -> Rest:
+    """Of one accelerometer."""
+    held = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
+    raw = fit.rest / np.array(held.scale) + np.array(held.offset)
+    scale, offset = fit.estimate[:3], fit.estimate[3:]
+    felt = scale * (raw - offset)
+    along = felt / np.linalg.norm(felt)
+    slope = np.concatenate([along * (raw - offset), -along * scale])
+    return Rest(
+        fit.flight,
+        fit.imu,
+        float(np.linalg.norm(fit.rest)) - STANDARD_GRAVITY,
+        float(np.linalg.norm(felt)) - STANDARD_GRAVITY,
+        float(np.sqrt(slope @ fit.covariance @ slope)),
+    )
+
+
+def table(rests: Sequence[Rest]) -> str:
+    """One line for each accelerometer, and what they come to."""
+    if not rests:
+        return "nobody was seen standing"
+    head = f"{'flight, IMU':26}{'in force':>10}{'estimate':>10}{'sigma':>8}{'off':>7}"
+    lines = [
+        f"{r.flight[:22]:23}{r.imu:3}{r.in_force:10.3f}{r.estimate:10.3f}{r.sigma:8.3f}{r.off:7.1f}"
+        for r in rests
+    ]
+    before, after, off = (
+        float(np.sqrt(np.mean(np.square([getattr(r, n) for r in rests]))))
+        for n in ("in_force", "estimate", "off")
+    )
+    end = (
+        f"root mean square {before:.3f} in force, {after:.3f} estimated, {off:.2f} sigma; those of "
+        "one flight are not independent"
+    )
+    return "\n".join([head, *lines, end])
+
+
+def show(made: Sequence[Fit]) -> None:
+    """Print the table."""
+    print(table(run(made)))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Fit and print."""
+    fit_and_show("Accelerometers at rest, which no flight has seen.", show, arguments)
+
+
+if __name__ == "__main__":
+    main()
