@@ -13,6 +13,7 @@ from onboard.core.estimate.limits import (
     HEADING_RANGE_RAD,
     LONGEST_WINDOW_S,
     SHAPE_RANGE,
+    SHORTER,
 )
 from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array, vector3, vector4
@@ -98,8 +99,9 @@ def beyond_range(
     """What would have to be further off than it is looked for, by :data:`BEYOND` of its sigmas.
 
     Its clipped value is then none that the flight asks for, and everything else makes up for it.
-    Where the shape of the receiver's averaging is not followed, an even mean stands for it; past
-    what is looked around a fix on one side, what else it may be is none of that.
+    Where the shape of the receiver's averaging is not followed, an even mean stands for it, and
+    that only as long as all of it is within what is looked around a fix: it has to be shorter, by
+    :data:`SHORTER` sigmas.
 
     Args:
         point: the linearisation that the estimate is about.
@@ -117,7 +119,7 @@ def beyond_range(
             "the receiver's averaging",
             "window_squared",
             point.window**2,
-            (-np.inf, (LONGEST_WINDOW_S if shaped else AROUND_SPAN_S) ** 2),
+            (-np.inf, LONGEST_WINDOW_S**2),
         ),
         (
             "the lateness of the attitude",
@@ -130,9 +132,12 @@ def beyond_range(
     out = []
     for words, name, taken, (low, high) in ranges:
         i = model.index[name]
-        asked, margin = taken + theta[i], BEYOND * math.sqrt(covariance[i, i])
-        if asked < low - margin or asked > high + margin:
-            out.append(words)
+        asked, sigma = taken + theta[i], math.sqrt(covariance[i, i])
+        if asked < low - BEYOND * sigma or asked > high + BEYOND * sigma:
+            out.append(f"{words} would have to be further off than can be told")
+        elif name == "window_squared" and not shaped:
+            if asked + SHORTER * sigma > AROUND_SPAN_S**2:
+                out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
     return out
 
 

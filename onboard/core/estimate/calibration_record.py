@@ -309,10 +309,7 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
             "see onboard explain"
         )
     if beyond := too_far(engine, solution):
-        return (
-            f"{' and '.join(beyond)} would have to be further off than can be told: something "
-            "is missing from the model, see onboard explain"
-        )
+        return f"{' and '.join(beyond)}: something is missing from the model, see onboard explain"
     return ""
 
 

@@ -26,6 +26,9 @@ HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 BEYOND: Final = 3.0
 """Sigmas outside of a range: the flight wants what nothing of it can be [probability: 0.1 % where
 it is at the very end]."""
+SHORTER: Final = 2.0
+"""Sigmas by which a span has to be shorter than what an even mean may stand for [probability: 2 %
+that it is longer all the same]."""
 
 # Refinement (engine).
 
