@@ -133,11 +133,11 @@ def beyond_range(
     for words, name, taken, (low, high) in ranges:
         i = model.index[name]
         asked, sigma = taken + theta[i], math.sqrt(covariance[i, i])
+        longer = name == "window_squared" and asked + SHORTER * sigma > AROUND_SPAN_S**2
         if asked < low - BEYOND * sigma or asked > high + BEYOND * sigma:
             out.append(f"{words} would have to be further off than can be told")
-        elif name == "window_squared" and not shaped:
-            if asked + SHORTER * sigma > AROUND_SPAN_S**2:
-                out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
+        elif longer and not shaped:
+            out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
     return out
 
 
