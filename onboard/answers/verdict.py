@@ -14,7 +14,7 @@ from onboard.answers.words import (
     setting,
     signed,
 )
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis, Unused, Verdict
 from onboard.core.physics.catalogue import (
     danger_of,
     is_excluded,
@@ -228,16 +228,23 @@ def unused_in_words(diagnosis: Diagnosis) -> list[str]:
     for reason in dict.fromkeys(u.reason for u in diagnosis.unused):
         mine = [u for u in diagnosis.unused if u.reason == reason]
         whole = sum(u.end_s - u.start_s for u in mine)
-        when = [f"{u.start_s:.0f} to {u.end_s:.0f} s" for u in mine[:MOST_SPANS]]
-        more = f" and {len(mine) - len(when)} more times" if len(mine) > len(when) else ""
+        when = list(dict.fromkeys(map(_when, mine)))
+        many = len(when) - MOST_SPANS
+        more = f" and {many} more time{'s' if many > 1 else ''}" if many > 0 else ""
         why = DISTRUST.get(reason, reason.replace("_", " "))
-        said = f"{whole:.0f} s of flight were not used ({', '.join(when)}{more}; {why})"
+        long = f"{whole:.0f} s of flight were" if whole >= 1.5 else "About a second of flight was"
+        said = f"{long} not used ({', '.join(when[:MOST_SPANS])}{more}; {why})"
         if any(u.contradicted for u in mine):
             said += ": inertia contradicts GPS there"
         elif any(u.contradicted is False for u in mine):
             said += ": nothing there contradicts GPS"
         out.append(f"{said}.")
     return out
+
+
+def _when(unused: Unused) -> str:
+    start, end = f"{unused.start_s:.0f}", f"{unused.end_s:.0f}"
+    return f"at {start} s" if start == end else f"{start} to {end} s"
 
 
 def _sentences(note: str) -> list[str]:

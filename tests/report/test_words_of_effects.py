@@ -14,8 +14,9 @@ from onboard.answers.verdict import (
     severity,
     sized,
     to_fly,
+    unused_in_words,
 )
-from onboard.core.diagnosis.records import Verdict
+from onboard.core.diagnosis.records import Unused, Verdict
 from onboard.core.physics.catalogue import kinds, size_of, title_of
 from onboard.core.physics.finding import Quantity
 from tests.report.diagnoses_by_hand import NAN, advice_on, diagnosis, effect
@@ -136,3 +137,12 @@ def test_what_is_dangerous_is_named_first_and_told_with_what_to_do():
     assert said.endswith("Do not fly before it is cured.")
     assert severity(d) == "error"
     assert dangers(diagnosis()) == []
+
+
+def test_moments_that_were_not_used_are_said_once_each():
+    moments = tuple(Unused(t, t + 0.1, "few_satellites") for t in (13.0, 13.2, 40.1, 57.6, 71.0))
+    (said,) = unused_in_words(diagnosis(unused=moments))
+    assert said.startswith("About a second of flight was not used (at 13 s, at 40 s, at 58 s and 1")
+    long = (Unused(10.0, 14.0, "few_satellites"), Unused(20.0, 20.2, "few_satellites"))
+    (said,) = unused_in_words(diagnosis(unused=long))
+    assert said.startswith("4 s of flight were not used (10 to 14 s, at 20 s; ")
