@@ -12,6 +12,7 @@ from onboard.core.inputs.limits import (
     MISSED,
     MOST_MISSED,
     NO_GRID_S,
+    OFF_GRID,
     REWEIGHTINGS,
     UNEVEN,
     WAITED_S,
@@ -97,9 +98,9 @@ def _numbers(since: Array) -> Array | None:
     phase -= middle[:, None]
     count = np.round(phase)
     period = since[-1] / (n - 1 + missing)
-    scatter = np.maximum((phase - count).std(axis=1) * period, WAITED_S)
-    likely = -n * np.log(scatter) - missing * MISSED
-    likely[np.any(np.diff(count, axis=1) < 1.0, axis=1)] = -np.inf
+    share = (phase - count).std(axis=1)
+    likely = -n * np.log(np.maximum(share * period, WAITED_S)) - missing * MISSED
+    likely[(share > OFF_GRID) | np.any(np.diff(count, axis=1) < 1.0, axis=1)] = -np.inf
     best = int(np.argmax(likely))
     if not np.isfinite(likely[best]):
         return None

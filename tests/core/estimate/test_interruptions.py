@@ -369,6 +369,12 @@ def test_epochs_that_come_in_pairs_are_not_three_of_which_one_is_lost():
     )  # a crystal
 
 
+def test_stamps_of_no_grid_stay_where_they_are():
+    for seed in range(40):
+        stamp = np.cumsum(np.random.default_rng(seed).uniform(0.05, 0.3, 90))
+        assert np.array_equal(even_times(stamp, None), stamp)
+
+
 def test_a_slow_track_refuses_what_is_late_and_keeps_two():
     track = SlowTrack()
     assert track.add(1.0, (0.0,))
