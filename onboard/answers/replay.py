@@ -25,7 +25,7 @@ from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue, Sample
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.maths.arrays import Vector3
+from onboard.core.maths.arrays import Array, Vector3
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.opening import open_recording
 from onboard.recordings.recording import Recording, damage_by_file
@@ -306,7 +306,7 @@ class Vehicle:
         """
         if isinstance(sample, Block):
             for columns in sample.imus:
-                self._count(columns.imu, columns.t.tolist())
+                self._count(columns.imu, columns.t)
             for other in sample.others:
                 self.check(other, recording)
         elif isinstance(sample, ImuSample):
@@ -319,10 +319,10 @@ class Vehicle:
             if sample.name in DEVICE_IDS and sample.value:
                 self._check_device(sample, recording)
 
-    def _count(self, imu: int, times: Sequence[float]) -> None:
+    def _count(self, imu: int, times: Sequence[float] | Array) -> None:
         self._samples[imu] += len(times)
         if len(self._first_times[imu]) < TIMES_LOOKED_AT:
-            self._first_times[imu] += times
+            self._first_times[imu] += map(float, times[:TIMES_LOOKED_AT])
 
     def _check_device(self, sample: ParameterValue, recording: Recording) -> None:
         imu = DEVICE_IDS[sample.name]

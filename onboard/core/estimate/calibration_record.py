@@ -316,7 +316,9 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
 def too_far(engine: Engine, solution: Solution) -> list[str]:
     """What the flight wants further off than anything of it can be, in words."""
     found = solution.theta, solution.covariance
-    return beyond_range(engine.point, engine.model, *found, shaped=engine.shaped)
+    # Sums of earlier flights alone have followed what their fixes showed.
+    shaped = engine.shaped or not engine.batches
+    return beyond_range(engine.point, engine.model, *found, shaped=shaped)
 
 
 def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Calibration:
