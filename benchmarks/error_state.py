@@ -31,7 +31,7 @@ from benchmarks.recorded import (
     recorded,
 )
 from onboard.core.inputs.parameters import filter_delay
-from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.samples import FIX_3D, AttitudeSample, GpsFix, ImuSample, ImuSource
 from onboard.core.maths.earth import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def streams(flight: Flight) -> Streams:
             imu[s.t - IMU_DELAY] = [*force, *turn]
         elif isinstance(s, AttitudeSample) and s.t > begin:
             attitude[s.t] = [s.roll, s.pitch, s.yaw]
-        elif isinstance(s, GpsFix) and s.t > begin and s.fix_type >= 3:
+        elif isinstance(s, GpsFix) and s.t > begin and s.fix_type >= FIX_3D:
             vertical &= s.v_d is not None
             fixes[s.t] = [s.latitude, s.longitude, s.altitude, s.v_n, s.v_e, s.v_d or 0.0]
     return Streams(_rows(imu), _rows(attitude), _rows(fixes), vertical)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real.concealed_response import at_once
-from onboard.core.inputs.samples import GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue, Sample
 
 Array = NDArray[np.float64]
 X, Y, Z = 0, 1, 2
@@ -84,7 +84,7 @@ def about(samples: Sequence[Sample], imu: int) -> About:
     if parameters.get("AHRS_ORIENTATION", 0.0) != 0.0:
         raise ValueError("the board is turned in the body")
     rows = [s for s in samples if isinstance(s, ImuSample) and s.imu == imu]
-    fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= 3]
+    fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= FIX_3D]
     moving = [f.t for f in fixes if np.hypot(f.v_n, f.v_e) > MOVING_M_S]
     if not rows or len(moving) < 2:
         raise ValueError("no moving flight")

@@ -20,7 +20,7 @@ from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
-from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
+from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.model.linearisation import Linearisation
@@ -212,7 +212,7 @@ def judged(samples: Iterable[Sample], imu: int) -> Judge:
 
 def moving_force(samples: Sequence[Sample], imu: int, until: float = np.inf) -> Array:
     """(3,) mean of the reported force while the vehicle moves, body axes, m/s^2."""
-    fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= 3]
+    fixes = [s for s in samples if isinstance(s, GpsFix) and s.fix_type >= FIX_3D]
     rows = [s for s in samples if isinstance(s, ImuSample) and s.imu == imu]
     if len(fixes) < 2 or not rows:
         return np.full(3, np.nan)

@@ -53,7 +53,7 @@ class AttitudeSample:
 
 
 FIX_3D = 3
-"""GPS_FIX_TYPE from which a receiver knows where it is, and how high."""
+"""GPS_FIX_TYPE of MAVLink, from which a receiver knows where it is, and how high [data sheet]."""
 
 
 @dataclass(frozen=True, slots=True)
