@@ -3,7 +3,8 @@
 A covariance recursion (Riccati) over the true motion at the inertial rate, with every unknown of
 the model as a state that does not move: its last covariance is the inverse of the Fisher
 information with the prior added (van Trees 1968, section 2.4).  It shares with the estimator the
-levels of noise and the list of unknowns, but no code: no columns, no epochs' integrals, no sums.
+levels of noise, constants and the list of unknowns, but no code: no columns, no epochs' integrals,
+no sums.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
 
@@ -22,13 +24,13 @@ ATT, WANDER, COLOUR = slice(10, 13), 13, slice(14, 17)
 SCALE, BETA = slice(17, 20), slice(20, 23)
 DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
 GYRO_SCALE, ROLL, PITCH, YAW, ARM = slice(29, 32), 32, 33, 34, slice(35, 38)
-TURNING, SIZE = 38, 39
+LATE, TURNING, SIZE = 38, 39, 40
 """The rate of the smooth error of the heading is the last state."""
 
 PRIOR = (
     (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
     (H_DELAY, 0.1), (GYRO_LATE, 0.005), (GYRO_SCALE, 0.01), (ROLL, 0.03), (PITCH, 0.03),
-    (YAW, 0.1), (ARM, 0.05), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
+    (YAW, 0.1), (ARM, 0.05), (LATE, 0.1), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
 )  # fmt: skip
 """Standard deviations before the flight, of constants and of what moves; SI."""
 
@@ -43,12 +45,14 @@ def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
     stride = RATE // IMU_HZ
     Q, keep = _walks(levels, step)
     acceleration, jerks = jerk(path)
-    rates = derivative(path.w_b)
+    rates, tilt = derivative(path.w_b), _late_tilt(acceleration, stride)
     F, eye = np.zeros((SIZE, SIZE)), np.eye(SIZE)
     epochs = path.epochs.tolist()
     per_epoch = (RATE // GPS_HZ) // stride
     for k, row in enumerate(epochs):
-        P = _updated(P, path, row, levels, acceleration[row], jerks[row], jerks)
+        P = _updated(
+            P, path, row, levels, acceleration[row], jerks[row], jerks, tilt[row // stride]
+        )
         if k + 1 == len(epochs):
             break
         for i in range(per_epoch):
@@ -107,8 +111,31 @@ def _turn(R: Array, w_b: Array, rate: Array) -> Array:
     return out
 
 
+def _late_tilt(acceleration: Array, stride: int) -> Array:
+    """(n, 3) rotation vector, NED, of an EKF's tilt for each s by which its velocities are late.
+
+    Step by step, as the EKF does it: its velocity and tilt with their gains.
+    """
+    step = stride / RATE
+    a = acceleration[::stride, :2]
+    out, e, v = np.zeros((len(a), 3)), np.zeros(2), np.zeros(2)
+    for k, now in enumerate(a):
+        innovation = -now - v
+        v = v + step * (9.80665 * np.array([-e[1], e[0]]) + 2.0 * DAMPING * LOOP_RAD_S * innovation)
+        e = e + step * LOOP_RAD_S**2 / 9.80665 * np.array([innovation[1], -innovation[0]])
+        out[k, :2] = e
+    return out
+
+
 def _updated(
-    P: Array, path: Path, row: int, q: NoiseLevels, a: Array, j: Array, jerks: Array
+    P: Array,
+    path: Path,
+    row: int,
+    q: NoiseLevels,
+    a: Array,
+    j: Array,
+    jerks: Array,
+    tilt: Array,
 ) -> Array:
     """Covariance after the epoch at ``row``: two velocities, height, attitude."""
     R, v = path.R_nb[row], path.v_n[row]
@@ -124,6 +151,7 @@ def _updated(
     M[3:, PSI] = M[3:, ATT] = np.eye(3)
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
+    M[3:, LATE] = tilt
     noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude_white**2] * 3)
     S = np.diag(noise)
     S[:2, :2] += q.jitter**2 * np.outer(a[:2], a[:2])

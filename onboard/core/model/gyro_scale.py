@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.leaky import leaky_integral
 from onboard.core.model.around import Around
+from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S, Recorded, through_loop
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
 
-CORRECTED_S: Final = (2.0, 2.0, 5.0)
-"""s in which an EKF takes back what its gyroscope has turned it too far about north, east and down.
-Tilt: with velocities good to 0.3 m/s five times a second and a gyroscope to 0.015 rad/s, as
-ArduPilot's EKF3 has them, its gain is that of a second-order loop of 1 rad/s.  Heading: the usual
-time of its error [physics; from 1.5 to 30 s the calibration of simulated vehicles with gyroscopes
+HEADING_S: Final = 5.0
+"""s in which an EKF takes back what its gyroscope has turned its heading too far: the usual time of
+a heading's error [physics; from 1.5 to 30 s the calibration of simulated vehicles with gyroscopes
 3 % off differs by a fifth of a sigma]."""
-
-PIECE: Final = 200
-"""Attitudes that are summed at once [cost]."""
-MOST_PIECE: Final = 300.0
-"""Time constants of a piece, past which nothing of its beginning is left [bound: the square of
-e^300 is a number still]."""
-_CORRECTED = np.repeat(CORRECTED_S, 3)
 
 
 class GyroScale(Family):
@@ -49,32 +41,28 @@ class GyroScale(Family):
         return -np.eye(3) * nodes.w_b[..., None, :]
 
     def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:
-        """How far an EKF is turned by one unit of each unknown: (k, 9), rotation vectors in NED.
+        """What one unit of each unknown turns an EKF by, (k, 15): (2, 3) of tilt, 3 of heading.
 
-        ``d' = R e_j w_j - d / T``, row by row of (3, 3), from one recorded attitude to the next,
-        with the mean of both.
+        ``d' = R e_j w_j`` and what velocities take back of the tilt, by the EKF's loop, and a
+        compass of the heading.
         """
-        inside = slice(*np.searchsorted(segment.t_attitude, segment.t[[0, -1]]))
-        t = segment.t_attitude[inside]
-        if not segment.gyro_followed or len(t) < 2:
+        recorded = Recorded.of(segment) if segment.gyro_followed else None
+        if recorded is None:
             return None
-        R = segment.R_attitude[inside]
-        steps = np.diff(segment.t)[:, None] * (segment.w_b[1:] + segment.w_b[:-1])
-        angle = np.vstack([np.zeros(3), np.cumsum(0.5 * steps, axis=0)])
-        turns = np.diff([np.interp(t, segment.t, a) for a in angle.T]).T
-        x = (0.5 * (R[1:] + R[:-1]) * turns[:, None, :]).reshape(-1, 9)
-        d = np.zeros((len(t), 9))
+        turned = recorded.R * recorded.gained(segment.t, segment.w_b)[:, None, :]
+        tilt = before and (before[0], before[1][:, :12])
+        t, z = recorded.looped(turned[:, :2].reshape(-1, 6), tilt)
+        start = np.zeros(3)
         if before is not None:
-            d[0] = [np.interp(t[0], before[0], column) for column in before[1].T]
-        # What is taken back is put back before it is summed, a piece at a time: after minutes
-        # without a fix it would be too large a number.
-        for i, j in pairwise([*range(0, len(t) - 1, PIECE), len(t) - 1]):
-            left = np.exp(np.maximum((t[i] - t[i : j + 1, None]) / _CORRECTED, -MOST_PIECE))
-            middle = np.sqrt(left[1:] * left[:-1])
-            d[i + 1 : j + 1] = left[1:] * (d[i] + np.cumsum(x[i:j] / middle, axis=0))
-        return t, d
+            start = np.array([np.interp(t[0], before[0], x) for x in before[1][:, 12:].T])
+        heading = leaky_integral(t, turned[:, 2], np.full(3, -1.0 / HEADING_S), start)
+        return t, np.hstack([z, heading])
 
     def attitude(self, around: Around) -> Direct:
         """What :meth:`remembers` tells, if the recorded attitude follows this gyroscope."""
         followed = around.now.slow(self.name)
-        return NOTHING if followed is None else Direct(ned=followed.reshape(-1, 3, 3))
+        if followed is None:
+            return NOTHING
+        tilt = through_loop(followed[:, :12], 2.0 * DAMPING * LOOP_RAD_S)
+        turned = np.concatenate([tilt, followed[:, 12:]], axis=1)
+        return Direct(ned=turned.reshape(-1, 3, 3))

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.segments import Segment
+from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.small_turns import turn_by
 from onboard.core.model.around import around
-from onboard.core.model.gyro_scale import CORRECTED_S, GyroScale
+from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S
+from onboard.core.model.gyro_scale import HEADING_S, GyroScale
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.model.regressors import Model
 
@@ -31,12 +33,18 @@ def attitude():
     return R
 
 
-def followed(R, scale, start=None):
-    """(n, 3) rad, NED: how far an EKF is off whose gyroscope reads ``scale`` too much."""
-    d = np.zeros((len(T), 3)) if start is None else np.tile(start, (len(T), 1))
-    w = rates(T)
+def followed(R, scale):
+    """(n, 3) rad, NED: how far an EKF is off whose gyroscope reads ``scale`` too much.
+
+    Step by step, with its velocity (n, 2) that the tilt makes grow and that fixes take back.
+    """
+    d, v, w = np.zeros((len(T), 3)), np.zeros(2), rates(T)
+    by_velocity, by_tilt = 2.0 * DAMPING * LOOP_RAD_S, LOOP_RAD_S**2 / STANDARD_GRAVITY
     for k in range(len(T) - 1):
-        d[k + 1] = d[k] + H * (R[k] @ (scale * w[k]) - d[k] / CORRECTED_S)
+        taken_back = [-by_tilt * v[1], by_tilt * v[0], -d[k, 2] / HEADING_S]
+        d[k + 1] = d[k] + H * (R[k] @ (scale * w[k]) + taken_back)
+        feels = STANDARD_GRAVITY * np.array([-d[k, 1], d[k, 0]])
+        v = v + H * (feels - by_velocity * v)
     return d
 
 
@@ -48,39 +56,42 @@ def segment_of(R, start, end, hz=10.0, *, own=True):
     return Segment(T[cut], w, w, T[few], R[few], np.eye(3), gyro_followed=own)
 
 
+def seen(segment, t, before=None):
+    """(k, 3, 3) what the family has for the recorded attitude at ``t`` (k,)."""
+    made = Model([GyroScale()]).remembering(segment, before or {})
+    return GyroScale().attitude(around(NodeMaker(made, np.zeros(3), SIX), t)).ned
+
+
 @pytest.mark.parametrize("hz", [4.0, 10.0, 50.0])
 @pytest.mark.parametrize("axis", range(3))
 def test_the_column_is_how_far_an_ekf_is_off(attitude, axis, hz):
     """Within a few per cent: of an angle of some milliradians, which is all that an EKF shows."""
-    got_t, got = GyroScale().remembers(segment_of(attitude, 0.0, 24.0, hz), None)
-    want = followed(attitude, np.eye(3)[axis])
-    at = np.stack([np.interp(got_t, T, x) for x in want.T], axis=-1)
-    error = got.reshape(-1, 3, 3)[..., axis] - at
-    assert np.abs(error).max() < 0.04 * np.abs(at).max()
+    at = np.arange(1.0, 23.0, 0.25)
+    got = seen(segment_of(attitude, 0.0, 24.0, hz), at)[..., axis]
+    want = np.stack([np.interp(at, T, x) for x in followed(attitude, np.eye(3)[axis]).T], axis=-1)
+    assert np.abs(got - want).max() < 0.04 * np.abs(want).max()
 
 
 def test_it_goes_on_from_segment_to_segment(attitude):
     """What was turned before is still there where the next one begins."""
-    family = GyroScale()
-    whole = family.remembers(segment_of(attitude, 0.0, 24.0), None)
-    before = family.remembers(segment_of(attitude, 0.0, 13.0), None)
-    after = family.remembers(segment_of(attitude, 11.0, 24.0), before)
-    common = np.isin(whole[0], after[0])
-    np.testing.assert_allclose(after[1], whole[1][common], atol=1e-6)
-    alone = family.remembers(segment_of(attitude, 11.0, 24.0), None)
-    assert np.abs(alone[1][0] - after[1][0]).max() > 0.1
+    family, at = GyroScale(), np.array([12.0, 15.0, 20.0])
+    whole = seen(segment_of(attitude, 0.0, 24.0), at)
+    before = {family.name: family.remembers(segment_of(attitude, 0.0, 13.0), None)}
+    after = segment_of(attitude, 11.0, 24.0)
+    np.testing.assert_allclose(seen(after, at, before), whole, atol=1e-6)
+    assert np.abs(seen(after, at)[0] - whole[0]).max() > 0.1
 
 
 def test_it_reaches_the_recorded_attitude_at_the_fixes(attitude):
     segment = segment_of(attitude, 0.0, 24.0)
-    family, model = GyroScale(), Model([GyroScale()])
+    model = Model([GyroScale()])
     made = model.remembering(segment, {})
     maker = NodeMaker(made, np.zeros(3), SIX)
     epochs = np.array([5.0, 5.2, 5.4])
     near = around(maker, epochs)
     got = model.regressors(maker.intervals(epochs[:-1], epochs[1:]), near)
-    t, d = family.remembers(segment, None)
-    want = np.stack([np.interp(epochs, t, column) for column in d.T], axis=-1).reshape(-1, 3, 3)
+    want = seen(segment, epochs)
+    assert np.abs(want).max() > 0.1
     np.testing.assert_allclose(got.attitude_ned, want, atol=1e-12)
     assert not got.attitude_body.any()
 
