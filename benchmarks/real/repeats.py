@@ -1,9 +1,11 @@
 """Flights of one vehicle one by one: do the estimates repeat, and do they predict each other?
 
 The scatter of single-flight estimates over their sigmas is a reduced chi-square of 1 if the sigmas
-are honest: less if they are too wide.  Only numbers are compared that the flight itself has
-observed, by a sigma that is well below that of the prior; the rest scatter less than they claim,
-for all lean on the same prior.
+are honest: less if they are too wide.  Numbers are compared that the flight itself has observed, by
+a sigma that is well below that of the prior.  They scatter less than they claim, for all lean on
+the same prior: of a hover, scale and offset of z are known together and neither alone.  What counts
+is how flights scatter along the directions that they know, the prior taken out of each
+(:func:`together`).
 
 Leave-one-out: the sums of all other flights, with the prior once, give one set of six; with it the
 held-out flight is integrated freely from the filter's velocity, and compared with its GPS and with
@@ -22,9 +24,12 @@ from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from benchmarks.real.split import RealFlight
 from onboard.core.estimate.dead_reckoning import free_drift
+from onboard.core.estimate.joint import without_prior
 from onboard.core.estimate.limits import PRIOR_SHARE
+from onboard.core.estimate.merged_flights import FlightSix, Prior, reconciled
 from onboard.core.estimate.result import SIX_NAMES
-from onboard.core.maths.accelerometer import linear_of, parameters_of
+from onboard.core.maths.accelerometer import SixParameters, linear_of, parameters_of
+from onboard.core.maths.arrays import vector3
 
 Array = NDArray[np.float64]
 
@@ -56,6 +61,25 @@ class Scatter:
     sigma: float
     spread: float
     reduced: float
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """How the flights of one accelerometer scatter along the directions that they know.
+
+    Attributes:
+        vehicle: whose.
+        imu: accelerometer.
+        flights: how many.
+        chi_square: of each against those before it, added up.
+        freedom: directions that both knew.
+    """
+
+    vehicle: str
+    imu: int
+    flights: int
+    chi_square: float
+    freedom: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +118,30 @@ def run(made: Sequence[Fit]) -> tuple[list[Scatter], list[LeftOut]]:
         for f in some:
             left_out += _left_out(f, [o for o in some if o is not f])
     return scatter, left_out
+
+
+def together(made: Sequence[Fit]) -> list[Together]:
+    """Every accelerometer with several flights."""
+    out = []
+    good = [f for f in made if not f.failed]
+    for vehicle, imu in sorted({(f.vehicle, f.imu) for f in good}):
+        some = [f for f in good if (f.vehicle, f.imu) == (vehicle, imu)]
+        said = [six for f in some if (six := _alone(f)) is not None]
+        if len(said) >= FEWEST_FLIGHTS:
+            scatter = reconciled(said, Prior(some[0].prior, some[0].prior_sigma)).scatter
+            out.append(Together(vehicle, imu, len(said), scatter.chi_square, scatter.dof))
+    return out
+
+
+def _alone(fit: Fit) -> FlightSix | None:
+    """What a flight says without its prior, and without what its gyroscope's axes leave open."""
+    in_force = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
+    covariance = fit.covariance - np.diag(fit.gyro_sigma**2)
+    s = without_prior(fit.imu, in_force, fit.prior_sigma, fit.estimate, covariance)
+    if s is None:
+        return None
+    vector = s.vector + s.information @ s.before
+    return FlightSix(s.information, vector, s.information, vector)
 
 
 def observed(fit: Fit, i: int) -> bool:
@@ -172,11 +220,15 @@ def left_out_table(left_out: Sequence[LeftOut]) -> str:
     return "\n".join([head, *lines])
 
 
-def summary(scatter: Sequence[Scatter], left_out: Sequence[LeftOut]) -> list[str]:
-    """What both say together."""
+def summary(
+    scatter: Sequence[Scatter], known: Sequence[Together], left_out: Sequence[LeftOut]
+) -> list[str]:
+    """What all say together."""
     dof = sum(s.flights - 1 for s in scatter if np.isfinite(s.reduced))
     chi = sum(s.reduced * (s.flights - 1) for s in scatter if np.isfinite(s.reduced))
     lines = [f"scatter over sigmas: chi-square {chi:.1f} for {dof} degrees of freedom"]
+    chi, dof = sum(t.chi_square for t in known), sum(t.freedom for t in known)
+    lines.append(f"along what flights know, without their prior: {chi:.1f} for {dof}")
     for horizon in HORIZONS_S:
         some = [o for o in left_out if o.horizon_s == horizon]
         if some:
@@ -201,7 +253,7 @@ def show(made: Sequence[Fit]) -> None:
     print(scatter_table(scatter))
     print()
     print(left_out_table(left_out))
-    print("\n".join(summary(scatter, left_out)))
+    print("\n".join(summary(scatter, together(made), left_out)))
 
 
 def repeated(flights: Sequence[RealFlight]) -> list[RealFlight]:

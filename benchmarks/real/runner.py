@@ -45,6 +45,7 @@ class Results:
     pairs: tuple[Pair, ...] = ()
     agreements: tuple[Agreement, ...] = ()
     scatter: tuple[repeats.Scatter, ...] = ()
+    together: tuple[repeats.Together, ...] = ()
     left_out: tuple[repeats.LeftOut, ...] = ()
     concealed: tuple[outcomes.Outcome, ...] = ()
 
@@ -60,7 +61,11 @@ class Results:
             "rest": [_json(r) | {"off": r.off} for r in self.rests],
             "pairs": [_json(p) | {"chi_square": p.chi_square} for p in self.pairs],
             "agreements": _json(self.agreements),
-            "repeats": {"scatter": _json(self.scatter), "left_out": _json(self.left_out)},
+            "repeats": {
+                "scatter": _json(self.scatter),
+                "together": _json(self.together),
+                "left_out": _json(self.left_out),
+            },
             "concealed": [_json(o) | {"recovered": o.recovered} for o in self.concealed],
         }
 
@@ -116,6 +121,7 @@ def run(
         tuple(pairs.run(made)) if "pairs" in contents else (),
         tuple(pairs.agreements(made)) if "pairs" in contents else (),
         tuple(scatter),
+        tuple(repeats.together(made)) if "repeats" in contents else (),
         tuple(left_out),
         tuple(concealed),
     )
@@ -137,7 +143,7 @@ def show(found: Results, contents: Sequence[str]) -> None:
         print(repeats.scatter_table(found.scatter))
         print()
         print(repeats.left_out_table(found.left_out))
-        print("\n".join(repeats.summary(found.scatter, found.left_out)))
+        print("\n".join(repeats.summary(found.scatter, found.together, found.left_out)))
     if "conceal" in contents:
         print("\n### Concealed errors")
         print(outcomes.table(found.concealed))

@@ -11,12 +11,17 @@ from benchmarks.real.levels import gate_table
 from benchmarks.real.outcomes import Said, compared, table
 from benchmarks.real.pairs import agreements, mean_force, own_table, run
 from benchmarks.real.pairs import table as pair_table
-from benchmarks.real.repeats import average, scatter_of
+from benchmarks.real.repeats import average, scatter_of, together
 from benchmarks.real.whiteness import whiteness_of
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
-from onboard.core.maths.accelerometer import SixParameters, linear_of, parameters_jacobian
+from onboard.core.maths.accelerometer import (
+    SixParameters,
+    linear_of,
+    parameters_jacobian,
+    parameters_of,
+)
 from tests.core.estimate.two_accelerometers import Motion, batches
 
 RNG = np.random.default_rng(3)
@@ -121,6 +126,28 @@ def test_honest_flights_scatter_by_their_sigmas() -> None:
     assert scatter.flights == 400
     assert scatter.reduced == pytest.approx(1.0, abs=0.3)
     assert scatter.spread == pytest.approx(scatter.sigma, rel=0.2)
+
+
+def test_honest_flights_scatter_as_they_should_along_what_they_know() -> None:
+    """Hovers know scale and offset of z together; each alone leans on the prior they share."""
+    true = PRIOR + np.array([0.0, 0.0, 0.02, 0.1, -0.1, 0.2])
+    H = np.zeros((3, 6))
+    H[[0, 1, 2], [3, 4, 5]], H[2, 2] = 1.0, -9.0
+    noise, chi, freedom, z_offset = 0.02, 0.0, 0, []
+    covariance = np.linalg.inv(np.diag(PRIOR_SIGMA**-2.0) + H.T @ H / noise**2)
+    for _ in range(150):
+        some = []
+        for k in range(5):
+            seen = H @ (true - PRIOR) + noise * RNG.standard_normal(3)
+            linear = PRIOR + covariance @ H.T @ seen / noise**2
+            J = parameters_jacobian(linear)
+            some.append(fit(parameters_of(linear), J @ covariance @ J.T, flight=str(k)))
+        (found,) = together(some)
+        chi, freedom = chi + found.chi_square, freedom + found.freedom
+        z_offset.append(scatter_of(some, 5).reduced)
+    assert freedom == 150 * 4 * 3
+    assert chi / freedom == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / freedom))
+    assert np.nanmean(z_offset) < 0.2
 
 
 def test_a_number_that_only_the_prior_knows_is_not_compared() -> None:
