@@ -119,7 +119,7 @@ SECRETS = (b"open sesame\n", b"\n", "wörter\r\nzwei".encode())
 def _states() -> tuple[bytes, ...]:
     with tempfile.TemporaryDirectory() as name:
         store = Store(Path(name))
-        store.save(1, b'{"version": 3, "engines": []}', version="1.0", saved_at=1.0, flight=b"\x80")
+        store.save(1, b'{"version": 4, "engines": []}', version="1.0", saved_at=1.0, flight=b"\x80")
         saved = store.path(1).read_bytes()
     row = Row(1.0, 2.0, (1.0,) * 6, (0.1,) * 6, (None,) * 6)
     kept = msgspec.msgpack.encode(Kept(imus={1: Ring(rows=[row, row], trusted_s=9.0)}))

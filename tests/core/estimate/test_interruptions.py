@@ -258,9 +258,9 @@ def test_damaged_state_is_refused(identified):
     damages = [
         text[:-40],
         "[]",
-        '{"version": 3}',
-        text.replace('"version": 3', '"version": 2'),
-        text.replace('"version": 3', '"version": 99'),
+        '{"version": 4}',
+        text.replace('"version": 4', '"version": 2'),
+        text.replace('"version": 4', '"version": 99'),
         text.replace('"velocity": ', '"velocity": -'),
         text.replace('"delay": ', '"delay": NaN, "was": '),
         text.replace('"prior": [', '"prior": [1.0, '),
