@@ -15,6 +15,7 @@ from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
@@ -119,10 +120,12 @@ def _late_tilt(acceleration: Array, stride: int) -> Array:
     step = stride / RATE
     a = acceleration[::stride, :2]
     out, e, v = np.zeros((len(a), 3)), np.zeros(2), np.zeros(2)
+    by_velocity, by_tilt = 2.0 * DAMPING * LOOP_RAD_S, LOOP_RAD_S**2 / STANDARD_GRAVITY
     for k, now in enumerate(a):
         innovation = -now - v
-        v = v + step * (9.80665 * np.array([-e[1], e[0]]) + 2.0 * DAMPING * LOOP_RAD_S * innovation)
-        e = e + step * LOOP_RAD_S**2 / 9.80665 * np.array([innovation[1], -innovation[0]])
+        feels = STANDARD_GRAVITY * np.array([-e[1], e[0]])
+        v = v + step * (feels + by_velocity * innovation)
+        e = e + step * by_tilt * np.array([innovation[1], -innovation[0]])
         out[k, :2] = e
     return out
 

@@ -14,7 +14,7 @@ the parameters in force.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,11 +109,7 @@ def run(made: Sequence[Fit]) -> tuple[list[Scatter], list[LeftOut]]:
     """Scatter and leave-one-out of every vehicle with several flights, by accelerometer."""
     scatter: list[Scatter] = []
     left_out: list[LeftOut] = []
-    good = [f for f in made if not f.failed]
-    for vehicle, imu in sorted({(f.vehicle, f.imu) for f in good}):
-        some = [f for f in good if (f.vehicle, f.imu) == (vehicle, imu)]
-        if len(some) < FEWEST_FLIGHTS:
-            continue
+    for some in _several(made):
         scatter += [scatter_of(some, i) for i in range(6)]
         for f in some:
             left_out += _left_out(f, [o for o in some if o is not f])
@@ -123,14 +119,22 @@ def run(made: Sequence[Fit]) -> tuple[list[Scatter], list[LeftOut]]:
 def together(made: Sequence[Fit]) -> list[Together]:
     """Every accelerometer with several flights."""
     out = []
+    for some in _several(made):
+        one = some[0]
+        said = [six for f in some if (six := _alone(f)) is not None]
+        if len(said) >= FEWEST_FLIGHTS:
+            scatter = reconciled(said, Prior(one.prior, one.prior_sigma)).scatter
+            out.append(Together(one.vehicle, one.imu, len(said), scatter.chi_square, scatter.dof))
+    return out
+
+
+def _several(made: Sequence[Fit]) -> Iterator[list[Fit]]:
+    """The flights of each accelerometer that has enough of them."""
     good = [f for f in made if not f.failed]
     for vehicle, imu in sorted({(f.vehicle, f.imu) for f in good}):
         some = [f for f in good if (f.vehicle, f.imu) == (vehicle, imu)]
-        said = [six for f in some if (six := _alone(f)) is not None]
-        if len(said) >= FEWEST_FLIGHTS:
-            scatter = reconciled(said, Prior(some[0].prior, some[0].prior_sigma)).scatter
-            out.append(Together(vehicle, imu, len(said), scatter.chi_square, scatter.dof))
-    return out
+        if len(some) >= FEWEST_FLIGHTS:
+            yield some
 
 
 def _alone(fit: Fit) -> FlightSix | None:

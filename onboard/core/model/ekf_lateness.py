@@ -1,4 +1,4 @@
-"""Tilt of an EKF that takes velocities for later ones than they are."""
+"""Tilt of an EKF that takes velocities for newer ones than they are."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ class EkfLateness(Family):
         if recorded is None:
             return None
         felt = recorded.gained(segment.t, segment.raw_s @ segment.R_bs.T)
-        return recorded.looped((recorded.R[:, :2] @ felt[..., None])[..., 0], before)
+        level = (recorded.R[:, :2] @ felt[..., None])[..., 0]
+        return recorded.t, recorded.looped(level, recorded.start(before, 4))
 
     def attitude(self, around: Around) -> Direct:
         """The tilt that comes of it."""

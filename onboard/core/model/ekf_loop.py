@@ -53,20 +53,23 @@ class Recorded:
         out: Array = np.diff([np.interp(self.t, t, column) for column in total.T]).T
         return out
 
-    def looped(self, gained: Array, before: Signal | None) -> Signal:
+    def start(self, before: Signal | None, size: int) -> Array:
+        """(size,) signal of the segment before where this one begins; zeros after a gap."""
+        if before is None:
+            return np.zeros(size)
+        return np.array([np.interp(self.t[0], before[0], x) for x in before[1].T])
+
+    def looped(self, gained: Array, start: Array) -> Array:
         """``z' = p z + x`` with the loop's pole, (k, 2 m): real parts of z, then imaginary ones.
 
         Args:
             gained: (k - 1, m) integral of x from each attitude to the next.
-            before: the same of the segment before, None after a gap.
+            start: (2 m,) the same at the first attitude.
         """
-        m = gained.shape[1]
-        start = np.zeros(m, dtype=np.complex128)
-        if before is not None:
-            parts = np.array([np.interp(self.t[0], before[0], x) for x in before[1].T])
-            start = parts[:m] + 1j * parts[m : 2 * m]
-        z = leaky_integral(self.t, gained, np.full(m, POLE), start)
-        return self.t, np.hstack([z.real, z.imag])
+        real, imaginary = np.split(start, 2)
+        pole = np.full(len(real), POLE)
+        z = leaky_integral(self.t, gained, pole, real + 1j * imaginary)
+        return np.hstack([z.real, z.imag])
 
 
 def through_loop(z: Array, zero: float) -> Array:

@@ -41,7 +41,7 @@ class GyroScale(Family):
         return -np.eye(3) * nodes.w_b[..., None, :]
 
     def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:
-        """What one unit of each unknown turns an EKF by, (k, 15): (2, 3) of tilt, 3 of heading.
+        """What one unit of each unknown turns an EKF by, (k, 15): 12 of tilt, 3 of heading.
 
         ``d' = R e_j w_j`` and what velocities take back of the tilt, by the EKF's loop, and a
         compass of the heading.
@@ -50,13 +50,11 @@ class GyroScale(Family):
         if recorded is None:
             return None
         turned = recorded.R * recorded.gained(segment.t, segment.w_b)[:, None, :]
-        tilt = before and (before[0], before[1][:, :12])
-        t, z = recorded.looped(turned[:, :2].reshape(-1, 6), tilt)
-        start = np.zeros(3)
-        if before is not None:
-            start = np.array([np.interp(t[0], before[0], x) for x in before[1][:, 12:].T])
-        heading = leaky_integral(t, turned[:, 2], np.full(3, -1.0 / HEADING_S), start)
-        return t, np.hstack([z, heading])
+        start = recorded.start(before, 15)
+        tilt = recorded.looped(turned[:, :2].reshape(-1, 6), start[:12])
+        pole = np.full(3, -1.0 / HEADING_S)
+        heading = leaky_integral(recorded.t, turned[:, 2], pole, start[12:])
+        return recorded.t, np.hstack([tilt, heading])
 
     def attitude(self, around: Around) -> Direct:
         """What :meth:`remembers` tells, if the recorded attitude follows this gyroscope."""
