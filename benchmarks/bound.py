@@ -15,8 +15,7 @@ from benchmarks.matched import GPS_HZ, IMU_HZ, LEVELS, Path, jerk
 from benchmarks.recorded import Array
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S
+from sitl.builtin.attitude import STEP, AttitudeFilter
 from sitl.builtin.rotation import cross_matrix
 from sitl.builtin.smoothing import RATE, derivative
 
@@ -25,13 +24,15 @@ ATT, WANDER, COLOUR = slice(10, 13), 13, slice(14, 17)
 SCALE, BETA = slice(17, 20), slice(20, 23)
 DELAY, SPAN, THIRD, ATT_DELAY, H_DELAY, GYRO_LATE = 23, 24, 25, 26, 27, 28
 GYRO_SCALE, ROLL, PITCH, YAW, ARM = slice(29, 32), 32, 33, 34, slice(35, 38)
-LATE, TURNING, SIZE = 38, 39, 40
-"""The rate of the smooth error of the heading is the last state."""
+TOLD, TURNING, SIZE = slice(38, 45), 45, 46
+"""What an EKF was told that was wrong: a delay, scale and offset of its own accelerometer; and the
+rate of the smooth error of the heading."""
 
 PRIOR = (
     (SCALE, 0.03), (BETA, 0.5), (DELAY, 0.5), (SPAN, 0.2), (THIRD, 1e-3), (ATT_DELAY, 0.2),
     (H_DELAY, 0.1), (GYRO_LATE, 0.005), (GYRO_SCALE, 0.01), (ROLL, 0.03), (PITCH, 0.03),
-    (YAW, 0.1), (ARM, 0.05), (LATE, 0.1), (V, 10.0), (H, 100.0), (BIAS, 0.01), (WANDER, 0.0),
+    (YAW, 0.1), (ARM, 0.05), (TOLD, (0.1, *3 * (0.03,), *3 * (0.5,))), (V, 10.0), (H, 100.0),
+    (BIAS, 0.01), (WANDER, 0.0),
 )  # fmt: skip
 """Standard deviations before the flight, of constants and of what moves; SI."""
 
@@ -46,14 +47,13 @@ def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
     stride = RATE // IMU_HZ
     Q, keep = _walks(levels, step)
     acceleration, jerks = jerk(path)
-    rates, tilt = derivative(path.w_b), _late_tilt(acceleration, stride)
+    rates, tilts = derivative(path.w_b), ekf_tilts(path, acceleration)
     F, eye = np.zeros((SIZE, SIZE)), np.eye(SIZE)
     epochs = path.epochs.tolist()
     per_epoch = (RATE // GPS_HZ) // stride
     for k, row in enumerate(epochs):
-        P = _updated(
-            P, path, row, levels, acceleration[row], jerks[row], jerks, tilt[row // stride]
-        )
+        tilt = tilts[round(row / RATE / STEP)]
+        P = _updated(P, path, row, levels, acceleration[row], jerks[row], jerks, tilt)
         if k + 1 == len(epochs):
             break
         for i in range(per_epoch):
@@ -112,21 +112,28 @@ def _turn(R: Array, w_b: Array, rate: Array) -> Array:
     return out
 
 
-def _late_tilt(acceleration: Array, stride: int) -> Array:
-    """(n, 3) rotation vector, NED, of an EKF's tilt for each s by which its velocities are late.
+def ekf_tilts(path: Path, acceleration: Array) -> Array:
+    """(n, 3, 7) rotation vector, NED, of an EKF's attitude each :data:`STEP`, for what it was told.
 
-    Step by step, as the EKF does it: its velocity and tilt with their gains.
+    By the built-in simulator's own filter, which is linear in them.
     """
-    step = stride / RATE
-    a = acceleration[::stride, :2]
-    out, e, v = np.zeros((len(a), 3)), np.zeros(2), np.zeros(2)
-    by_velocity, by_tilt = 2.0 * DAMPING * LOOP_RAD_S, LOOP_RAD_S**2 / STANDARD_GRAVITY
-    for k, now in enumerate(a):
-        innovation = -now - v
-        feels = STANDARD_GRAVITY * np.array([-e[1], e[0]])
-        v = v + step * (feels + by_velocity * innovation)
-        e = e + step * by_tilt * np.array([innovation[1], -innovation[0]])
-        out[k, :2] = e
+    small = 1e-3
+    rows = np.arange(0, len(path.f_b), round(STEP * RATE))
+    f_n = np.einsum("kij,kj->ki", path.R_nb[rows], path.f_b[rows])
+    out = np.empty((len(rows), 3, 7))
+    size = np.zeros((7, 2, 3))
+    size[range(1, 4), 0, range(3)] = size[range(4, 7), 1, range(3)] = small
+    for j, (scale, beta) in enumerate(size):
+        ekf = AttitudeFilter()
+        ekf.align(path.R_nb[0], scale * path.f_b[0] + beta, 0.0)
+        for k, row in enumerate(rows):
+            wrong = scale * path.f_b[row] + beta
+            ekf.predict(path.R_nb[row], f_n[k], wrong, np.zeros(3))
+            if row % (RATE // GPS_HZ) == 0:
+                late = small if j == 0 else 0.0
+                ekf.fuse_gps(-late * acceleration[row], -late * path.v_n[row])
+                ekf.fuse_heading(0.0)
+            out[k, :, j] = ekf.phi / small
     return out
 
 
@@ -154,7 +161,7 @@ def _updated(
     M[3:, PSI] = M[3:, ATT] = np.eye(3)
     M[3:, ATT_DELAY] = -R @ path.w_b[row]
     M[3:, ROLL], M[3:, PITCH], M[5, YAW] = R[:, 0], R[:, 1], 1.0
-    M[3:, LATE] = tilt
+    M[3:, TOLD] = tilt
     noise = np.array([q.velocity**2] * 2 + [q.height**2] + [q.attitude_white**2] * 3)
     S = np.diag(noise)
     S[:2, :2] += q.jitter**2 * np.outer(a[:2], a[:2])

@@ -30,8 +30,9 @@ POSITION_SIGMA = 0.5
 HEIGHT_SIGMA = 2.0
 HEADING_SIGMA = 0.05
 GATE = 5.0
-SMOOTHING = 0.25
-"""Time in which the output predictor takes over a correction, s."""
+SMOOTHING = 0.14
+"""s in which the output predictor takes over a correction, once it is made: EKF3's gain is half of
+the inverse of the delay of what it fuses, whose correction it sees as late as that."""
 
 PHI, VEL, POS, BG, BA = (slice(i, i + 3) for i in range(0, 15, 3))
 _INITIAL_SIGMA = np.repeat([0.02, 0.3, 0.5, 0.005, 0.2], 3)

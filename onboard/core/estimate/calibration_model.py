@@ -18,7 +18,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array, vector3, vector4
 from onboard.core.model.around import AROUND_SPAN_S
-from onboard.core.model.ekf_lateness import EkfLateness
+from onboard.core.model.ekf_sensors import EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.linearisation import SHAPES, Linearisation
 from onboard.core.model.nuisances import (
@@ -61,7 +61,7 @@ def calibration_model(
         HeightLatency(),
         GyroTiming(),
         GyroScale(),
-        EkfLateness(),
+        EkfSensors(needs.prior_scale, needs.prior_offset),
         AttitudeOffset(point.heading),
         LeverArmError(),
     )

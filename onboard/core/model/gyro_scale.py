@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.leaky import leaky_integral
+from onboard.core.model import ekf3
 from onboard.core.model.around import Around
-from onboard.core.model.ekf_loop import DAMPING, LOOP_RAD_S, Recorded, through_loop
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
-
-HEADING_S: Final = 5.0
-"""s in which an EKF takes back what its gyroscope has turned its heading too far: the usual time of
-a heading's error [physics; from 1.5 to 30 s the calibration of simulated vehicles with gyroscopes
-3 % off differs by a fifth of a sigma]."""
 
 
 class GyroScale(Family):
@@ -40,27 +31,10 @@ class GyroScale(Family):
         """``-e_j w_j``: the unknown is what the gyroscope reads too much."""
         return -np.eye(3) * nodes.w_b[..., None, :]
 
-    def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:
-        """What one unit of each unknown turns an EKF by, (k, 15): 12 of tilt, 3 of heading.
-
-        ``d' = R e_j w_j`` and what velocities take back of the tilt, by the EKF's loop, and a
-        compass of the heading.
-        """
-        recorded = Recorded.of(segment) if segment.gyro_followed else None
-        if recorded is None:
-            return None
-        turned = recorded.R * recorded.gained(segment.t, segment.w_b)[:, None, :]
-        start = recorded.start(before, 15)
-        tilt = recorded.looped(turned[:, :2].reshape(-1, 6), start[:12])
-        pole = np.full(3, -1.0 / HEADING_S)
-        heading = leaky_integral(recorded.t, turned[:, 2], pole, start[12:])
-        return recorded.t, np.hstack([tilt, heading])
-
     def attitude(self, around: Around) -> Direct:
-        """What :meth:`remembers` tells, if the recorded attitude follows this gyroscope."""
-        followed = around.now.slow(self.name)
-        if followed is None:
+        """What an EKF makes of it, if the recorded attitude follows this gyroscope."""
+        now = around.now
+        told = now.slow(ekf3.TILTED) if now.segment.gyro_followed else None
+        if told is None:
             return NOTHING
-        tilt = through_loop(followed[:, :12], 2.0 * DAMPING * LOOP_RAD_S)
-        turned = np.concatenate([tilt, followed[:, 12:]], axis=1)
-        return Direct(ned=turned.reshape(-1, 3, 3))
+        return Direct(ned=told.reshape(-1, 3, ekf3.ERRORS)[..., ekf3.GYRO_SCALE])

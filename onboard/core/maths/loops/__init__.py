@@ -7,6 +7,7 @@ held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
 from onboard.core.maths.loops.integrals import gained, integrals, twice
+from onboard.core.maths.loops.kalman import kalman_errors
 from onboard.core.maths.loops.turns import attitudes, turns_in_a_row
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "dragged",
     "gained",
     "integrals",
+    "kalman_errors",
     "signals",
     "straight",
     "turns_in_a_row",

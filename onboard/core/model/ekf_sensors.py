@@ -1,0 +1,53 @@
+"""What the autopilot's EKF was told that was wrong: its own accelerometer, and when a fix was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from onboard.core.inputs.segments import Segment, Signal
+from onboard.core.model import ekf3
+from onboard.core.model.around import Around
+from onboard.core.model.nuisances import AXIS
+from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
+
+LATENESS_S: Final = 0.1
+"""s by which a receiver's delay is another one than its EKF takes it for: they are 0.1 to 0.25 s
+[data sheet]."""
+TOLD: Final = (*ekf3.LATENESS, *ekf3.SCALE, *ekf3.BETA)
+"""Columns of these unknowns."""
+
+
+class EkfSensors(Family):
+    """Errors of the recorded attitude that an EKF makes of wrong forces and late velocities.
+
+    A nuisance.  Velocities that are older than the EKF thinks differ from its own by ``-late a``,
+    and it tilts until they do not; forces that are wrong tilt it until it has learned their bias.
+    A copter's tilt goes with its acceleration, so that such an attitude, were it held for right, is
+    as good as another scale of x and y.
+
+    The forces' errors are unknowns of their own: which accelerometer the EKF used, with what
+    parameters and in which of its lanes, a recording need not tell, and an attitude that fits no
+    error of this accelerometer must not be held against it.
+    """
+
+    name = "ekf_sensors"
+
+    def __init__(self, scale_sigma: float = 0.03, beta_sigma: float = 0.5) -> None:
+        """Take prior sigmas of the EKF's accelerometer, by share and m/s^2."""
+        self.unknowns = (
+            Unknown("ekf_lateness", "s", 0.0, LATENESS_S),
+            *(Unknown(f"ekf_scale_{a}", "1", 0.0, scale_sigma) for a in AXIS),
+            *(Unknown(f"ekf_beta_{a}", "m/s^2", 0.0, beta_sigma) for a in AXIS),
+        )
+
+    def remembers(self, segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal]:
+        """What an EKF makes of any error of its sensors, here and from here on."""
+        return ekf3.followed(segment, before)
+
+    def attitude(self, around: Around) -> Direct:
+        """Of these errors."""
+        told = around.now.slow(ekf3.TILTED)
+        if told is None:
+            return NOTHING
+        return Direct(ned=told.reshape(-1, 3, ekf3.ERRORS)[..., TOLD])

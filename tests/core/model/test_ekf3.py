@@ -1,0 +1,183 @@
+"""What an EKF makes of errors of its sensors, against the built-in simulator's own EKF."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.segments import Segment
+from onboard.core.maths.earth import STANDARD_GRAVITY as G
+from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
+from onboard.core.model import ekf3
+from onboard.core.model.around import around
+from onboard.core.model.ekf_sensors import EkfSensors
+from onboard.core.model.gyro_scale import GyroScale
+from onboard.core.model.quadrature import NodeMaker
+from onboard.core.model.regressors import Model
+from sitl.builtin import attitude
+
+STEP = attitude.STEP
+T = np.arange(0.0, 60.0 + STEP / 2, STEP)
+BOARD = rotation_from_vector(np.array([0.3, -0.2, 1.2]))
+SMALL = 1e-4
+
+
+def motion():
+    """(n, 2) acceleration north and east, m/s^2: stops and goes, after three seconds of rest."""
+    a = np.stack([2.0 * np.sin(0.9 * T), 1.5 * np.cos(0.4 * T) + np.sin(2.0 * T)], axis=-1)
+    return a * np.clip((T - 3.0) / 2.0, 0.0, 1.0)[:, None]
+
+
+def attitudes():
+    """(n, 3, 3) of a copter that leans into it and turns its nose."""
+    a = motion()
+    moving = np.clip((T - 3.0) / 2.0, 0.0, 1.0)
+    nose = 0.7 + 0.8 * moving * np.sin(0.3 * T) + 0.2 * np.maximum(T - 10.0, 0.0)
+    lean = rotation_from_vector(np.stack([0.1 * a[:, 1], -0.1 * a[:, 0], 0.0 * T], axis=-1))
+    return lean @ rotation_from_vector(np.stack([0.0 * T, 0.0 * T, nose], axis=-1))
+
+
+def felt(R):
+    """(n, 3) force, body axes."""
+    f_n = np.concatenate([motion(), np.full((len(T), 1), -G)], axis=1)
+    return np.einsum("nji,nj->ni", R, f_n)
+
+
+def rates(R):
+    """(n, 3) rad/s; of the step from each to the next."""
+    turn = vector_from_rotation(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / STEP
+    return np.vstack([turn, turn[-1:]])
+
+
+def segment_of(start, end, every=2, *, own=True):
+    """Samples in the axes of a turned board, and every so many of the attitudes."""
+    R = attitudes()
+    w = rates(R)
+    smooth = np.vstack([w[:1], 0.5 * (w[1:] + w[:-1])])
+    cut = slice(round(start / STEP), round(end / STEP) + 1)
+    raw = felt(R)[cut] @ BOARD
+    few = slice(0, None, every)
+    return Segment(T[cut], smooth[cut], raw, T[few], R[few], BOARD, gyro_followed=own)
+
+
+@pytest.fixture(scope="module")
+def theirs():
+    """(n, 3, 10) attitude that the simulator's EKF reports, per unit of each error."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(attitude, "SMOOTHING", ekf3.SHOWN_S)
+        patch.setattr(attitude, "HEADING_SIGMA", 0.1)
+        return np.stack([their_own(j) for j in range(ekf3.ERRORS)], axis=-1)
+
+
+def their_own(j):
+    """(n, 3) of one error, after a minute of rest; a fix each fifth step."""
+    R, a = attitudes(), np.pad(motion(), [(0, 0), (0, 1)])
+    f, w = felt(R), rates(R)
+    v = np.cumsum(a, axis=0) * STEP
+    scale, beta, turns = np.zeros(3), np.zeros(3), np.zeros(3)
+    late = SMALL if j in ekf3.LATENESS else 0.0
+    for array, columns in ((scale, ekf3.SCALE), (beta, ekf3.BETA), (turns, ekf3.GYRO_SCALE)):
+        if j in columns:
+            array[columns.index(j)] = SMALL
+    ekf = attitude.AttitudeFilter()
+    begins = ekf3.BEGINS.reshape(5, 3)[[0, 1, 2, 4, 3]]  # the gyroscope's biases come first there
+    ekf.covariance = np.diag(begins.ravel() ** 2)
+    rest = round(60.0 / STEP)
+    out = np.zeros((len(T), 3))
+    for k in range(-rest, len(T) - 1):
+        i = max(k, 0)
+        wrong = BOARD @ (scale * (BOARD.T @ f[i]) + beta)
+        if k == -rest:
+            ekf.align(R[0], wrong, 0.0)
+        middle = 0.5 * (R[i] + R[min(i + 1, len(T) - 1)]) if k >= 0 else R[0]
+        moving = k >= 0
+        f_n = np.append(a[i, :2], -G) if moving else np.array([0.0, 0.0, -G])
+        ekf.predict(middle, f_n, wrong, turns * w[i] * moving)
+        if k % 5 == 0:
+            ekf.fuse_gps(-late * a[i] * moving, -late * v[i] * moving)
+            ekf.fuse_heading(0.0)
+        if moving:
+            out[k + 1] = ekf.phi / SMALL
+    return out
+
+
+def ours(segment, t, before=None):
+    """(k, 3, 10)"""
+    times, told = ekf3.followed(segment, before or {})[ekf3.TILTED]
+    return np.stack([np.interp(t, times, x) for x in told.T], axis=-1).reshape(-1, 3, ekf3.ERRORS)
+
+
+@pytest.mark.parametrize("every", [2, 6])
+@pytest.mark.parametrize("j", range(ekf3.ERRORS))
+def test_an_error_tilts_it_as_far_as_another_ekf(theirs, j, every):
+    at = np.arange(5.0, 58.0, 0.5)
+    got = ours(segment_of(0.0, 60.0, every), at)[..., j]
+    want = np.stack([np.interp(at, T, x) for x in theirs[..., j].T], axis=-1)
+    size = np.abs(want).max()
+    assert size > 1e-3
+    assert np.sqrt(np.mean((got - want) ** 2)) < 0.06 * np.sqrt(np.mean(want**2)) + 1e-4
+
+
+def test_it_goes_on_from_segment_to_segment():
+    at = np.array([22.0, 25.0, 30.0, 38.0])
+    whole = ours(segment_of(0.0, 60.0), at)
+    before = ekf3.followed(segment_of(0.0, 22.0), {})
+    after = segment_of(20.0, 40.0)
+    np.testing.assert_allclose(ours(after, at, before), whole, atol=2e-3)
+    assert np.abs(ours(after, at) - whole).max() > 0.02
+
+
+def test_where_segments_do_not_overlap_it_begins_anew():
+    before = ekf3.followed(segment_of(0.0, 15.0), {})
+    at = np.array([25.0, 30.0])
+    np.testing.assert_array_equal(
+        ours(segment_of(20.0, 40.0), at, before), ours(segment_of(20.0, 40.0), at)
+    )
+
+
+def test_a_gap_in_the_attitudes_is_forgotten():
+    """Its samples go on: some seconds later all is as if there had been none."""
+    segment, at = segment_of(0.0, 60.0), np.array([45.0, 50.0, 55.0])
+    kept = (segment.t_attitude < 20.0) | (segment.t_attitude > 25.0)
+    gone = replace(
+        segment, t_attitude=segment.t_attitude[kept], R_attitude=segment.R_attitude[kept]
+    )
+    want = ours(segment, at)
+    assert np.abs(ours(gone, at) - want).max() < 0.1 * np.abs(want).max()
+
+
+def test_levelled_at_rest_it_tilts_by_the_offset_and_learns_the_one_along_gravity():
+    R = np.broadcast_to(np.eye(3), (len(T), 3, 3))
+    still = Segment(
+        T, np.zeros((len(T), 3)), np.tile([0.0, 0.0, -G], (len(T), 1)), T[::2], R[::2], np.eye(3)
+    )
+    got = ours(still, np.array([1.0, 30.0]))
+    x, y, z = (got[..., j] for j in ekf3.BETA)
+    np.testing.assert_allclose(x[:, 1], 1.0 / G, rtol=0.05)
+    np.testing.assert_allclose(y[:, 0], -1.0 / G, rtol=0.05)
+    assert np.abs(z).max() < 1e-9
+    others = [*ekf3.LATENESS, *ekf3.GYRO_SCALE, ekf3.SCALE[0], ekf3.SCALE[1]]
+    assert np.abs(got[..., others]).max() < 1e-9
+
+
+def test_a_segment_without_attitudes_shows_nothing():
+    few = segment_of(10.0, 10.2, every=10)
+    assert ekf3.followed(few, {}) == {}
+    maker = NodeMaker(segment_of(0.0, 20.0), np.zeros(3), np.repeat([1.0, 0.0], 3))
+    assert EkfSensors().attitude(around(maker, np.array([5.0]))).ned is None
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_families_have_their_columns_of_it(own):
+    """The gyroscope's only where the attitude is turned by it."""
+    model = Model([GyroScale(), EkfSensors()])
+    segment = segment_of(0.0, 40.0, own=own)
+    made = model.remembering(segment, {})
+    epochs = np.array([15.0, 15.2, 15.4])
+    maker = NodeMaker(made, np.zeros(3), np.repeat([1.0, 0.0], 3))
+    got = model.regressors(maker.intervals(epochs[:-1], epochs[1:]), around(maker, epochs))
+    want = ours(segment, epochs)
+    np.testing.assert_allclose(got.attitude_ned[..., :3], own * want[..., 7:], atol=1e-12)
+    np.testing.assert_allclose(got.attitude_ned[..., 3], want[..., 6], atol=1e-12)
+    np.testing.assert_allclose(got.attitude_ned[..., 4:], want[..., :6], atol=1e-12)
+    assert not got.attitude_body.any()
