@@ -126,7 +126,7 @@ def run(made: Sequence[Fit]) -> list[Pair]:
 
 def _own(one: Fit, other: Fit) -> tuple[Array, float]:
     """(3,) sigma of the difference as the pair itself has it, and chi-square against that."""
-    a, b = _single(one), _single(other)
+    a, b = single_of(one), single_of(other)
     if a is None or b is None:
         return np.full(3, np.nan), float("nan")
     before, prior = (np.concatenate(x) for x in ((a.before, b.before), (a.prior_sigma,) * 2))
@@ -137,7 +137,8 @@ def _own(one: Fit, other: Fit) -> tuple[Array, float]:
     return np.sqrt(np.diag(relative.own_covariance)), disagreement(relative, a, b)
 
 
-def _single(fit: Fit) -> Single | None:
+def single_of(fit: Fit) -> Single | None:
+    """What a flight says of an accelerometer without its prior; None: it says nothing."""
     in_force = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
     return without_prior(
         fit.imu, in_force, fit.prior_sigma, fit.estimate, fit.covariance, fit.gyro_sigma

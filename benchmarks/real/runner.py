@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.real import conceal, levels, outcomes, pairs, repeats, rest
+from benchmarks.real import conceal, levels, outcomes, pair_parts, pairs, repeats, rest
 from benchmarks.real.flights import Fit, fits
 from benchmarks.real.pairs import Agreement, Pair
 from benchmarks.real.split import (
@@ -44,6 +44,7 @@ class Results:
     rests: tuple[rest.Rest, ...] = ()
     pairs: tuple[Pair, ...] = ()
     agreements: tuple[Agreement, ...] = ()
+    in_parts: tuple[pair_parts.PairInParts, ...] = ()
     scatter: tuple[repeats.Scatter, ...] = ()
     together: tuple[repeats.Together, ...] = ()
     left_out: tuple[repeats.LeftOut, ...] = ()
@@ -61,6 +62,7 @@ class Results:
             "rest": [_json(r) | {"off": r.off} for r in self.rests],
             "pairs": [_json(p) | {"chi_square": p.chi_square} for p in self.pairs],
             "agreements": _json(self.agreements),
+            "pairs_in_parts": _json(self.in_parts),
             "repeats": {
                 "scatter": _json(self.scatter),
                 "together": _json(self.together),
@@ -120,6 +122,7 @@ def run(
         tuple(rest.run(made)) if "rest" in contents else (),
         tuple(pairs.run(made)) if "pairs" in contents else (),
         tuple(pairs.agreements(made)) if "pairs" in contents else (),
+        tuple(pair_parts.run(made)) if "pairs" in contents else (),
         tuple(scatter),
         tuple(repeats.together(made)) if "repeats" in contents else (),
         tuple(left_out),
@@ -138,6 +141,8 @@ def show(found: Results, contents: Sequence[str]) -> None:
     if "pairs" in contents:
         print("\n### Pairs of accelerometers in flight, m/s^2")
         print(pairs.table(found.pairs, found.agreements))
+        print()
+        print(pair_parts.table(found.in_parts))
     if "repeats" in contents:
         print("\n### Repeated flights")
         print(repeats.scatter_table(found.scatter))

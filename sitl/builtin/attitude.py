@@ -28,7 +28,8 @@ VELOCITY_SIGMA = 0.3
 HEIGHT_VELOCITY_SIGMA = 0.5
 POSITION_SIGMA = 0.5
 HEIGHT_SIGMA = 2.0
-HEADING_SIGMA = 0.05
+HEADING_SIGMA = 0.1
+"""rad: EK3_MAG_M_NSE, 0.05 gauss, of a field of half a gauss."""
 GATE = 5.0
 SMOOTHING = 0.14
 """s in which the output predictor takes over a correction, once it is made: EKF3's gain is half of

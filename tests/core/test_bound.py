@@ -43,8 +43,10 @@ def test_claims_are_what_physics_allows(flown, whole):
         # The bound takes the gyroscope's axes for those of the accelerometer, and here they are.
         claimed.append(c.sigma_with_its_gyroscope / limit)
         assert np.all(np.abs(error_of(c, flight)) < 4.0 * limit)
-    # Levels are found from one flight only, and its blocks may contradict each other by chance.
-    assert np.all(np.min(claimed, axis=0) > 0.8), claimed
+    # Levels are found from one flight only (that of the force by a factor of two), and its blocks
+    # may contradict each other by chance.
+    assert np.all(np.min(claimed, axis=0) > 0.7), claimed
+    assert np.all(np.median(claimed, axis=0) > 0.8), claimed
     assert np.all(np.median(claimed, axis=0) < 1.5), claimed
 
 

@@ -40,6 +40,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged, total
+from onboard.core.model import ekf3
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
@@ -115,10 +116,8 @@ class Engine:
         """Of :attr:`brisk_s` what has left the buffer."""
         self._waiting = 0
         """Batches that were added and that no pass has gone through yet, at the end."""
-        self._buffered_s = 0.0
-        self._refined_s = 0.0
-        self._due = False
-        self._frozen = False
+        self._buffered_s = self._refined_s = 0.0
+        self._due = self._frozen = False
         self.model = self._model()
         self._seed: Solution | None = None
         self._pass = self._counting_pass()
@@ -192,7 +191,8 @@ class Engine:
         """Process a batch."""
         fresh = [i for i, before in enumerate([*self.batches, batch]) if before.fresh]
         run = slice(fresh[-1] if fresh else 0, None)
-        self.batches[run] = self._heading.joined(self.batches[run], batch)
+        known = self.batches[run]
+        self.batches[run] = ekf3.along(known, self._heading.joined(known, batch))
         self._waiting += 1
         self._solution = None
         self._buffered_s += batch.duration

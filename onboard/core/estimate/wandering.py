@@ -12,14 +12,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.estimate.limits import CLUSTER_S, FEWEST_BLOCKS, ONE_IN_A_THOUSAND
+from onboard.core.estimate.limits import (
+    CLUSTER_S,
+    FEWEST_BLOCKS,
+    ONE_IN_A_THOUSAND,
+    SHARED_WINDOW_S,
+    WARMING_S,
+)
 from onboard.core.maths.arrays import Array
 
 SHARES = np.array([0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])
 """Of the variance that wanders."""
 CONSTANTS = 10
-"""Time constants that are tried, between two windows and half of the flight: what is slower
-would be a trend [cost: a finer grid moves the inflation by less than blocks scatter]."""
+"""Time constants that are tried, between two windows and the longest [cost: a finer grid moves the
+inflation by less than blocks scatter]."""
 
 
 def inflation(t: Array, scores: Array) -> float:
@@ -55,7 +61,7 @@ def _wandering(scores: Array) -> float:
     n = len(scores)
     periodogram = np.abs(np.fft.rfft(scores - scores.mean())[1:]) ** 2 / n
     turn = np.cos(2.0 * np.pi * np.arange(1, n // 2 + 1) / n)
-    constant = np.geomspace(2.0, n / 2.0, CONSTANTS)[:, None]
+    constant = np.geomspace(2.0, max(n / 2.0, WARMING_S / SHARED_WINDOW_S), CONSTANTS)[:, None]
     keep = np.exp(-1.0 / constant)
     # Spectra of unit variance; (constants, shares, frequencies).
     slow = (1.0 - keep**2) / (1.0 - 2.0 * keep * turn + keep**2)
@@ -64,8 +70,8 @@ def _wandering(scores: Array) -> float:
     level = np.mean(periodogram / S, axis=-1)
     likelihood = -np.sum(np.log(S), axis=-1) - len(turn) * np.log(level)
     weight = np.exp(likelihood - likelihood.max())
+    weight[:, SHARES == 0.0] *= len(SHARES) - 1.0  # none at all is as likely as any beforehand
     # Variance of a mean over n of a unit process, times n.
     mean = (1.0 + keep) / (1.0 - keep) - 2.0 * keep * (1.0 - keep**n) / (n * (1.0 - keep) ** 2)
     found = level * (SHARES * mean + (1.0 - SHARES))
-    # The mean of the logarithm: a little likelihood of very much must not decide.
-    return float(np.exp(np.sum(weight * np.log(found)) / np.sum(weight)) / np.mean(scores**2))
+    return float(np.sum(weight * found) / np.sum(weight) / np.mean(scores**2))

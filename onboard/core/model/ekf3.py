@@ -9,14 +9,14 @@ Riccati's equation along the flight, for the noise that EKF3 believes in.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Final, Self
 
 import numpy as np
 
-from onboard.core.inputs.segments import Segment, Signal
+from onboard.core.inputs.segments import Batch, Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_euler, skew
@@ -161,6 +161,30 @@ class _Steps:
         return moves, h * NOISE, SIGMA**2 * (FUSED_S / h)
 
 
+def along(known: Sequence[Batch], run: Sequence[Batch]) -> list[Batch]:
+    """An uninterrupted flight with what :func:`followed` tells among its slow signals.
+
+    Args:
+        known: what this has given of it.
+        run: the same and more, or anew where attitudes have changed.
+    """
+    out: list[Batch] = []
+    for i, batch in enumerate(run):
+        if i < len(known) and known[i] is batch:
+            out.append(batch)
+            continue
+        before = out[-1].segment.slow if out else {}
+        told = followed(batch.segment, before)
+        if out:
+            out[-1] = _with(out[-1], {name: x for name, x in before.items() if name != STATES})
+        out.append(_with(batch, batch.segment.slow | told))
+    return out
+
+
+def _with(batch: Batch, slow: dict[str, Signal]) -> Batch:
+    return replace(batch, segment=replace(batch.segment, slow=slow))
+
+
 def followed(segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal]:
     """The attitude's errors along a segment, and states from which the next one goes on.
 
@@ -186,7 +210,7 @@ def followed(segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal
     ends = _ends(t)
     attitude, states = _steps(segment, t, R[chosen]).through(state, ends)
     return {
-        TILTED: (np.concatenate([old, t]), np.concatenate([was, attitude])),
+        TILTED: (np.concatenate([old, t]), np.concatenate([was, attitude.astype(np.float32)])),
         STATES: (t[ends], np.stack(states)),
     }
 

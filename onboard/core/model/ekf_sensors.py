@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
-from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.model import ekf3
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
@@ -40,10 +38,6 @@ class EkfSensors(Family):
             *(Unknown(f"ekf_scale_{a}", "1", 0.0, scale_sigma) for a in AXIS),
             *(Unknown(f"ekf_beta_{a}", "m/s^2", 0.0, beta_sigma) for a in AXIS),
         )
-
-    def remembers(self, segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal]:
-        """What an EKF makes of any error of its sensors, here and from here on."""
-        return ekf3.followed(segment, before)
 
     def attitude(self, around: Around) -> Direct:
         """Of these errors."""

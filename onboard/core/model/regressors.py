@@ -76,23 +76,19 @@ class Family:
         """True if the recording has the signals that the regressors need."""
         return True
 
-    def remembers(
-        self,
-        segment: Segment,  # noqa: ARG002 - subclasses look at it
-        before: Mapping[str, Signal],  # noqa: ARG002
-    ) -> dict[str, Signal]:
-        """Signals of this segment that depend on what was before it: an effect with a memory.
+    def remembers(self, segment: Segment, before: Signal | None) -> Signal | None:  # noqa: ARG002
+        """A signal of this segment that depends on what was before it: an effect with a memory.
 
-        They are looked up at nodes like any slow signal, under their names.
+        It is looked up at nodes like any slow signal, under the name of the family.
 
         Args:
-            segment: samples; segments overlap, so that those before have a value at its start.
-            before: slow signals of the segment before, none after a gap.
+            segment: samples; segments overlap, so that ``before`` has a value at its start.
+            before: the signal over the segment before, None after a gap.
 
         Returns:
-            By name, times (j,) and values (j,) or (j, k).
+            Times (j,) and values (j,) or (j, k).
         """
-        return {}
+        return None
 
     def acceleration(self, nodes: Signals) -> Array | None:  # noqa: ARG002
         """(K, M + 1, 3, m) body axes, m/s^2 per unit; added to the predicted specific force."""
@@ -204,9 +200,11 @@ class Model:
             segment: samples.
             before: slow signals of the segment before; empty after a gap.
         """
-        remembered: dict[str, Signal] = {}
-        for family in self.families:
-            remembered |= family.remembers(segment, before)
+        remembered = {
+            f.name: signal
+            for f in self.families
+            if (signal := f.remembers(segment, before.get(f.name))) is not None
+        }
         return replace(segment, slow=segment.slow | remembered) if remembered else segment
 
     def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from typing import Self
 
@@ -82,7 +82,7 @@ class AccelerometerHysteresis(Effect):
         made.weights = _invertible(size.reshape(len(WEIGHTS), 3).T @ WEIGHTS)
         return made
 
-    def remembers(self, segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal]:
+    def remembers(self, segment: Segment, before: Signal | None) -> Signal:
         """Where the followers are against the load, (n, 9): -1 while it rises and 1 while it falls.
 
         Play by play of x, then of y and z.  A raw force will do: a scale is a per cent, and an
@@ -91,11 +91,11 @@ class AccelerometerHysteresis(Effect):
         f_b = _averaged(segment.t, segment.raw_s @ segment.R_bs.T)
         count = len(PLAYS)
         places = np.zeros((3, count))
-        if self.name in before:
-            t, x = before[self.name]
+        if before is not None:
+            t, x = before
             places = np.array([np.interp(segment.t[0], t, b) for b in x.T]).reshape(3, count)
         branches = [_branches(f_b[:, j], places[j], self.weights[j]) for j in range(3)]
-        return {self.name: (segment.t, np.hstack(branches))}
+        return segment.t, np.hstack(branches)
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-h_i e_i`` with the mean branch ``h`` of the plays, then the same of each shape."""
