@@ -173,9 +173,9 @@ OUTLYING: Final = 6.0
 CLUSTER_S: Final = 10.0
 """Blocks whose scatter is compared with what windows promise, s [cost]."""
 WARMING_S: Final = 100.0
-"""s; the longest time constant of what two accelerometers drift apart by: that of a small board that
-warms up [physics; with none longer than half of a flight, halves of flights for building differ by
-3.5 times the variance that they say, with 100 s by 0.8, with 300 s by 0.45]."""
+"""s; the longest time constant of what two accelerometers drift apart by: a small board's that
+warms up [physics; with none longer than half of a flight, halves of flights for building differ
+by 3.5 times the variance that they say, with 100 s by 0.8, with 300 s by 0.45]."""
 LIKE_SIGMAS: Final = 3.0
 """Sigmas past which two accelerometers differ, a common change is one, or a place is wrong
 [probability]."""
