@@ -258,9 +258,9 @@ def test_damaged_state_is_refused(identified):
     damages = [
         text[:-40],
         "[]",
-        '{"version": 4}',
-        text.replace('"version": 4', '"version": 2'),
-        text.replace('"version": 4', '"version": 99'),
+        '{"version": 5}',
+        text.replace('"version": 5', '"version": 2'),
+        text.replace('"version": 5', '"version": 99'),
         text.replace('"velocity": ', '"velocity": -'),
         text.replace('"delay": ', '"delay": NaN, "was": '),
         text.replace('"prior": [', '"prior": [1.0, '),
