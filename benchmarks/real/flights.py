@@ -17,12 +17,15 @@ from onboard.answers.recorded import Recorded
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.estimate.dead_reckoning import Chain, intervals
+from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
+from onboard.core.estimate.solution import Solution
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.blocks import total
 from onboard.core.model.linearisation import Linearisation
 from onboard.recordings.opening import open_recording
 
@@ -67,7 +70,8 @@ class Fit:
         force: (3,) mean of the force in the air with the parameters in force, sensor axes.
         beside: what the effects that were said add to it.
         levels: noise levels by name.
-        inflation: variance inflation.
+        inflation: of the variance, in the direction in which it is largest.
+        numbers_inflation: of the variances of the six numbers, in the mean.
         window: averaging span of the receiver, s; ``window_asked`` without its limit.
         epochs: how many, ``believed`` how many were to be used.
         refused: epochs that each gate refused, by name.
@@ -98,6 +102,7 @@ class Fit:
     force: Array
     levels: dict[str, float]
     inflation: float
+    numbers_inflation: float
     window: float
     window_asked: float
     epochs: int
@@ -178,6 +183,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         force=recorded.calibrator.parameters.R_bs.T @ moving_force(samples, imu, flight.ends_s),
         levels={n: float(getattr(engine.noise, n)) for n in LIMITS if hasattr(engine.noise, n)},
         inflation=solution.variance_inflation,
+        numbers_inflation=_numbers_inflation(engine, solution),
         window=engine.point.window,
         window_asked=float(np.sqrt(max(asked, 0.0))),
         epochs=len(engine.traces),
@@ -190,6 +196,13 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         beside=beside(engine, MOVING_M_S, flight.ends_s),
         rest=recorded.calibrator.parameters.R_bs.T @ resting_force(samples, imu),
     )
+
+
+def _numbers_inflation(engine: Engine, solution: Solution) -> float:
+    """Claimed variances of the six over those that the sums and the prior alone would have."""
+    sums, prior = total(engine.all_blocks), np.diag(engine.model.prior_sigma**-2.0)
+    plain = np.diag(np.linalg.inv(sums.signal + prior))[:6]
+    return float(np.mean(np.diag(solution.covariance)[:6] / plain))
 
 
 def heard(samples: Iterable[Sample], imu: int) -> Recorded:

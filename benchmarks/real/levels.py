@@ -65,7 +65,12 @@ def run(made: Sequence[Fit]) -> list[Share]:
             lambda f: any(name.endswith("+") for name in f.at_limit),
         ),
         share(
-            f"variance inflation below {SANE_INFLATION:g}", lambda f: f.inflation < SANE_INFLATION
+            f"variance inflation below {SANE_INFLATION:g} in the worst direction",
+            lambda f: f.inflation < SANE_INFLATION,
+        ),
+        share(
+            f"variance inflation below {SANE_INFLATION:g} of the six numbers",
+            lambda f: f.numbers_inflation < SANE_INFLATION,
         ),
         share(f"averaging span clipped at {LONGEST_WINDOW_S:g} s", lambda f: f.clipped),
         share("calibrated", lambda f: f.status == "calibrated"),
@@ -96,7 +101,7 @@ def level_table(made: Sequence[Fit]) -> str:
 def gate_table(made: Sequence[Fit]) -> str:
     """Inflation, averaging span, and what the gates refused or renewed, in per cent."""
     lines = [
-        f"{'flight, IMU':16}{'infl.':>6}{'span':>5}{'asked':>6}{'believed':>9}"
+        f"{'flight, IMU':16}{'infl.':>6}{'of six':>7}{'span':>5}{'asked':>6}{'believed':>9}"
         + "".join(f"{g[:5]:>6}" for g in GATES)
         + " verdict"
     ]
@@ -106,7 +111,7 @@ def gate_table(made: Sequence[Fit]) -> str:
         cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
         believed = f"{f.believed}/{f.epochs}"
         lines.append(
-            f"{_label(f)}{f.inflation:6.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>9}"
+            f"{_label(f)}{f.inflation:6.2f}{f.numbers_inflation:7.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>9}"
             f"{cells} {f.verdict.removesuffix('_explained')}"
         )
     return "\n".join(lines)
