@@ -28,15 +28,18 @@ VELOCITY_SIGMA = 0.3
 HEIGHT_VELOCITY_SIGMA = 0.5
 POSITION_SIGMA = 0.5
 HEIGHT_SIGMA = 2.0
-HEADING_SIGMA = 0.1
-"""rad: EK3_MAG_M_NSE, 0.05 gauss, of a field of half a gauss."""
+HEADING_SIGMA = 0.07
+"""rad, five times a second: EK3_MAG_M_NSE, 0.05 gauss of half a gauss, ten times a second."""
 GATE = 5.0
-SMOOTHING = 0.14
-"""s in which the output predictor takes over a correction, once it is made: EKF3's gain is half of
-the inverse of the delay of what it fuses, whose correction it sees as late as that."""
+SMOOTHING = 0.25
+"""Time in which the output predictor takes over a correction, s."""
 
 PHI, VEL, POS, BG, BA = (slice(i, i + 3) for i in range(0, 15, 3))
-_INITIAL_SIGMA = np.repeat([0.02, 0.3, 0.5, 0.005, 0.2], 3)
+_INITIAL_SIGMA = np.repeat([0.1, 0.3, 0.5, 0.005, 0.2], 3)
+FUSE_EVERY = 5
+"""Steps from fix to fix, while it stands."""
+STOOD_STEPS = 1500
+"""A vehicle has stood for a minute before it is told to fly."""
 
 
 class AttitudeFilter:
@@ -79,7 +82,17 @@ class AttitudeFilter:
             f_error_n[0] / STANDARD_GRAVITY,
             heading_error,
         )
+        self._stand(R_nb, f_error_b, heading_error)
         self.phi = self._error[PHI].copy()
+
+    def _stand(self, R_nb: Array, f_error_b: Array, heading_error: float) -> None:
+        """What it learns of its biases before it flies."""
+        gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+        for k in range(STOOD_STEPS):
+            self.predict(R_nb, gravity, f_error_b, np.zeros(3))
+            if k % FUSE_EVERY == 0:
+                self.fuse_gps(np.zeros(3), np.zeros(3))
+                self.fuse_heading(heading_error)
 
     def predict(self, R_nb: Array, f_n: Array, f_error_b: Array, w_error_b: Array) -> None:
         """One step of ``STEP`` seconds.

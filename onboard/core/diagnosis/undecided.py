@@ -51,16 +51,22 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
 
     Args:
         choice: effects that were taken, and others that were not.
-        families: those of the reported model; what was taken and is not there has been decided.
+        families: those of the reported model.  What was taken and is not there was not needed by
+            its own sums: it is one of the others again, unless something is there instead that was
+            not to be chosen from, which has decided it.
     """
     kept = {f.effect for f in families}
     out = []
     for chosen in choice.chosen:
         if chosen.effect in kept:
             out += _in_the_place_of(choice, chosen)
-    fitter, free = choice.fitter, choice.free
+    fitter, free, others = choice.fitter, choice.free, _others(choice)
+    if kept <= {c.effect for c in choice.chosen}:
+        dropped = [c for c in choice.chosen if c.effect not in kept]
+        gone = {i for c in dropped for i in c.index}
+        free, others = [i for i in free if i not in gone], [*others, *dropped]
     before = fitter.fit(free)
-    for c, odds, after in _likely(fitter, free, before, _others(choice)):
+    for c, odds, after in _likely(fitter, free, before, others):
         moves = after.theta[:6] - before.theta[:6]
         out.append(Undecided(c.effect, _title(c), 1.0 / (1.0 + exp(-odds)), moves))
     return out

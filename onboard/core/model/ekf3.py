@@ -44,9 +44,10 @@ NOISE: Final = 0.012 * np.repeat([0.015, 0.35, 0.0, 0.02, 1e-3], 3) ** 2
 steps of 12 ms [physics]."""
 FUSED_S: Final = 0.2
 """From one velocity to the next that it fuses [physics: five a second is the usual rate]."""
-SIGMA: Final = np.array([0.3, 0.3, 0.5, 0.5, 0.5, 2.0, 0.1])
+SIGMA: Final = np.array([0.3, 0.3, 0.5, 0.5, 0.5, 2.0, 0.07])
 """Of what it observes, m/s, m and rad: EK3_VELNE_M_NSE, _VELD_, _POSNE_ and _ALT_M_NSE, below which
-it takes no receiver's word, and a compass's 0.05 of a field of half a gauss [physics]."""
+it takes no receiver's word, and a compass's 0.05 of a field of half a gauss ten times a second
+[physics]."""
 SHOWN_S: Final = 0.3
 """s in which what it reports takes over a correction: twice the delay of what it fuses, 0.12 to 0.2
 [physics]."""

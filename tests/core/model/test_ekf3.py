@@ -79,24 +79,16 @@ def their_own(j):
         if j in columns:
             array[columns.index(j)] = SMALL
     ekf = attitude.AttitudeFilter()
-    begins = ekf3.BEGINS.reshape(5, 3)[[0, 1, 2, 4, 3]]  # the gyroscope's biases come first there
-    ekf.covariance = np.diag(begins.ravel() ** 2)
-    rest = round(60.0 / STEP)
     out = np.zeros((len(T), 3))
-    for k in range(-rest, len(T) - 1):
-        i = max(k, 0)
-        wrong = BOARD @ (scale * (BOARD.T @ f[i]) + beta)
-        if k == -rest:
+    for k in range(len(T) - 1):
+        wrong = BOARD @ (scale * (BOARD.T @ f[k]) + beta)
+        if k == 0:
             ekf.align(R[0], wrong, 0.0)
-        middle = 0.5 * (R[i] + R[min(i + 1, len(T) - 1)]) if k >= 0 else R[0]
-        moving = k >= 0
-        f_n = np.append(a[i, :2], -G) if moving else np.array([0.0, 0.0, -G])
-        ekf.predict(middle, f_n, wrong, turns * w[i] * moving)
+        ekf.predict(0.5 * (R[k] + R[k + 1]), np.append(a[k, :2], -G), wrong, turns * w[k])
         if k % 5 == 0:
-            ekf.fuse_gps(-late * a[i] * moving, -late * v[i] * moving)
+            ekf.fuse_gps(-late * a[k], -late * v[k])
             ekf.fuse_heading(0.0)
-        if moving:
-            out[k + 1] = ekf.phi / SMALL
+        out[k + 1] = ekf.phi / SMALL
     return out
 
 
