@@ -293,6 +293,7 @@ def _failed(flight: RealFlight, imu: int, why: str) -> Fit:
         nan,
         nan,
         nan,
+        nan,
         0,
         0,
         {},

@@ -99,9 +99,12 @@ def level_table(made: Sequence[Fit]) -> str:
 
 
 def gate_table(made: Sequence[Fit]) -> str:
-    """Inflation, averaging span, and what the gates refused or renewed, in per cent."""
+    """Inflation, averaging span, and what the gates refused or renewed, in per cent.
+
+    Inflation in the worst direction, and of the six numbers.
+    """
     lines = [
-        f"{'flight, IMU':16}{'infl.':>6}{'of six':>7}{'span':>5}{'asked':>6}{'believed':>9}"
+        f"{'flight, IMU':16}{'worst':>5}{'six':>5}{'span':>5}{'asked':>6}{'used':>5}"
         + "".join(f"{g[:5]:>6}" for g in GATES)
         + " verdict"
     ]
@@ -109,10 +112,10 @@ def gate_table(made: Sequence[Fit]) -> str:
         if f.failed:
             continue
         cells = "".join(f"{_percent(f, gate):5.1f}%" for gate in GATES)
-        believed = f"{f.believed}/{f.epochs}"
+        used = f"{100.0 * f.believed / max(f.epochs, 1):.0f}%"
         lines.append(
-            f"{_label(f)}{f.inflation:6.2f}{f.numbers_inflation:7.2f}{f.window:5.2f}{f.window_asked:6.2f}{believed:>9}"
-            f"{cells} {f.verdict.removesuffix('_explained')}"
+            f"{_label(f)}{f.inflation:5.1f}{f.numbers_inflation:5.1f}{f.window:5.2f}"
+            f"{f.window_asked:6.2f}{used:>5}{cells} {f.verdict.removesuffix('_explained')}"
         )
     return "\n".join(lines)
 

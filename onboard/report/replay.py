@@ -14,7 +14,7 @@ from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
 from onboard.answers.chronicle import FREE_S, Figures
 from onboard.answers.compared import common_cause
-from onboard.answers.knowledge import ALL_SIX, determined, knowledge, seen
+from onboard.answers.knowledge import ALL_SIX, ROUGHLY, YES, determined, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import LACKING, about_six
 from onboard.core.estimate.comparison import Comparison
@@ -214,7 +214,8 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
             yield "Run onboard explain on the recording: it says what is missing."
         yield f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
     elif not whole and fly:
-        yield f"To learn the others: {fly}."
+        roughly = all(word in {YES, ROUGHLY} for word in seen(c))
+        yield f"To know them better: {fly}." if roughly else f"To learn the others: {fly}."
 
 
 def _rows(c: Calibration, autopilot: str) -> list[dict[str, Any]]:

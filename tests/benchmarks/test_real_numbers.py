@@ -9,6 +9,8 @@ from benchmarks.real.concealed import KINDS
 from benchmarks.real.flights import Fit, moving_force
 from benchmarks.real.levels import gate_table
 from benchmarks.real.outcomes import Said, compared, table
+from benchmarks.real.pair_parts import run as in_parts
+from benchmarks.real.pair_parts import table as parts_table
 from benchmarks.real.pairs import agreements, mean_force, own_table, run
 from benchmarks.real.pairs import table as pair_table
 from benchmarks.real.repeats import average, scatter_of, together
@@ -51,6 +53,7 @@ def fit(estimate: np.ndarray, covariance: np.ndarray, *, flight: str = "a", imu:
         PRIOR_SIGMA,
         np.array([0.3, -0.2, -9.8]),
         {},
+        1.0,
         1.0,
         0.1,
         0.1,
@@ -266,6 +269,29 @@ def test_a_pair_that_kept_its_flight_knows_its_difference_itself() -> None:
     assert pair.own_chi_square < 16.3
     (apart,) = run([replace(right, estimate=PRIOR), other])
     assert apart.own_chi_square > 16.3
+
+
+def test_parts_of_a_pair_differ_as_it_says_and_show_when_it_jumps() -> None:
+    rng = np.random.default_rng(6)
+    chi = {2: 0.0, 3: 0.0, 4: 0.0}
+    six = SixParameters((1.0, 1.0, 1.0), (0.1, 0.0, 0.0))
+    for _ in range(6):
+        motion = Motion(rng)
+        noise = 0.05 * rng.standard_normal((2, len(motion.t), 3))
+        first, second = (replace(drawn(imu), flight="b") for imu in (1, 2))
+        right = replace(first, batches=tuple(heard(motion, six, noise[0])))
+        other = replace(second, batches=tuple(heard(motion, SixParameters(), noise[1])))
+        for part in in_parts([right, other]):
+            chi[part.count] += part.chi_square / part.freedom / 6
+    # White noise shows no drift, of which there may have been some: rather too wide.
+    assert all(0.05 < x < 1.5 for x in chi.values()), chi
+    noise[0, len(motion.t) // 2 :, 0] += 0.3
+    jumped = replace(first, batches=tuple(heard(motion, six, noise[0])))
+    halves = next(p for p in in_parts([jumped, other]) if p.count == 2)
+    assert halves.chi_square > 16.3
+    lines = parts_table([halves]).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "halves" in lines[-1]
 
 
 def heard(motion: Motion, six: SixParameters, noise: np.ndarray) -> list[Batch]:
