@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from onboard.core.model import ekf3
+from onboard.core.model import ekf3, ekf3_filter
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
@@ -12,7 +12,7 @@ from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
 LATENESS_S: Final = 0.1
 """s by which a receiver's delay is another one than its EKF takes it for: they are 0.1 to 0.25 s
 [data sheet]."""
-TOLD: Final = (*ekf3.LATENESS, *ekf3.SCALE, *ekf3.BETA)
+TOLD: Final = (*ekf3_filter.LATENESS, *ekf3_filter.SCALE, *ekf3_filter.BETA)
 """Columns of these unknowns."""
 
 
@@ -44,4 +44,4 @@ class EkfSensors(Family):
         told = around.now.slow(ekf3.TILTED)
         if told is None:
             return NOTHING
-        return Direct(ned=told.reshape(-1, 3, ekf3.ERRORS)[..., TOLD])
+        return Direct(ned=told.reshape(-1, 3, ekf3_filter.ERRORS)[..., TOLD])

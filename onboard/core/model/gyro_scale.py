@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.model import ekf3
+from onboard.core.model import ekf3, ekf3_filter
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.quadrature import Signals
@@ -37,4 +37,4 @@ class GyroScale(Family):
         told = now.slow(ekf3.TILTED) if now.segment.gyro_followed else None
         if told is None:
             return NOTHING
-        return Direct(ned=told.reshape(-1, 3, ekf3.ERRORS)[..., ekf3.GYRO_SCALE])
+        return Direct(ned=told.reshape(-1, 3, ekf3_filter.ERRORS)[..., ekf3_filter.GYRO_SCALE])

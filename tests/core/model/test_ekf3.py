@@ -10,6 +10,7 @@ from onboard.core.maths.earth import STANDARD_GRAVITY as G
 from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
 from onboard.core.model import ekf3
 from onboard.core.model.around import around
+from onboard.core.model.ekf3_filter import BETA, ERRORS, GYRO_SCALE, LATENESS, SCALE, SHOWN_S
 from onboard.core.model.ekf_sensors import EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.quadrature import NodeMaker
@@ -64,8 +65,8 @@ def segment_of(start, end, every=2, *, own=True):
 def theirs():
     """(n, 3, 10) attitude that the simulator's EKF reports, per unit of each error."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(attitude, "SMOOTHING", ekf3.SHOWN_S)
-        return np.stack([their_own(j) for j in range(ekf3.ERRORS)], axis=-1)
+        patch.setattr(attitude, "SMOOTHING", SHOWN_S)
+        return np.stack([their_own(j) for j in range(ERRORS)], axis=-1)
 
 
 def their_own(j):
@@ -74,8 +75,12 @@ def their_own(j):
     f, w = felt(R), rates(R)
     v = np.cumsum(a, axis=0) * STEP
     scale, beta, turns = np.zeros(3), np.zeros(3), np.zeros(3)
-    late = SMALL if j in ekf3.LATENESS else 0.0
-    for array, columns in ((scale, ekf3.SCALE), (beta, ekf3.BETA), (turns, ekf3.GYRO_SCALE)):
+    late = SMALL if j in LATENESS else 0.0
+    for array, columns in (
+        (scale, SCALE),
+        (beta, BETA),
+        (turns, GYRO_SCALE),
+    ):
         if j in columns:
             array[columns.index(j)] = SMALL
     ekf = attitude.AttitudeFilter()
@@ -95,11 +100,11 @@ def their_own(j):
 def ours(segment, t, before=None):
     """(k, 3, 10)"""
     times, told = ekf3.followed(segment, before or {})[ekf3.TILTED]
-    return np.stack([np.interp(t, times, x) for x in told.T], axis=-1).reshape(-1, 3, ekf3.ERRORS)
+    return np.stack([np.interp(t, times, x) for x in told.T], axis=-1).reshape(-1, 3, ERRORS)
 
 
 @pytest.mark.parametrize("every", [2, 6])
-@pytest.mark.parametrize("j", range(ekf3.ERRORS))
+@pytest.mark.parametrize("j", range(ERRORS))
 def test_an_error_tilts_it_as_far_as_another_ekf(theirs, j, every):
     at = np.arange(5.0, 58.0, 0.5)
     got = ours(segment_of(0.0, 60.0, every), at)[..., j]
@@ -143,11 +148,16 @@ def test_levelled_at_rest_it_tilts_by_the_offset_and_learns_the_one_along_gravit
         T, np.zeros((len(T), 3)), np.tile([0.0, 0.0, -G], (len(T), 1)), T[::2], R[::2], np.eye(3)
     )
     got = ours(still, np.array([1.0, 30.0]))
-    x, y, z = (got[..., j] for j in ekf3.BETA)
+    x, y, z = (got[..., j] for j in BETA)
     np.testing.assert_allclose(x[:, 1], 1.0 / G, rtol=0.05)
     np.testing.assert_allclose(y[:, 0], -1.0 / G, rtol=0.05)
     assert np.abs(z).max() < 1e-9
-    others = [*ekf3.LATENESS, *ekf3.GYRO_SCALE, ekf3.SCALE[0], ekf3.SCALE[1]]
+    others = [
+        *LATENESS,
+        *GYRO_SCALE,
+        SCALE[0],
+        SCALE[1],
+    ]
     assert np.abs(got[..., others]).max() < 1e-9
 
 
