@@ -1,4 +1,4 @@
-"""A filter like ArduPilot's EKF3, in error form: its states' errors, per unit of its sensors' errors.
+"""A filter like ArduPilot's EKF3 in error form: its states' errors, per unit of those of its sensors.
 
 Attitude, velocity and place, and biases of gyroscope and accelerometer.  All of it is linear in the
 errors, with gains that depend on how it was flown but not on them: those of Riccati's equation
