@@ -1,4 +1,4 @@
-"""A filter like ArduPilot's EKF3 in error form: its states' errors, per unit of those of its sensors.
+"""A filter like ArduPilot's EKF3 in error form: what errors of its sensors do to its states.
 
 Attitude, velocity and place, and biases of gyroscope and accelerometer.  All of it is linear in the
 errors, with gains that depend on how it was flown but not on them: those of Riccati's equation
