@@ -10,13 +10,13 @@ chi-square is its freedom.  Of several accelerometers each is compared with the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real.flights import Fit
-from benchmarks.real.pairs import single_of
+from benchmarks.real.pairs import Mean, apart, single_of
 from onboard.core.estimate.relative import Relative, relative_of
 from onboard.core.estimate.shared_windows import SharedWindows, shared_windows
 
@@ -60,35 +60,22 @@ def run(made: Sequence[Fit]) -> list[PairInParts]:
             prior = np.concatenate([one.prior_sigma, another.prior_sigma])
             windows = shared_windows(fits[0].batches, other.batches)
             imus = (fits[0].imu, other.imu)
-            for count in COUNTS:
-                found = _apart(windows, count, imus, before, prior)
-                if found is not None:
-                    out.append(replace(found, flight=flight))
+            whole = relative_of(imus, windows, before, prior)
+            for count in COUNTS if whole is not None else ():
+                cut = (relative_of(imus, part, before, prior) for part in _cut(windows, count))
+                parts = [part for part in cut if part is not None]
+                if len(parts) == count:
+                    out.append(_compared(flight, whole, parts))
     return out
 
 
-def _apart(
-    windows: SharedWindows, count: int, imus: tuple[int, int], before: Array, prior: Array
-) -> PairInParts | None:
-    whole = relative_of(imus, windows, before, prior)
-    parts = [relative_of(imus, part, before, prior) for part in _cut(windows, count)]
-    if whole is None or any(part is None for part in parts):
-        return None
-    # All asked for the same: the difference at the flight's mean force.
-    asked = [_at(whole, part) for part in parts if part is not None]
-    weights = [np.linalg.inv(P) for _, P in asked]
-    b = sum((W @ d for W, (d, _) in zip(weights, asked, strict=True)), np.zeros(3))
-    middle = np.linalg.solve(sum(weights, np.zeros((3, 3))), b)
-    chi = sum(
-        float((d - middle) @ W @ (d - middle)) for W, (d, _) in zip(weights, asked, strict=True)
-    )
-    sigma = np.mean([np.sqrt(np.diag(P)) for _, P in asked], axis=0)
-    return PairInParts("", imus, count, sigma, chi, 3 * (count - 1))
-
-
-def _at(whole: Relative, part: Relative) -> tuple[Array, Array]:
+def _compared(flight: str, whole: Relative, parts: Sequence[Relative]) -> PairInParts:
+    """All are asked for the same: the difference at the flight's mean force."""
     J = whole.weights
-    return J @ part.theta, J @ part.covariance[:12, :12] @ J.T
+    asked = [Mean(J @ part.theta, J @ part.covariance[:12, :12] @ J.T) for part in parts]
+    sigma = np.mean([np.sqrt(np.diag(m.covariance)) for m in asked], axis=0)
+    count = len(parts)
+    return PairInParts(flight, whole.imus, count, sigma, apart(asked), 3 * (count - 1))
 
 
 def _cut(windows: SharedWindows, count: int) -> Iterator[SharedWindows]:

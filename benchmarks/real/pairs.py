@@ -84,7 +84,7 @@ class Agreement:
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """Mean force of one accelerometer by one set of six, and its covariance."""
+    """A mean force, or a difference of two, and its covariance."""
 
     force: Array
     covariance: Array
@@ -152,15 +152,17 @@ def agreements(made: Sequence[Fit]) -> list[Agreement]:
         means = [mean_force(f) for f in made if f.flight == flight and _usable(f)]
         if len(means) < 2:
             continue
-        weights = [np.linalg.inv(m.covariance) for m in means]
-        whole = sum(weights, np.zeros((3, 3)))
-        middle = np.linalg.solve(
-            whole, sum(w @ m.force for w, m in zip(weights, means, strict=True))
-        )
-        apart = [m.force - middle for m in means]
-        chi = sum(float(d @ w @ d) for d, w in zip(apart, weights, strict=True))
-        out.append(Agreement(flight, chi, 3 * (len(means) - 1)))
+        out.append(Agreement(flight, apart(means), 3 * (len(means) - 1)))
     return out
+
+
+def apart(means: Sequence[Mean]) -> float:
+    """Chi-square of some about their common mean, weighted by what they claim."""
+    weights = [np.linalg.inv(m.covariance) for m in means]
+    b = sum((w @ m.force for w, m in zip(weights, means, strict=True)), np.zeros(3))
+    middle = np.linalg.solve(sum(weights, np.zeros((3, 3))), b)
+    off = [m.force - middle for m in means]
+    return sum(float(d @ w @ d) for d, w in zip(off, weights, strict=True))
 
 
 def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:

@@ -111,16 +111,17 @@ class Steps:
             (n + 1, 3 m), and packed states.
         """
         moves, noise, variance = self._filter()
+        pushed = self.pushed.copy()
         late = np.diff(np.vstack([state.a_n, self.a_n]), axis=0)
-        self.pushed[:, 3:6, LATENESS] += late[..., None]
+        pushed[:, 3:6, LATENESS] += late[..., None]
         attitude, kept = [state.x[None, :FIRST].copy()], []
         for k, stop in pairwise([0, *stop_after]):
             cut = slice(k, stop)
-            given = moves[cut], self.pushed[cut], noise[cut], OBSERVED, variance[cut]
+            given = moves[cut], pushed[cut], noise[cut], OBSERVED, variance[cut]
             attitude.append(kalman_errors(*given, state.x, state.P))
             kept.append(state.packed(state.unshown, self.a_n[stop - 1]))
         whole = np.concatenate(attitude)
-        corrected = (np.diff(whole, axis=0) - self.pushed[:, :3]).reshape(len(self.h), -1)
+        corrected = (np.diff(whole, axis=0) - pushed[:, :3]).reshape(len(self.h), -1)
         t = np.concatenate([[0.0], np.cumsum(self.h)])
         pole = np.full(corrected.shape[1], -1.0 / SHOWN_S)
         unshown = leaky_integral(t, corrected, pole, state.unshown)

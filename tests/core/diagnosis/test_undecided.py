@@ -95,6 +95,19 @@ def test_sigmas_cover_what_either_model_says():
     assert np.mean(np.array(with_it) < 3.0) > 0.95
 
 
+def test_what_was_chosen_and_then_not_needed_is_open_unless_something_else_is_there():
+    class Shock:
+        effect = "shock"  # which was not to be chosen from
+
+    for problem, _ in at_the_edge():
+        (dropped,) = undecided(decided(problem, found=True)[0], ())
+        (never,) = undecided(decided(problem, found=False)[0], ())
+        assert dropped.effect == "effect"
+        assert dropped.share == pytest.approx(never.share)
+        np.testing.assert_allclose(dropped.moves, never.moves)
+        assert undecided(decided(problem, found=True)[0], (Shock(),)) == []
+
+
 def test_an_effect_in_the_place_of_another_is_a_model_too():
     rng = np.random.default_rng(5)
     made = drawn(rng, [Columns("effect", 1), Columns("other", 1)], np.zeros(8))

@@ -5,7 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.compiler import compiled
+from onboard.core.maths.compiler import compiled, part
+
+
+@part
+def moved(rows: Array, x: Array, gained: Array) -> None:
+    """``x += F x`` of x (s, m), F having these first rows (r, s); by way of ``gained`` (r, m)."""
+    for a in range(rows.shape[0]):
+        for c in range(x.shape[1]):
+            total = 0.0
+            for k in range(x.shape[0]):
+                total += rows[a, k] * x[k, c]
+            gained[a, c] = total
+    for a in range(rows.shape[0]):
+        for c in range(x.shape[1]):
+            x[a, c] += gained[a, c]
 
 
 @compiled(
@@ -24,36 +38,16 @@ def kalman_errors(
 ) -> None:
     """:func:`onboard.core.maths.kalman_errors.kalman_errors`, one measurement after the other."""
     n, r, s = moves.shape
-    m, o = x.shape[1], out.shape[1]
-    gain, grown = np.empty(s), np.empty((r, max(s, m)))
+    m = x.shape[1]
+    gain, gained = np.empty(s), np.empty((r, max(s, m)))
     for i in range(n):
+        moved(moves[i], x, gained)
+        moved(moves[i], P, gained)
+        moved(moves[i], P.T, gained)
         for a in range(r):
             for c in range(m):
-                total = pushed[i, a, c]
-                for k in range(s):
-                    total += moves[i, a, k] * x[k, c]
-                grown[a, c] = total
-        for a in range(r):
-            for c in range(m):
-                x[a, c] += grown[a, c]
-        for a in range(r):
-            for c in range(s):
-                total = 0.0
-                for k in range(s):
-                    total += moves[i, a, k] * P[k, c]
-                grown[a, c] = total
-        for a in range(r):
-            for c in range(s):
-                P[a, c] += grown[a, c]
+                x[a, c] += pushed[i, a, c]
         for a in range(s):
-            for c in range(r):
-                total = 0.0
-                for k in range(s):
-                    total += P[a, k] * moves[i, c, k]
-                grown[c, a] = total
-        for a in range(s):
-            for c in range(r):
-                P[a, c] += grown[c, a]
             P[a, a] += noise[i, a]
         for q in range(len(observed)):
             seen = observed[q]
@@ -61,9 +55,9 @@ def kalman_errors(
             for a in range(s):
                 gain[a] = P[a, seen] / spread
             for c in range(m):
-                innovation = -x[seen, c]
+                off = x[seen, c]
                 for a in range(s):
-                    x[a, c] += gain[a] * innovation
+                    x[a, c] -= gain[a] * off
             for c in range(s):
                 row = gain[c] * spread
                 for a in range(s):
@@ -71,6 +65,6 @@ def kalman_errors(
         for a in range(s):
             for c in range(a):
                 P[a, c] = P[c, a]
-        for a in range(o):
+        for a in range(out.shape[1]):
             for c in range(m):
                 out[i, a, c] = x[a, c]
