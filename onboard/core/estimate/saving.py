@@ -20,7 +20,7 @@ from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.errors import StateError
 
-VERSION = 5
+VERSION = 6
 """1: sums without the antenna's place among the unknowns.  2: with time on the ground in them.
 3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer."""
 

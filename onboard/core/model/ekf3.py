@@ -17,12 +17,14 @@ import numpy as np
 
 from onboard.core.inputs.segments import Batch, Segment, Signal
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.maths.frames import rotation_from_euler, skew
 from onboard.core.model.ekf3_filter import (
+    ANTENNA,
     BETA,
     ERRORS,
     GRAVITY,
     GYRO_SCALE,
+    LATENESS,
     MOVED,
     SCALE,
     SIZE,
@@ -135,9 +137,9 @@ def _at_rest(R_bs: tuple[float, ...]) -> Array:
     pushed[:, 3:6, :6] = STEP_S * force
     x = np.zeros((SIZE, ERRORS))
     x[0, :6], x[1, :6] = force[1] / -GRAVITY[2], force[0] / GRAVITY[2]
-    state = State(x, np.diag(BEGINS**2), np.zeros(3 * ERRORS), np.zeros(3))
+    state = State(x, np.diag(BEGINS**2), np.zeros(3 * ERRORS), np.zeros(3 * ERRORS))
     still = np.broadcast_to(np.eye(3), (n, 3, 3))
-    steps = Steps(np.full(n, STEP_S), still, np.zeros((n, 3)), pushed)
+    steps = Steps(np.full(n, STEP_S), still, np.zeros((n, 3)), pushed, np.zeros((n, 3, ERRORS)))
     return steps.through(state, [n])[1][0]
 
 
@@ -155,7 +157,10 @@ def _steps(segment: Segment, t: Array, R: Array) -> Steps:
     pushed[:, 3:6, SCALE] = board * raw
     pushed[:, 3:6, BETA] = board * h[:, None, None]
     a_n = pushed[:, 3:6, SCALE].sum(axis=2) / h[:, None] + GRAVITY
-    return Steps(h, mean, a_n, pushed)
+    told_n = np.zeros((len(h), 3, ERRORS))
+    told_n[..., LATENESS] = a_n[..., None]
+    told_n[..., ANTENNA] = -mean @ skew(turn[:, 0] / h[:, None])
+    return Steps(h, mean, a_n, pushed, told_n)
 
 
 def _ends(t: Array) -> list[int]:

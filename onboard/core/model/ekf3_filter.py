@@ -20,10 +20,12 @@ from onboard.core.maths.frames import skew
 from onboard.core.maths.kalman_errors import FIRST, kalman_errors
 from onboard.core.maths.leaky import leaky_integral
 
-SCALE, BETA, LATENESS, GYRO_SCALE = [0, 1, 2], [3, 4, 5], [6], [7, 8, 9]
+SCALE, BETA, LATENESS = [0, 1, 2], [3, 4, 5], [6]
+GYRO_SCALE, ANTENNA = [7, 8, 9], [10, 11, 12]
 """Errors, by columns: what the accelerometer reads too much, by share (1) and at any force (m/s^2);
-how much older velocities are than it takes them for (s); what the gyroscope reads too much (1)."""
-ERRORS: Final = 10
+how much older velocities are than it takes them for (s); what the gyroscope reads too much (1); how
+far the antenna is from where it takes it to be, body (m)."""
+ERRORS: Final = 13
 SIZE: Final = 15
 """States: attitude (rad), velocity (m/s) and place (m), NED; biases of accelerometer and gyroscope,
 body."""
@@ -52,36 +54,37 @@ class State:
     """An EKF's errors, per unit of each error of its sensors, and what its gains depend on.
 
     Attributes:
-        x: (s, m) errors of its states; velocity and place in the column of the lateness count from
-            those of a vehicle as late.
+        x: (s, m) errors of its states; velocity and place in the columns of lateness and antenna
+            count from those of a vehicle as late, and from those of the antenna.
         P: (s, s) its covariance.
         unshown: (3 m,) what it has corrected of its attitude and does not report yet, rad.
-        a_n: (3,) mean acceleration of the step before, NED, m/s^2.
+        told_n: (3 m,) how much too slow the velocities were in the step before that it was told,
+            NED, m/s.
     """
 
     x: Array
     P: Array
     unshown: Array
-    a_n: Array
+    told_n: Array
 
     @classmethod
     def unpacked(cls, row: Array) -> Self:
         """From one row of numbers."""
-        x, P, unshown, a_n = np.split(row, np.cumsum([SIZE * ERRORS, SIZE**2, 3 * ERRORS]))
+        x, P, unshown, told_n = np.split(row, np.cumsum([SIZE * ERRORS, SIZE**2, 3 * ERRORS]))
         shape = SIZE, ERRORS
-        return cls(x.reshape(shape).copy(), P.reshape(SIZE, SIZE).copy(), unshown, a_n)
+        return cls(x.reshape(shape).copy(), P.reshape(SIZE, SIZE).copy(), unshown, told_n)
 
-    def packed(self, unshown: Array, a_n: Array) -> Array:
+    def packed(self, unshown: Array, told_n: Array) -> Array:
         """As one row, with these in the place of its own."""
-        return np.concatenate([self.x.ravel(), self.P.ravel(), unshown, a_n])
+        return np.concatenate([self.x.ravel(), self.P.ravel(), unshown, told_n])
 
     def turned(self, R: Array) -> Self:
         """The same with another heading: R (3, 3)."""
         block = np.kron(np.eye(3), R)
         both = np.zeros((SIZE, SIZE))
         both[:9, :9], both[9:, 9:] = block, np.eye(SIZE - 9)
-        shown = (R @ self.unshown.reshape(3, ERRORS)).ravel()
-        return type(self)(both @ self.x, both @ self.P @ both.T, shown, R @ self.a_n)
+        shown, told_n = ((R @ x.reshape(3, ERRORS)).ravel() for x in (self.unshown, self.told_n))
+        return type(self)(both @ self.x, both @ self.P @ both.T, shown, told_n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +96,14 @@ class Steps:
         R: (n, 3, 3) mean attitude.
         a_n: (n, 3) mean acceleration, NED, m/s^2.
         pushed: (n, 9, m) what errors add to attitude, velocity and place.
+        told_n: (n, 3, m) how much too slow velocities are that it is told, NED, m/s.
     """
 
     h: Array
     R: Array
     a_n: Array
     pushed: Array
+    told_n: Array
 
     def through(self, state: State, stop_after: Sequence[int]) -> tuple[Array, list[Array]]:
         """The attitude that is reported, before and after each step, and states after some.
@@ -111,22 +116,22 @@ class Steps:
             (n + 1, 3 m), and packed states.
         """
         moves, noise, variance = self._filter()
-        pushed = self.pushed.copy()
-        late = np.diff(np.vstack([state.a_n, self.a_n]), axis=0)
-        pushed[:, 3:6, LATENESS] += late[..., None]
+        pushed, told_n = self.pushed.copy(), self.told_n.reshape(len(self.h), -1)
+        slower = np.diff(np.vstack([state.told_n, told_n]), axis=0)
+        pushed[:, 3:6] += slower.reshape(self.told_n.shape)
         attitude, kept = [state.x[None, :FIRST].copy()], []
         for k, stop in pairwise([0, *stop_after]):
             cut = slice(k, stop)
             given = moves[cut], pushed[cut], noise[cut], OBSERVED, variance[cut]
             attitude.append(kalman_errors(*given, state.x, state.P))
-            kept.append(state.packed(state.unshown, self.a_n[stop - 1]))
+            kept.append(state.packed(state.unshown, told_n[stop - 1]))
         whole = np.concatenate(attitude)
         corrected = (np.diff(whole, axis=0) - pushed[:, :3]).reshape(len(self.h), -1)
         t = np.concatenate([[0.0], np.cumsum(self.h)])
         pole = np.full(corrected.shape[1], -1.0 / SHOWN_S)
         unshown = leaky_integral(t, corrected, pole, state.unshown)
         for stop, row in zip(stop_after, kept, strict=True):
-            row[-3 - len(pole) : -3] = unshown[stop]
+            row[-2 * len(pole) : -len(pole)] = unshown[stop]
         return whole.reshape(unshown.shape) - unshown, kept
 
     def _filter(self) -> tuple[Array, Array, Array]:

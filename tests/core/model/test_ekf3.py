@@ -10,8 +10,16 @@ from onboard.core.maths.earth import STANDARD_GRAVITY as G
 from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
 from onboard.core.model import ekf3
 from onboard.core.model.around import around
-from onboard.core.model.ekf3_filter import BETA, ERRORS, GYRO_SCALE, LATENESS, SCALE, SHOWN_S
-from onboard.core.model.ekf_sensors import EkfSensors
+from onboard.core.model.ekf3_filter import (
+    ANTENNA,
+    BETA,
+    ERRORS,
+    GYRO_SCALE,
+    LATENESS,
+    SCALE,
+    SHOWN_S,
+)
+from onboard.core.model.ekf_sensors import TOLD, EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.model.regressors import Model
@@ -63,7 +71,7 @@ def segment_of(start, end, every=2, *, own=True):
 
 @pytest.fixture(scope="module")
 def theirs():
-    """(n, 3, 10) attitude that the simulator's EKF reports, per unit of each error."""
+    """(n, 3, 13) attitude that the simulator's EKF reports, per unit of each error."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(attitude, "SMOOTHING", SHOWN_S)
         return np.stack([their_own(j) for j in range(ERRORS)], axis=-1)
@@ -74,12 +82,13 @@ def their_own(j):
     R, a = attitudes(), np.pad(motion(), [(0, 0), (0, 1)])
     f, w = felt(R), rates(R)
     v = np.cumsum(a, axis=0) * STEP
-    scale, beta, turns = np.zeros(3), np.zeros(3), np.zeros(3)
+    scale, beta, turns, arm = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     late = SMALL if j in LATENESS else 0.0
     for array, columns in (
         (scale, SCALE),
         (beta, BETA),
         (turns, GYRO_SCALE),
+        (arm, ANTENNA),
     ):
         if j in columns:
             array[columns.index(j)] = SMALL
@@ -91,14 +100,15 @@ def their_own(j):
             ekf.align(R[0], wrong, 0.0)
         ekf.predict(0.5 * (R[k] + R[k + 1]), np.append(a[k, :2], -G), wrong, turns * w[k])
         if k % 5 == 0:
-            ekf.fuse_gps(-late * a[k], -late * v[k])
+            swing = np.cross(0.5 * (w[k] + w[max(k - 1, 0)]), arm)
+            ekf.fuse_gps(R[k] @ swing - late * a[k], (R[k] - R[0]) @ arm - late * v[k])
             ekf.fuse_heading(0.0)
         out[k + 1] = ekf.phi / SMALL
     return out
 
 
 def ours(segment, t, before=None):
-    """(k, 3, 10)"""
+    """(k, 3, 13)"""
     times, told = ekf3.followed(segment, before or {})[ekf3.TILTED]
     return np.stack([np.interp(t, times, x) for x in told.T], axis=-1).reshape(-1, 3, ERRORS)
 
@@ -155,6 +165,7 @@ def test_levelled_at_rest_it_tilts_by_the_offset_and_learns_the_one_along_gravit
     others = [
         *LATENESS,
         *GYRO_SCALE,
+        *ANTENNA,
         SCALE[0],
         SCALE[1],
     ]
@@ -178,9 +189,8 @@ def test_families_have_their_columns_of_it(own):
     maker = NodeMaker(made, np.zeros(3), np.repeat([1.0, 0.0], 3))
     got = model.regressors(maker.intervals(epochs[:-1], epochs[1:]), around(maker, epochs))
     want = ours(segment, epochs)
-    np.testing.assert_allclose(got.attitude_ned[..., :3], own * want[..., 7:], atol=1e-6)
-    np.testing.assert_allclose(got.attitude_ned[..., 3], want[..., 6], atol=1e-6)
-    np.testing.assert_allclose(got.attitude_ned[..., 4:], want[..., :6], atol=1e-6)
+    np.testing.assert_allclose(got.attitude_ned[..., :3], own * want[..., GYRO_SCALE], atol=1e-6)
+    np.testing.assert_allclose(got.attitude_ned[..., 3:], want[..., TOLD], atol=1e-6)
     assert not got.attitude_body.any()
 
 
