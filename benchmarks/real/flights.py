@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,8 @@ from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.estimate.solution import Solution
-from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.limits import FLOORS, LIMITS
+from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
@@ -35,6 +36,8 @@ MOVING_M_S = 0.5
 """Faster than this a vehicle is in the air: a receiver at rest wanders slower."""
 AT_LIMIT = 0.01
 """A level is at a limit within this share of it."""
+AT_FLOOR = 0.1
+"""A level is its floor where what is beyond it adds less than this share."""
 
 
 STANDS_S = 2.0
@@ -124,15 +127,21 @@ class Fit:
     def at_limit(self) -> tuple[str, ...]:
         """Names of the levels at a limit, with ``-`` at the lower and ``+`` at the upper end."""
         out = []
+        if not self.levels:
+            return ()
+        levels = NoiseLevels(**self.levels)
         for name, (low, high) in LIMITS.items():
-            level = self.levels.get(name)
-            if level is None:
-                continue
+            level = levels.beyond(name)
             if level <= low * (1.0 + AT_LIMIT):
                 out.append(f"{name}-")
             elif level >= high * (1.0 - AT_LIMIT):
                 out.append(f"{name}+")
         return tuple(out)
+
+    @property
+    def at_floor(self) -> tuple[str, ...]:
+        """Names of the levels that are their floor: the flight asks for no more."""
+        return tuple(n for n, x in self.levels.items() if x < FLOORS[n] * (1.0 + AT_FLOOR))
 
     @property
     def clipped(self) -> bool:
@@ -181,7 +190,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         prior=engine.model.prior[:6].copy(),
         prior_sigma=engine.model.prior_sigma[:6].copy(),
         force=recorded.calibrator.parameters.R_bs.T @ moving_force(samples, imu, flight.ends_s),
-        levels={n: float(getattr(engine.noise, n)) for n in LIMITS if hasattr(engine.noise, n)},
+        levels=asdict(engine.noise),
         inflation=solution.variance_inflation,
         numbers_inflation=_numbers_inflation(engine, solution),
         window=engine.point.window,

@@ -61,8 +61,8 @@ def run(made: Sequence[Fit]) -> list[Share]:
         ),
         share("a noise level at a limit", lambda f: bool(f.at_limit)),
         share(
-            "a noise level at its upper limit",
-            lambda f: any(name.endswith("+") for name in f.at_limit),
+            "a noise level that is its floor",
+            lambda f: bool(f.at_floor),
         ),
         share(
             f"variance inflation below {SANE_INFLATION:g} in the worst direction",
@@ -88,11 +88,11 @@ def _label(f: Fit) -> str:
 
 
 def level_table(made: Sequence[Fit]) -> str:
-    """Noise levels; ``-`` and ``+`` mark those at their lower and upper limit."""
+    """Noise levels; ``-`` and ``+`` mark those at a limit, ``.`` those that are their floor."""
     names = list(dict.fromkeys(n for f in made for n in f.levels))
     lines = [f"{'flight, IMU':16}" + "".join(f"{SHORT.get(n, n[:5]):>7}" for n in names)]
     for f in made:
-        marks = {m[:-1]: m[-1] for m in f.at_limit}
+        marks = dict.fromkeys(f.at_floor, ".") | {m[:-1]: m[-1] for m in f.at_limit}
         cells = [f"{f.levels[n]:6.1g}{marks.get(n, ' ')}" for n in names if n in f.levels]
         lines.append(_label(f) + ("".join(cells) or f"  {f.verdict[:60]}"))
     return "\n".join(lines)
@@ -158,7 +158,7 @@ def _median(values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64
 
 def show(made: Sequence[Fit]) -> None:
     """Print the tables and the criteria."""
-    print("Noise levels (SI; - at the lower limit, + at the upper)")
+    print("Noise levels (SI; . no more than the floor, - at the lower limit, + at the upper)")
     print(level_table(made))
     print("\nInflation of variance, averaging span (s), refused of what could be")
     print(gate_table(made))

@@ -11,6 +11,7 @@ import pytest
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Restarted
+from onboard.core.estimate.saving import VERSION
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.assembly import AssemblySettings
 from onboard.core.inputs.even_times import even_times
@@ -258,9 +259,9 @@ def test_damaged_state_is_refused(identified):
     damages = [
         text[:-40],
         "[]",
-        '{"version": 5}',
-        text.replace('"version": 5', '"version": 2'),
-        text.replace('"version": 5', '"version": 99'),
+        f'{{"version": {VERSION}}}',
+        text.replace(f'"version": {VERSION}', '"version": 2'),
+        text.replace(f'"version": {VERSION}', '"version": 99'),
         text.replace('"velocity": ', '"velocity": -'),
         text.replace('"delay": ', '"delay": NaN, "was": '),
         text.replace('"prior": [', '"prior": [1.0, '),
