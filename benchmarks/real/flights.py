@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 
@@ -20,8 +20,7 @@ from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.estimate.solution import Solution
-from onboard.core.filter.limits import FLOORS, LIMITS
-from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
@@ -35,9 +34,9 @@ Array = NDArray[np.float64]
 MOVING_M_S = 0.5
 """Faster than this a vehicle is in the air: a receiver at rest wanders slower."""
 AT_LIMIT = 0.01
-"""A level is at a limit within this share of it."""
-AT_FLOOR = 0.1
-"""A level is its floor where what is beyond it adds less than this share."""
+"""A level is at an end within this share of it."""
+FLOORLESS = frozenset({"vertical", "heading_time"})
+"""Levels whose lower end is a lowest value, not what no flight is without."""
 
 
 STANDS_S = 2.0
@@ -126,22 +125,22 @@ class Fit:
     @property
     def at_limit(self) -> tuple[str, ...]:
         """Names of the levels at a limit, with ``-`` at the lower and ``+`` at the upper end."""
-        out = []
-        if not self.levels:
-            return ()
-        levels = NoiseLevels(**self.levels)
-        for name, (low, high) in LIMITS.items():
-            level = levels.beyond(name)
-            if level <= low * (1.0 + AT_LIMIT):
-                out.append(f"{name}-")
-            elif level >= high * (1.0 - AT_LIMIT):
-                out.append(f"{name}+")
-        return tuple(out)
+        return tuple(
+            f"{name}{'+' if high else '-'}"
+            for name, high in self._at_ends()
+            if high or name in FLOORLESS
+        )
 
     @property
     def at_floor(self) -> tuple[str, ...]:
         """Names of the levels that are their floor: the flight asks for no more."""
-        return tuple(n for n, x in self.levels.items() if x < FLOORS[n] * (1.0 + AT_FLOOR))
+        return tuple(n for n, high in self._at_ends() if not high and n not in FLOORLESS)
+
+    def _at_ends(self) -> Iterator[tuple[str, bool]]:
+        for name, level in self.levels.items():
+            low, high = LIMITS[name]
+            if level <= low * (1.0 + AT_LIMIT) or level >= high * (1.0 - AT_LIMIT):
+                yield name, level >= high * (1.0 - AT_LIMIT)
 
     @property
     def clipped(self) -> bool:

@@ -21,6 +21,7 @@ from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Ser
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.mean_force import in_the_mean
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.blocks import Block
@@ -121,7 +122,11 @@ class Recorded:
             calibrations: of the accelerometers, as the answers have them.
         """
         try:
-            return compare(calibrations, (self.kept(),))
+            whole = [
+                c if (engine := self._engines.get(c.imu)) is None else in_the_mean(c, engine)
+                for c in calibrations
+            ]
+            return compare(whole, (self.kept(),))
         except (ArithmeticError, ValueError):  # numbers that no model fits
             return None
 

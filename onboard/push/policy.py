@@ -228,6 +228,10 @@ def objections(
     found: list[Refusal] = []
     if missing:
         found.append(_no(Objection.PHYSICS_MISSING, f"{PHYSICS_MISSING}{missing}"))
+    elif plan.contradiction > plan.contradiction_limit:
+        kept = ", ".join(c.name for c in plan.changes if c.kept)
+        sentence = f"the flight does not fit {kept} as in force, nor shows what it should be"
+        found.append(_no(Objection.CONTRADICTED, sentence))
     found += _estimate(plan, calibration, settings)
     for change in plan.changes:
         found += _number(change, settings)
@@ -265,10 +269,6 @@ def _estimate(plan: PushPlan, calibration: Calibration, settings: PolicySettings
             f"{settings.sure:g} is needed"
         )
         found.append(_no(Objection.NOT_SURE, sentence))
-    if plan.contradiction > plan.contradiction_limit:
-        kept = ", ".join(c.name for c in plan.changes if c.kept)
-        sentence = f"the flight shows that {kept} is wrong as it is, but not what it should be"
-        found.append(_no(Objection.CONTRADICTED, sentence))
     return found + _held_out(plan, calibration, settings)
 
 

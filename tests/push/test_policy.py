@@ -157,6 +157,23 @@ class TestEstimate:
         )
         assert Objection.CONTRADICTED in objections(cal)
 
+    def test_of_numbers_that_lack_physics_nothing_more_is_said(self):
+        """By how much they are wrong nobody knows, so they contradict nothing that is in force."""
+        cal = calibration(
+            scale=(1.013, 1.0 + 0.2, 1.01),
+            covariance=covariance((0.001, 0.029, 0.001, 0.008, 0.008, 0.008)),
+        )
+        plan = propose(cal, current(), system_id=1)
+        settings = PolicySettings()
+        assert Objection.CONTRADICTED in {
+            r.objection for r in values_objections(plan, cal, settings)
+        }
+        missing = {
+            r.objection for r in values_objections(plan, cal, settings, missing="the offset jumped")
+        }
+        assert Objection.PHYSICS_MISSING in missing
+        assert Objection.CONTRADICTED not in missing
+
     def test_nothing_seen(self):
         cal = calibration(
             scale=(1.0, 1.0, 1.0),

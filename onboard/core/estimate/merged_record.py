@@ -54,7 +54,7 @@ def merged_calibration(
     """
     # All flights have flown with the same gyroscope: its share does not become less.
     floor = np.diag(FLOOR**2 + np.square(flights[-1].gyro_sigma))
-    made = _with_six(flights[-1], found.estimate, found.covariance, floor)
+    made = with_six(flights[-1], found.estimate, found.covariance, floor)
     back = np.linalg.inv(parameters_jacobian(found.estimate))
     seen = assess(back.T @ found.information @ back, needs, kind)
     seconds = [c.trusted_s for c in flights]
@@ -115,7 +115,7 @@ def of_raw(c: Calibration, applied: SixParameters) -> Calibration:
     back = T @ np.linalg.inv(parameters_jacobian(x))
     mean, square = np.array(c.load_mean), np.array(c.load_square)
     gyro = np.diag(np.square(c.gyro_sigma))
-    made = _with_six(c, T @ x, back @ c.with_its_gyroscope @ back.T, gyro)
+    made = with_six(c, T @ x, back @ c.with_its_gyroscope @ back.T, gyro)
     return replace(
         made,
         in_force_scale=applied.scale,
@@ -125,7 +125,7 @@ def of_raw(c: Calibration, applied: SixParameters) -> Calibration:
     )
 
 
-def _with_six(c: Calibration, linear: Array, covariance: Array, floor: Array) -> Calibration:
+def with_six(c: Calibration, linear: Array, covariance: Array, floor: Array) -> Calibration:
     """The record with other numbers: (6,) scale and beta, (6, 6) of them, (6, 6) of the six."""
     six, J = parameters_of(linear), parameters_jacobian(linear)
     P = J @ covariance @ J.T + floor

@@ -100,31 +100,38 @@ STAMP_JITTER_S: Final = 8e-4
 
 # The search for noise levels (noise).
 
-FLOORS: Final[dict[str, float]] = {
-    "velocity": 0.01,
-    "velocity_colour": 0.005,
-    "vertical": 0.0,
-    "height": 0.01,
-    "height_walk": 0.002,
-    "force_walk": 0.01,
-    "tilt_walk": 5e-5,
-    "bias_walk": 1e-6,
-    "attitude": 0.02,
-    "heading": 0.05,
-    "heading_time": 0.0,
-    "heading_walk": 5e-5,
-    "attitude_white": 3e-5,
-    "jitter": 3e-4,
+LIMITS: Final[dict[str, tuple[float, float]]] = {
+    "velocity": (0.01, 2.0),
+    "velocity_colour": (0.005, 1.0),
+    "vertical": (0.1, 10.0),
+    "height": (0.01, 10.0),
+    "height_walk": (0.002, 2.0),
+    "force_walk": (0.01, 3.0),
+    "tilt_walk": (5e-5, 0.03),
+    "bias_walk": (1e-6, 3e-3),
+    "attitude": (0.02, 0.3),
+    "heading": (0.05, 0.6),
+    "heading_time": (2.0, 600.0),
+    "heading_walk": (5e-5, 0.03),
+    "attitude_white": (3e-5, 0.03),
+    "jitter": (3e-4, 0.2),
 }
-"""What is in every noise level, units of :class:`~onboard.core.filter.noise.NoiseLevels`; what the
-flight itself says comes on top of it, in squares.
+"""Floors and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
-No sensor on a small vehicle is better than that: a velocity and a height that a carrier's phase
-gives from one fix to the next are good to a centimetre (a second), a gyroscope to 3 mdps a root of
-a Hertz; hundredths of a degree, in which a log writes attitude, are off by 5e-5 rad; the jitter of
-a velocity's moment is that of whole milliseconds [data sheets].  They are there for simulations
-without noise, which must not make the filter believe that timing, interpolation and filters are
-modelled to the last digit.
+A level that is its floor says that a flight asks for nothing beyond what no flight is without; one
+that is at its highest, that something else is wrong.  Two have no floor but a lowest value: the
+vertical velocity's, a ratio, and a time.
+
+No sensor on a small vehicle is better than the floors: a velocity and a height that a carrier's
+phase gives from one fix to the next are good to a centimetre (a second), a gyroscope to 3 mdps a
+root of a Hertz; hundredths of a degree, in which a log writes attitude, are off by 5e-5 rad [data
+sheets].  They are there for simulations without noise, which must not make the filter believe that
+timing, interpolation and filters are modelled to the last digit.  A gyroscope's bias wanders by
+3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
+[physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
+time between two fixes, five a second being the fewest that ArduPilot flies with [physics].
+Velocities down are as good as those north and east but for a factor of ten, and a heading that is
+off for longer than ten minutes is off for the flight [physics].
 
 The slow error of the recorded attitude is no such formality.  Its floor is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
@@ -134,32 +141,6 @@ levelled with.  So with the heading, whose error goes with the manoeuvre, too: t
 have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
 1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
 sealed ones, which it was not made from]."""
-LEAST: Final = 1e-3
-"""Of what is usual: three sigma below it, a level adds nothing to its floor [probability]."""
-LIMITS: Final[dict[str, tuple[float, float]]] = {
-    "velocity": (LEAST * 0.05, 2.0),
-    "velocity_colour": (LEAST * 0.05, 1.0),
-    "vertical": (0.1, 10.0),
-    "height": (LEAST * 0.2, 10.0),
-    "height_walk": (LEAST * 0.05, 2.0),
-    "force_walk": (LEAST * 0.04, 3.0),
-    "tilt_walk": (LEAST * 3e-4, 0.03),
-    "bias_walk": (LEAST * 3e-5, 3e-3),
-    "attitude": (LEAST * 0.01, 0.3),
-    "heading": (LEAST * 0.03, 0.6),
-    "heading_time": (2.0, 600.0),
-    "heading_walk": (LEAST * 3e-4, 0.03),
-    "attitude_white": (LEAST * 5e-4, 0.03),
-    "jitter": (LEAST * 3e-3, 0.2),
-}
-"""Lowest and highest that a level may be beyond its floor: a search that ends at one says that
-something else is wrong.
-
-A gyroscope's bias wanders by 3e-3 rad/s in a second at the most, where vibration is rectified and
-changes with the throttle [physics]; the jitter of a velocity's moment is at most the time between
-two fixes, five a second being the fewest that ArduPilot flies with [physics]; velocities down are
-as good as those north and east but for a factor of ten, and a heading that is off for longer than
-ten minutes is off for the flight [physics]."""
 USUAL_SIGMA: Final = math.log(10.0)
 """Log ratio between a level and the usual one, one sigma: no more than its order of magnitude is
 known.  [Tuned on flights for building: with a factor of three the jitter of a receiver with one fix

@@ -1,6 +1,5 @@
 """Noise levels of the whitening filter and their estimation from the data.
 
-Each has a floor, of what no flight is without, and a part beyond it, in squares, which is found.
 The levels are the likeliest after the flight and what is known of them beforehand, which keeps
 those that a flight says nothing of where they usually are.  One pass over the data runs a filter
 bank: the levels that it is at; for each of them a neighbour, a nudge away, which tell the slope and
@@ -11,13 +10,12 @@ the residuals (:mod:`onboard.core.estimate.solution`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from onboard.core.filter.limits import FLOORS, LIMITS, NUDGE, USUAL_SIGMA
+from onboard.core.filter.limits import LIMITS, NUDGE, USUAL_SIGMA
 from onboard.core.maths.arrays import Array
 
 
@@ -55,27 +53,17 @@ class NoiseLevels:
     force_walk: float = 0.04
     tilt_walk: float = 3e-4
     bias_walk: float = 3e-5
-    attitude: float = 0.022
+    attitude: float = 0.02
     heading: float = 0.06
     heading_time: float = 5.0
     heading_walk: float = 3e-4
     attitude_white: float = 5e-4
     jitter: float = 3e-3
 
-    def beyond(self, name: str) -> float:
-        """What one level has beyond its floor, inside its limits."""
-        own = math.sqrt(max(getattr(self, name) ** 2 - FLOORS[name] ** 2, 0.0))
-        return _inside(name, own)
-
     def scaled(self, name: str, factor: float) -> NoiseLevels:
-        """What one level has beyond its floor times ``factor``, inside its limits."""
-        own = _inside(name, self.beyond(name) * factor)
-        return replace(self, **{name: math.hypot(FLOORS[name], own)})
-
-
-def _inside(name: str, own: float) -> float:
-    low, high = LIMITS[name]
-    return min(max(own, low), high)
+        """One level times ``factor``, inside its limits."""
+        low, high = LIMITS[name]
+        return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
 
 USUAL = NoiseLevels()
@@ -100,15 +88,15 @@ ESTIMATED = (
 
 
 def log_prior(levels: NoiseLevels, names: Sequence[str] = ESTIMATED) -> float:
-    """Of levels beforehand, up to a constant: log-normal about the usual ones, without floors."""
-    off = [levels.beyond(n) / USUAL.beyond(n) for n in names]
+    """Of levels beforehand, up to a constant: log-normal about the usual ones."""
+    off = [getattr(levels, n) / getattr(USUAL, n) for n in names]
     return -0.5 * float(np.square(np.log(off) / USUAL_SIGMA).sum())
 
 
 def nudges(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> Array:
     """(n,) log ratios that :func:`neighbours` are apart from ``centre``, inside the limits."""
     out = [
-        NUDGE if centre.beyond(name) * np.exp(NUDGE) <= LIMITS[name][1] else -NUDGE
+        NUDGE if getattr(centre, name) * np.exp(NUDGE) <= LIMITS[name][1] else -NUDGE
         for name in names
     ]
     return np.array(out)
@@ -122,12 +110,12 @@ def neighbours(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[N
 
 def between(start: NoiseLevels, end: NoiseLevels, shares: Sequence[float]) -> list[NoiseLevels]:
     """Levels at some shares of the way from ``start`` to ``end``, in log-levels."""
-    ratios = {name: end.beyond(name) / start.beyond(name) for name in ESTIMATED}
-
-    def reached(share: float) -> NoiseLevels:
-        levels = start
-        for name, ratio in ratios.items():
-            levels = levels.scaled(name, ratio**share)
-        return levels
-
-    return [reached(share) if share else start for share in shares]
+    return [
+        NoiseLevels(
+            *(
+                getattr(start, f.name) * (getattr(end, f.name) / getattr(start, f.name)) ** share
+                for f in fields(NoiseLevels)
+            )
+        )
+        for share in shares
+    ]

@@ -51,8 +51,8 @@ def scoring_step(
             :class:`~onboard.core.filter.passes.Pass`.
         names: the n levels.
     """
-    here = np.array([centre.beyond(name) for name in names])
-    usual = np.array([USUAL.beyond(name) for name in names])
+    here = np.array([getattr(centre, name) for name in names])
+    usual = np.array([getattr(USUAL, name) for name in names])
     limits = np.array([LIMITS[name] for name in names])
     apart = nudges(centre, names)
     H = trades / np.outer(apart, apart)

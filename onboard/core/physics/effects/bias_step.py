@@ -20,7 +20,7 @@ LARGEST = 3.0
 """m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
 
 SHARED_CURE = Cure(
-    "look first at what all accelerometers share, for each asks for this jump: the mount of "
+    "look at what all accelerometers share, for each asks for this jump: the mount of "
     "the autopilot, GPS, the compass, a blow"
 )
 

@@ -1,0 +1,90 @@
+"""What an accelerometer reads in the mean of a flight: scale, offset, and all beside them.
+
+Where vibration shifts an offset, or a blow has moved it, the six numbers are not all that a flight
+says of an accelerometer.  Another one on the same board has not got that, and is to be compared
+with all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.merged_record import with_six
+from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.segments import Batch, Segment
+from onboard.core.maths.accelerometer import linear_of, parameters_jacobian
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.model.quadrature import NodeMaker
+
+SIX = "six"
+Chosen = Callable[[Batch, Array], Mask]
+"""Which of some times (n,), s, of a batch count."""
+
+
+def mean_columns(engine: Engine, chosen: Chosen | None = None) -> Array | None:
+    """What each unknown of an engine's model adds to the mean force, (3, m), sensor axes.
+
+    Args:
+        engine: has its flight.
+        chosen: of the samples between fixes; None: all.
+
+    Returns:
+        m/s^2 per unit; None if there are no samples.
+    """
+    model = engine.model
+    columns, count = np.zeros((3, model.size)), 0
+    before: Segment | None = None
+    for batch in engine.batches:
+        known = {} if batch.fresh or before is None else before.slow
+        segment = before = model.remembering(batch.segment, known)
+        t = segment.t[(segment.t >= batch.fixes.t[0]) & (segment.t < batch.fixes.t[-1])]
+        if chosen is not None:
+            t = t[chosen(batch, t)]
+        if len(t):
+            columns += _added(engine, segment, t).sum(axis=0)
+            count += len(t)
+    return columns / count if count else None
+
+
+def in_the_mean(made: Calibration, engine: Engine) -> Calibration:
+    """The record with the offset that the accelerometer has in the mean of the flight.
+
+    Args:
+        made: of ``engine``'s sums.
+        engine: its model has physics besides the calibration's own, or nothing changes.
+    """
+    model, solution = engine.model, engine.solution()
+    always = {f.name for f in calibration_model(engine.point).families}
+    found = [f.name for f in model.families if f.name not in always]
+    columns = mean_columns(engine) if found else None
+    if columns is None or solution is None:
+        return made
+    of_found = np.zeros(model.size, dtype=bool)
+    for name in found:
+        of_found[model.slices[name]] = True
+    columns[:, ~of_found] = 0.0
+    linear = linear_of(np.array(made.scale + made.offset))
+    T = np.zeros((6, model.size))
+    T[:, model.slices[SIX]] = np.eye(6)
+    plain = T @ solution.covariance @ T.T
+    T[3:] += columns
+    linear[3:] += columns @ solution.theta
+    covariance = T @ solution.covariance @ T.T
+    # What its sigmas have beyond the sums (floors, axes, what is open) stays as it is.
+    J = parameters_jacobian(solution.theta)
+    return with_six(made, linear, covariance, np.array(made.covariance) - J @ plain @ J.T)
+
+
+def _added(engine: Engine, segment: Segment, t: Array) -> Array:
+    """(n, 3, m) what each unknown adds to the force at times ``t`` (n,), sensor axes."""
+    nodes = NodeMaker(segment, np.zeros(3), engine.point.six).signals(t[None])
+    out = np.zeros((len(t), 3, engine.model.size))
+    for family in engine.model.families:
+        pushed = family.acceleration(nodes) if family.available(nodes) else None
+        if pushed is not None:
+            out[:, :, engine.model.slices[family.name]] = segment.R_bs.T @ pushed[0]
+    return out
