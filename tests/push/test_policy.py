@@ -159,9 +159,10 @@ class TestEstimate:
 
     def test_of_numbers_that_lack_physics_nothing_more_is_said(self):
         """By how much they are wrong nobody knows, so they contradict nothing that is in force."""
+        sigmas = (0.001, 0.029, 0.029, 0.008, 0.008, 0.008)
         cal = calibration(
-            scale=(1.013, 1.0 + 0.2, 1.01),
-            covariance=covariance((0.001, 0.029, 0.001, 0.008, 0.008, 0.008)),
+            scale=(1.013, 1.0 + 0.06, 1.0 - 0.06),
+            covariance=covariance(sigmas, [(1, 2, 0.9)]),
         )
         plan = propose(cal, current(), system_id=1)
         settings = PolicySettings()

@@ -79,7 +79,7 @@ LAZY_EPOCHS: Final = 5
 
 MOST_PREPARED_BYTES: Final = 66_000_000
 """Of segments made ready that are kept for the next pass, in a program that goes over recordings;
-what is more is made anew.  Five minutes with five fixes a second and every effect are 15 MB.  None
+what is more is made anew.  Five minutes with five fixes a second and every effect are 18 MB.  None
 are beside an autopilot: to make them anew costs a thirtieth of a diagnosis [cost]."""
 NEAR_BIAS_RAD_S: Final = 2e-3
 """rad/s; within it attitude is linear in a bias: over the half second to either side of a fix a
