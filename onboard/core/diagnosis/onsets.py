@@ -64,7 +64,7 @@ def fitted(
         else:
             made.batches.append(batch)
     made.once()
-    sums = [block.sums for block in made.blocks]
+    sums = [total(made.blocks)] if made.blocks else []
     for blocks, after in ((early, False), (late, True)):
         if blocks:
             sums.append(_with_jumps(total(blocks), full, made.model, steps, after=after))
