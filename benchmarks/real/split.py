@@ -105,6 +105,7 @@ LOOKS: tuple[str, ...] = (
     "attitudes that follow the gyroscope, no rolling, noise as the velocity walks, or as it was",
     "the receiver's shapes in the linearisation, jumps where half of the best is, or as it was",
     "a heading that is set anew not followed, time and walk of its error found, or as it was",
+    "an EKF followed along the flight, its own sensors and antenna unknowns of it, or a loop",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
