@@ -192,7 +192,8 @@ class Engine:
         fresh = [i for i, before in enumerate([*self.batches, batch]) if before.fresh]
         run = slice(fresh[-1] if fresh else 0, None)
         known = self.batches[run]
-        self.batches[run] = ekf3.along(known, self._heading.joined(known, batch))
+        joined = self._heading.joined(known, batch)
+        self.batches[run] = ekf3.along(known, joined, self.batches[: run.start])
         self._waiting += 1
         self._solution = None
         self._buffered_s += batch.duration

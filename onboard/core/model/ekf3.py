@@ -39,7 +39,11 @@ STATES: Final = "ekf3_states"
 BEGINS: Final = np.repeat([0.1, 0.3, 0.5, 0.2, 0.005], 3)
 """Sigmas with which it begins [physics]."""
 SETTLED_S: Final = 60.0
-"""It has been at rest for as long where a flight begins [physics: its own checks take half]."""
+"""It has been at rest for as long where a flight begins [physics: its own checks take half]; pauses
+in the air are shorter."""
+
+FLYING_M_S: Final = 3.0
+"""Faster than that a vehicle that has flown is not on the ground for long [physics: a walk]."""
 
 STEP_S: Final = 0.1
 """s; attitudes are taken so far apart, within which nothing of an EKF moves [cost]."""
@@ -51,24 +55,36 @@ KEPT_STEPS: Final = 5
 """From one state that is kept there to the next [cost]."""
 
 
-def along(known: Sequence[Batch], run: Sequence[Batch]) -> list[Batch]:
+def along(
+    known: Sequence[Batch], run: Sequence[Batch], earlier: Sequence[Batch] = ()
+) -> list[Batch]:
     """An uninterrupted flight with what :func:`followed` tells among its slow signals.
 
     Args:
         known: what this has given of it.
         run: the same and more, or anew where attitudes have changed.
+        earlier: flight before the interruption.
     """
     out: list[Batch] = []
+    paused = earlier[-1].segment.slow if earlier and _flew_on(earlier[-1], run[0]) else {}
     for i, batch in enumerate(run):
         if i < len(known) and known[i] is batch:
             out.append(batch)
             continue
-        before = out[-1].segment.slow if out else {}
+        before = out[-1].segment.slow if out else paused
         told = followed(batch.segment, before)
         if out:
             out[-1] = _with(out[-1], {name: x for name, x in before.items() if name != STATES})
         out.append(_with(batch, batch.segment.slow | told))
     return out
+
+
+def _flew_on(before: Batch, after: Batch) -> bool:
+    """Whether a vehicle was in the air between two parts of its flight, and so its EKF went on."""
+    ends = before.fixes.v_n[-1], after.fixes.v_n[0]
+    pause = after.segment.t[0] - before.segment.t[-1]
+    fast = all(np.hypot(v[0], v[1]) > FLYING_M_S for v in ends)
+    return fast and -KEPT_S < pause < SETTLED_S
 
 
 def _with(batch: Batch, slow: dict[str, Signal]) -> Batch:
@@ -80,7 +96,7 @@ def followed(segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal
 
     Args:
         segment: samples.
-        before: the same of the segment before; empty after a gap.
+        before: the same of the segment before; empty if it was at rest before this one.
 
     Returns:
         By :data:`TILTED` (k, 3 m), NED, rad per unit of each error, and by :data:`STATES`; empty of
@@ -122,9 +138,12 @@ def _begin(
         old, attitude = before[TILTED]
         between = slice(*np.searchsorted(old, [t[0], times[k]]))
         return float(times[k]), State.unpacked(states[k]), (old[between], attitude[between])
+    nothing = np.zeros(0), np.zeros((0, 3 * ERRORS))
+    if len(times):
+        return float(t[0]), State.unpacked(states[-1]), nothing
     nose = rotation_from_euler(0.0, 0.0, np.arctan2(R[1, 0], R[0, 0]))
     rested = State.unpacked(_at_rest(tuple(R_bs.ravel().tolist()))).turned(nose)
-    return float(t[0]), rested, (np.zeros(0), np.zeros((0, 3 * ERRORS)))
+    return float(t[0]), rested, nothing
 
 
 @lru_cache(maxsize=4)

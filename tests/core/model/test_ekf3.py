@@ -133,12 +133,30 @@ def test_it_goes_on_from_segment_to_segment():
     assert np.abs(ours(after, at) - whole).max() > 0.02
 
 
-def test_where_segments_do_not_overlap_it_begins_anew():
+def test_over_a_pause_it_goes_on_with_what_it_has_learned():
+    """Levelled at rest it would be tilted by an offset, which it has learned in the air."""
     before = ekf3.followed(segment_of(0.0, 15.0), {})
-    at = np.array([25.0, 30.0])
-    np.testing.assert_array_equal(
-        ours(segment_of(20.0, 40.0), at, before), ours(segment_of(20.0, 40.0), at)
-    )
+    at = np.arange(20.5, 34.0, 0.5)
+    want = ours(segment_of(0.0, 60.0), at)
+    on, anew = ours(segment_of(20.0, 40.0), at, before), ours(segment_of(20.0, 40.0), at)
+    force = [*SCALE, *BETA]
+    left, all_of_it = (np.abs(x - want)[..., force].max(axis=(0, 1)) for x in (on, anew))
+    assert np.all(left < 0.2 * all_of_it)
+
+
+@pytest.mark.parametrize(("flying", "pause"), [(True, 5.0), (False, 5.0), (True, 90.0)])
+def test_a_pause_in_the_air_is_none_of_the_ekf(flying, pause):
+    """On the ground, or for long, it has been levelled anew."""
+    speed = 8.0 if flying else 1.0
+    first, second = batch_of(0.0, 20.0), batch_of(20.0, 40.0)
+    fixes = [replace(b.fixes, v_n=b.fixes.v_n + speed) for b in (first, second)]
+    (flown,) = ekf3.along([], [replace(first, fixes=fixes[0])])
+    t = second.segment.t
+    later = replace(second.segment, t=t + pause, t_attitude=second.segment.t_attitude + pause)
+    after = replace(second, segment=later, fixes=fixes[1], fresh=True)
+    (goes_on,), (rested,) = (ekf3.along([], [after], x) for x in ([flown], []))
+    got, anew = (b.segment.slow[ekf3.TILTED][1] for b in (goes_on, rested))
+    assert np.array_equal(got, anew) is not (flying and pause < ekf3.SETTLED_S)
 
 
 def test_a_gap_in_the_attitudes_is_forgotten():
