@@ -121,6 +121,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-25-3",
     "2026-11-26",
     "2026-11-26-2",
+    "2026-11-27",
 )
 """Releases that have been judged."""
 
