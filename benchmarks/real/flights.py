@@ -19,6 +19,8 @@ from onboard.core.diagnosis.procedure import examine
 from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import LONGEST_WINDOW_S
+from onboard.core.estimate.mean_force import in_the_mean
+from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.solution import Solution
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import EpochState
@@ -82,6 +84,8 @@ class Fit:
         chain: integrals between epochs.
         states: filter states at epochs.
         beside: what the effects that were said add to the force.
+        whole: the calibration in the mean of the flight, as accelerometers are compared; None if
+            there is none.
         rest: (3,) the force on the ground with the parameters in force, sensor axes, m/s^2; NaN
             where the vehicle was not seen standing.
     """
@@ -115,6 +119,7 @@ class Fit:
     chain: Chain = NO_CHAIN
     states: tuple[EpochState, ...] = ()
     beside: Beside = NOTHING
+    whole: Calibration | None = None
     rest: Array = field(default_factory=lambda: np.full(3, np.nan))
 
     @property
@@ -202,6 +207,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         chain=intervals([(b.segment, b.fixes) for b in engine.batches], engine.point),
         states=tuple(engine.states),
         beside=beside(engine, MOVING_M_S, flight.ends_s),
+        whole=in_the_mean(c, engine),
         rest=recorded.calibrator.parameters.R_bs.T @ resting_force(samples, imu),
     )
 

@@ -9,13 +9,14 @@ degrees of freedom, and a pair that is far above them is contradicted.  Left out
 of the sensors do (``w x (w x r)``, some mm/s^2 for 10 cm).
 
 The second table is of the pair itself (:mod:`onboard.core.estimate.relative`): how well it knows
-the difference without GPS, all flight in which both were heard and places taken into account, and
-the chi-square of the two estimates against it, with what they share left out.
+the difference without GPS, all flight in which both were heard and places taken into account; the
+chi-square of the two estimates against it, with what they share left out; and the difference that
+is left where all accelerometers of a flight are solved together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -25,9 +26,8 @@ from numpy.typing import NDArray
 from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from benchmarks.real.split import RealFlight
-from onboard.core.estimate.joint import Single, disagreement, without_prior
-from onboard.core.estimate.relative import relative_of
-from onboard.core.estimate.shared_windows import shared_windows
+from onboard.core.estimate.comparison import compare
+from onboard.core.estimate.joint import Single, without_prior
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import vector3
 from onboard.core.maths.chi_square import CHI_SQUARE_999, survival
@@ -47,6 +47,7 @@ class Pair:
         covariance: (3, 3) of ``after`` as the estimates claim.
         own_sigma: (3,) of the difference as the pair itself has it; NaN if it does not.
         own_chi_square: of the estimates against that.
+        together: (3,) with all accelerometers of the flight solved together.
     """
 
     flight: str
@@ -56,6 +57,7 @@ class Pair:
     covariance: Array
     own_sigma: Array
     own_chi_square: float
+    together: Array
 
     @property
     def sigma(self) -> Array:
@@ -92,8 +94,7 @@ class Mean:
 
 def mean_force(fit: Fit) -> Mean:
     """(3,) mean force by all that a flight says of an accelerometer, and its (3, 3) covariance."""
-    raw = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:])).undo(fit.force)
-    scale, offset = fit.estimate[:3], fit.estimate[3:]
+    raw, scale, offset = _raw(fit), fit.estimate[:3], fit.estimate[3:]
     J = np.hstack([np.diag(raw - offset), -np.diag(scale)])
     more = fit.beside
     return Mean(scale * (raw - offset) + more.force, J @ fit.covariance @ J.T + more.covariance)
@@ -106,35 +107,44 @@ def _usable(fit: Fit) -> bool:
 def run(made: Sequence[Fit]) -> list[Pair]:
     """Every pair of accelerometers of every flight that was estimated and moved."""
     good = [f for f in made if _usable(f)]
-    out = []
-    for one, other in combinations(good, 2):
-        if one.flight != other.flight:
-            continue
+    return [
+        pair
+        for flight in dict.fromkeys(f.flight for f in good)
+        for pair in _of_one_flight([f for f in good if f.flight == flight])
+    ]
+
+
+def _of_one_flight(fits: Sequence[Fit]) -> Iterator[Pair]:
+    whole = [f.whole for f in fits if f.whole is not None]
+    compared = compare(whole, [{f.imu: f.batches for f in fits}])
+    own = {} if compared is None else {p.imus: p for p in compared.pairs}
+    for one, other in combinations(fits, 2):
+        imus = one.imu, other.imu
         a, b = mean_force(one), mean_force(other)
-        out.append(
-            Pair(
-                one.flight,
-                (one.imu, other.imu),
-                one.force - other.force,
-                a.force - b.force,
-                a.covariance + b.covariance,
-                *_own(one, other),
-            )
+        sigma, chi_square, together = np.full(3, np.nan), float("nan"), np.full(3, np.nan)
+        if compared is not None and imus in own:
+            sigma, chi_square = np.array(own[imus].own_sigma), own[imus].chi_square
+            six = [compared.joint.of(imu)[0] for imu in imus]
+            together = _felt(one, six[0]) - _felt(other, six[1])
+        yield Pair(
+            one.flight,
+            imus,
+            one.force - other.force,
+            a.force - b.force,
+            a.covariance + b.covariance,
+            sigma,
+            chi_square,
+            together,
         )
-    return out
 
 
-def _own(one: Fit, other: Fit) -> tuple[Array, float]:
-    """(3,) sigma of the difference as the pair itself has it, and chi-square against that."""
-    a, b = single_of(one), single_of(other)
-    if a is None or b is None:
-        return np.full(3, np.nan), float("nan")
-    before, prior = (np.concatenate(x) for x in ((a.before, b.before), (a.prior_sigma,) * 2))
-    windows = shared_windows(one.batches, other.batches)
-    relative = relative_of((one.imu, other.imu), windows, before, prior)
-    if relative is None:
-        return np.full(3, np.nan), float("nan")
-    return np.sqrt(np.diag(relative.own_covariance)), disagreement(relative, a, b)
+def _felt(fit: Fit, six: Array) -> Array:
+    """(3,) mean force by six numbers."""
+    return six[:3] * (_raw(fit) - six[3:])
+
+
+def _raw(fit: Fit) -> Array:
+    return SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:])).undo(fit.force)
 
 
 def single_of(fit: Fit) -> Single | None:
@@ -179,16 +189,23 @@ def table(pairs: Sequence[Pair], agreed: Sequence[Agreement] = ()) -> str:
 
 
 def own_table(pairs: Sequence[Pair]) -> str:
-    """One line for each pair: how well it knows the difference, and the estimates against it."""
+    """One line for each pair: how well it knows the difference, and the estimates against it.
+
+    And the difference once all accelerometers are solved together.
+    """
     header = "".join(f"{'sigma ' + axis:>10}" for axis in "xyz")
-    lines = [f"{'flight, IMUs':17}{header}{'chi2':>8}   of the pair itself"]
+    lines = [f"{'flight, IMUs':17}{header}{'chi2':>8}{'all together':^21}"]
     for p in pairs:
         sigma = "".join(f"{x:10.4f}" for x in p.own_sigma)
-        lines.append(f"{_label(p):17}{sigma}{p.own_chi_square:8.1f}")
+        together = "".join(f"{x:7.3f}" for x in p.together)
+        lines.append(f"{_label(p):17}{sigma}{p.own_chi_square:8.1f}{together}")
     known = [p.own_chi_square for p in pairs if np.isfinite(p.own_chi_square)]
     if known:
         beyond = sum(x > CHI_SQUARE_999[3] for x in known)
         lines.append(f"contradicted once in a thousand: {beyond} of {len(known)} pairs")
+        left = np.array([p.together for p in pairs if np.isfinite(p.own_chi_square)])
+        rms, worst = float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+        lines.append(f"difference with all together, RMS, m/s^2: {rms:.3f}, at most {worst:.3f}")
     return "\n".join(lines)
 
 

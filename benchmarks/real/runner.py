@@ -142,6 +142,8 @@ def show(found: Results, contents: Sequence[str]) -> None:
         print("\n### Pairs of accelerometers in flight, m/s^2")
         print(pairs.table(found.pairs, found.agreements))
         print()
+        print(pairs.own_table(found.pairs))
+        print()
         print(pair_parts.table(found.in_parts))
     if "repeats" in contents:
         print("\n### Repeated flights")

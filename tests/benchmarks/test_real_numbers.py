@@ -15,7 +15,7 @@ from benchmarks.real.pairs import agreements, mean_force, own_table, run
 from benchmarks.real.pairs import table as pair_table
 from benchmarks.real.repeats import average, scatter_of, together
 from benchmarks.real.whiteness import whiteness_of
-from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.estimate.result import SIX_NAMES, Calibration, Coverage
 from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import (
@@ -24,6 +24,7 @@ from onboard.core.maths.accelerometer import (
     parameters_jacobian,
     parameters_of,
 )
+from onboard.core.maths.arrays import vector3
 from tests.core.estimate.two_accelerometers import Motion, batches
 
 RNG = np.random.default_rng(3)
@@ -256,19 +257,41 @@ def test_tables_fit_eighty_columns() -> None:
     assert max(map(len, lines)) <= 80
 
 
+def kept(f: Fit, estimate: np.ndarray, flight: list[Batch]) -> Fit:
+    """The fit with its flight, and a calibration of that."""
+    nothing = Calibration.unanswered(
+        f.imu,
+        SixParameters(),
+        "",
+        parameters_known=True,
+        coverage=Coverage(0.0, (0.0,) * 6, "", ()),
+    )
+    whole = replace(
+        nothing,
+        scale=vector3(estimate[:3]),
+        offset=vector3(estimate[3:]),
+        covariance=tuple(tuple(float(x) for x in row) for row in f.covariance),
+        prior_sigma=(0.03, 0.03, 0.03, 0.5, 0.5, 0.5),
+    )
+    return replace(f, flight="b", estimate=estimate, batches=tuple(flight), whole=whole)
+
+
 def test_a_pair_that_kept_its_flight_knows_its_difference_itself() -> None:
+    """And all together, whose difference is nothing, agree to what the pair knows."""
     rng = np.random.default_rng(5)
     motion = Motion(rng)
     six = SixParameters((1.0, 1.0, 1.0), (0.1, 0.0, 0.0))
     noise = 0.05 * rng.standard_normal((2, len(motion.t), 3))
-    first, second = (replace(drawn(imu), flight="b") for imu in (1, 2))
-    right = replace(first, estimate=six.as_vector(), batches=tuple(heard(motion, six, noise[0])))
-    other = replace(second, estimate=PRIOR, batches=tuple(heard(motion, SixParameters(), noise[1])))
-    (pair,) = run([right, other])
+    flown = [heard(motion, x, n) for x, n in zip((six, SixParameters()), noise, strict=True)]
+    first, second = drawn(1), kept(drawn(2), PRIOR, flown[1])
+    first = replace(first, force=second.force + np.array([0.1, 0.0, 0.0]))
+    (pair,) = run([kept(first, six.as_vector(), flown[0]), second])
     assert np.all(pair.own_sigma < 0.2 * pair.sigma)
     assert pair.own_chi_square < 16.3
-    (apart,) = run([replace(right, estimate=PRIOR), other])
+    (apart,) = run([kept(first, PRIOR, flown[0]), second])
     assert apart.own_chi_square > 16.3
+    assert np.abs(apart.after).max() == pytest.approx(0.1)
+    assert np.abs(apart.together).max() < 0.02
 
 
 def test_parts_of_a_pair_differ_as_it_says_and_show_when_it_jumps() -> None:
