@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real.flights import Fit
-from benchmarks.real.pairs import Mean, apart, single_of
+from benchmarks.real.pairs import Mean, apart
 from onboard.core.estimate.relative import Relative, relative_of
 from onboard.core.estimate.shared_windows import SharedWindows, shared_windows
 
@@ -53,11 +53,8 @@ def run(made: Sequence[Fit]) -> list[PairInParts]:
     for flight in dict.fromkeys(f.flight for f in made):
         fits = [f for f in made if f.flight == flight and not f.failed]
         for other in fits[1:]:
-            one, another = single_of(fits[0]), single_of(other)
-            if one is None or another is None:
-                continue
-            before = np.concatenate([one.before, another.before])
-            prior = np.concatenate([one.prior_sigma, another.prior_sigma])
+            before = np.concatenate([fits[0].prior, other.prior])
+            prior = np.concatenate([fits[0].prior_sigma, other.prior_sigma])
             windows = shared_windows(fits[0].batches, other.batches)
             imus = (fits[0].imu, other.imu)
             whole = relative_of(imus, windows, before, prior)

@@ -27,7 +27,6 @@ from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from benchmarks.real.split import RealFlight
 from onboard.core.estimate.comparison import compare
-from onboard.core.estimate.joint import Single, without_prior
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import vector3
 from onboard.core.maths.chi_square import CHI_SQUARE_999, survival
@@ -145,14 +144,6 @@ def _felt(fit: Fit, six: Array) -> Array:
 
 def _raw(fit: Fit) -> Array:
     return SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:])).undo(fit.force)
-
-
-def single_of(fit: Fit) -> Single | None:
-    """What a flight says of an accelerometer without its prior; None: it says nothing."""
-    in_force = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
-    return without_prior(
-        fit.imu, in_force, fit.prior_sigma, fit.estimate, fit.covariance, fit.gyro_sigma
-    )
 
 
 def agreements(made: Sequence[Fit]) -> list[Agreement]:

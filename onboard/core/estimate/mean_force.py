@@ -55,7 +55,7 @@ def in_the_mean(made: Calibration, engine: Engine) -> Calibration:
 
     Args:
         made: of ``engine``'s sums.
-        engine: its model has physics besides the calibration's own, or nothing changes.
+        engine: nothing changes if its model has no physics besides the calibration's own.
     """
     model, solution = engine.model, engine.solution()
     always = {f.name for f in calibration_model(engine.point).families}
