@@ -111,7 +111,7 @@ def judged(diagnosis: Diagnosis) -> Answer:
         diagnosis: with the calibration as its engine gave it.
     """
     suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
-    if diagnosis.verdict is Verdict.INSUFFICIENT:
+    if not diagnosis.mismatch.supported:
         return Answer(_refused(diagnosis))
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(phrase_of(e) for e in suspects)
@@ -184,7 +184,7 @@ def diagnosed(given: Answer, document: Mapping[str, Any], *, resumed: bool = Fal
 
 
 def _refused(diagnosis: Diagnosis) -> Diagnosis:
-    """A diagnosis that says nothing of the flight: nor do its numbers, for the same reason."""
+    """A diagnosis that no model supports: nor do its numbers say anything, for the same reason."""
     c = diagnosis.calibration
     if c.status is not Status.CALIBRATED:
         return diagnosis

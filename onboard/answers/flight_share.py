@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 from onboard.answers.answer import Answer
 from onboard.answers.recorded import NO_FLIGHT, Recorded
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.estimate.calibration_record import doubt_of, judged_by
+from onboard.core.estimate.calibration_record import judged_by
+from onboard.core.estimate.calibration_status import doubt_of
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.merged_flights import Apart, FlightSix, flight_six
 from onboard.core.estimate.merged_record import of_raw
@@ -31,7 +32,6 @@ from onboard.core.physics.effect import Bearing
 
 BESIDE = (Bearing.HARMLESS, Bearing.BESIDE)
 NOT_COMPARED = Apart(0.0, 0)
-HOVERED = "it hovered or stood still, so its numbers only repeat the recorded attitude"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +98,8 @@ def _why_not(recorded: Recorded, given: Answer, imu: int) -> str:
     beside = all(bearing_of(e.name) in BESIDE for e in diagnosis.effects)
     if given.missing and not (diagnosis.verdict is Verdict.EXPLAINED and beside):
         return given.missing
-    if diagnosis.verdict is Verdict.INSUFFICIENT:
-        m = diagnosis.mismatch
-        if not m.supported:
-            return f"only {m.fixes} of its {m.believed} GPS fixes fit one model"
-        return HOVERED
-    if not engine.moving:
-        return HOVERED
+    if not (m := diagnosis.mismatch).supported:
+        return f"only {m.fixes} of its {m.believed} GPS fixes fit one model"
     if doubt_of(engine, solution):
         return "its parts contradict each other"
     if engine.trusted_s < engine.settings.minimum_s:

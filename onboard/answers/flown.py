@@ -17,7 +17,7 @@ import numpy as np
 from onboard.answers.answer import Answer
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import Ground
@@ -223,8 +223,7 @@ def sensors_of(diagnosis: Diagnosis) -> Sensors:
     """What the sensor level has found, with what it leaves unknown of the force."""
     c = diagnosis.calibration
     timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
-    known = diagnosis.verdict is not Verdict.INSUFFICIENT
-    if not known:
+    if diagnosis.silent:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
     else:

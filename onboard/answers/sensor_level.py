@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Finding
 from onboard.core.vehicle.limits import APART, SURE
@@ -49,7 +49,7 @@ def sensor_differences(
         real: diagnosis of the real recording.
         simulation: of the simulation's; None: SITL with its default settings.
     """
-    if real.verdict is Verdict.INSUFFICIENT:
+    if real.silent:
         return ()
     out = list(_timing(real, simulation))
     theirs = {} if simulation is None else {e.name: e for e in simulation.effects}

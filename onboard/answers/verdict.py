@@ -23,6 +23,7 @@ from onboard.core.physics.catalogue import (
     title_of,
 )
 from onboard.core.physics.finding import Finding
+from onboard.core.physics.wording import listed
 from onboard.push import diagnosed
 from onboard.push.policy import PHYSICS_MISSING, Objection
 
@@ -48,7 +49,8 @@ SAID_ABOVE = (
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict as one short sentence."""
     if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return "This flight shows too little to tell"
+        what = "" if diagnosis.silent else " what is missing"
+        return f"This flight shows too little to tell{what}"
     if diagnosis.verdict is Verdict.CLEAN:
         return "Nothing is missing from the model" + (WHERE_BELIEVED if diagnosis.unused else "")
     named = [e for e in diagnosis.effects if is_named(e.name)]
@@ -156,7 +158,8 @@ def cures(diagnosis: Diagnosis, advice: Advice | None = None) -> list[str]:
     ``advice`` says which parameters may be set; without it none is named.
     """
     if diagnosis.verdict is Verdict.INSUFFICIENT:
-        return to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
+        fly = to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
+        return fly if diagnosis.silent or advice is None else [about_six(advice), *fly]
     out = []
     for e in diagnosis.effects:
         settings = "" if advice is None else _named(e, advice)
@@ -175,7 +178,10 @@ def cures(diagnosis: Diagnosis, advice: Advice | None = None) -> list[str]:
 
 def about_six(advice: Advice) -> str:
     """Whether to set the six, in a sentence."""
-    if advice.settable:
+    if advice.plan is not None and advice.settable:
+        shown = [c.name for c in advice.plan.changes if not c.kept]
+        if len(shown) < len(advice.plan.changes):
+            return f"Set {listed(shown)}; the rest stays as it is."
         return "Set the calibration parameters."
     # One reason is enough where the other only follows from it.
     lacking = any(r.objection is Objection.PHYSICS_MISSING for r in advice.refusals)

@@ -20,7 +20,7 @@ from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading
 from onboard.cli.replay import write_bytes, write_json, write_text
 from onboard.cli.terminal import Terminal
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.catalogue import title_of
 from onboard.core.physics.finding import Finding
@@ -100,7 +100,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
-    if d.verdict is Verdict.INSUFFICIENT:
+    if d.silent:
         return
     yield ""
     yield _six(d)
@@ -109,7 +109,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
 
 def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     """What, how sure, what to do: the same words as on the page."""
-    refused = d.verdict is Verdict.INSUFFICIENT
+    refused = d.silent
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column()

@@ -13,16 +13,6 @@ OFFSET_BOUND: Final = 3.5
 ARMING_THRESHOLD: Final = 0.75
 """ArduPilot's default of ARMING_ACCTHRESH, m/s^2, where it has not told its own."""
 
-# What a flight has to show; costs: a wrong value flies, a right one waits for another flight
-
-SURE: Final = 0.99
-"""Probability that the specific force becomes better over the loads flown: one push in a hundred
-may make it worse, by less than it is uncertain.  Flight that was not used in the fit has to show
-the same odds."""
-LEAST_CHANGE: Final = 0.01
-"""m/s^2, root mean square over the flight.  Tilts the horizon by 0.06 degrees, and a receiver of
-0.05 m/s shows it after five seconds: less changes nothing that anybody could notice."""
-
 # In flight, where the EKF has to follow each step
 
 IN_FLIGHT_SCALE_STEP: Final = 0.005

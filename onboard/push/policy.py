@@ -27,6 +27,7 @@ from enum import Enum
 
 import numpy as np
 
+from onboard.core.estimate.limits import LEAST_CHANGE, SURE
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.inputs.airborne import grounded
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
@@ -103,8 +104,8 @@ class PolicySettings:
     scale_min: float = limits.SCALE_BOUNDS[0]
     scale_max: float = limits.SCALE_BOUNDS[1]
     offset_max: float = limits.OFFSET_BOUND
-    sure: float = limits.SURE
-    least_change: float = limits.LEAST_CHANGE
+    sure: float = SURE
+    least_change: float = LEAST_CHANGE
     in_flight_scale_step: float = limits.IN_FLIGHT_SCALE_STEP
     in_flight_offset_step: float = limits.IN_FLIGHT_OFFSET_STEP
     arming_threshold: float = limits.ARMING_THRESHOLD

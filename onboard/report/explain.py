@@ -10,7 +10,7 @@ from onboard.answers import verdict, words
 from onboard.answers.advice import Advice
 from onboard.answers.explain import Explanation
 from onboard.answers.knowledge import seen
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.physics.catalogue import danger_of, is_excluded, kind_of, title_of
 from onboard.core.physics.finding import Confounder, Finding, Where
@@ -53,7 +53,7 @@ def explain_html(
         One HTML document in UTF-8 without references to anything outside itself.
     """
     unclear = {n for a in diagnosis.ambiguous for n in a.names}
-    refused = diagnosis.verdict is Verdict.INSUFFICIENT
+    refused = diagnosis.silent
     return render(
         TEMPLATE,
         base,
@@ -63,6 +63,7 @@ def explain_html(
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
+        silent=refused,
         headline=verdict.headline(diagnosis),
         severity=verdict.severity(diagnosis),
         dangers=verdict.dangers(diagnosis),

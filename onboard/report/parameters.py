@@ -18,7 +18,7 @@ from onboard.answers.answer import Answer
 from onboard.answers.explain import Explanation
 from onboard.answers.px4 import Px4Advice, px4_advice
 from onboard.answers.replay import Replay
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.result import SIX_NAMES, Calibration
 from onboard.core.physics.catalogue import title_of
 from onboard.errors import UsageError
@@ -57,7 +57,7 @@ def changes(diagnosis: Diagnosis, advice: Advice) -> tuple[Change, ...]:
     Each name comes once; values that are not finite do not come at all.
     """
     found: dict[str, Change] = {}
-    if diagnosis.verdict is Verdict.INSUFFICIENT:
+    if diagnosis.silent:
         return ()
     for change in (*_six(advice), *_cures(diagnosis, advice)):
         if math.isfinite(change.value):
@@ -72,7 +72,7 @@ def parameter_text(
     lines = [f"# onboard explain: {', '.join(files)}"] if files else []
     lines.append(f"# accelerometer {diagnosis.imu}, verdict {diagnosis.verdict.value}")
     lines.append(f"# calibration: {diagnosis.calibration.status.value}")
-    if diagnosis.verdict is Verdict.INSUFFICIENT:
+    if diagnosis.silent:
         lines.append("# This flight says too little: nothing to change.")
     else:
         lines += _about(diagnosis.calibration, advice)

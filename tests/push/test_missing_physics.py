@@ -139,11 +139,18 @@ def test_a_residual_that_is_not_noise_forbids_it(verdict):
     assert found.calibration.status is Status.INSUFFICIENT
 
 
-def test_a_flight_that_says_too_little_is_never_calibrated():
-    silent = dataclasses.replace(diagnosis(verdict=Verdict.INSUFFICIENT), note="half is false.")
-    found = judged(silent)
+def test_a_flight_of_which_half_is_refused_is_never_calibrated():
+    silent = diagnosis(verdict=Verdict.INSUFFICIENT)
+    refused = dataclasses.replace(silent.mismatch, fixes=400, believed=1000)
+    found = judged(dataclasses.replace(silent, mismatch=refused, note="half is false."))
     assert found.calibration.status is Status.INSUFFICIENT
     assert found.calibration.note == "half is false."
+    assert found.missing == ""
+
+
+def test_a_flight_too_dull_for_physics_keeps_the_numbers_that_it_shows():
+    found = judged(diagnosis(verdict=Verdict.INSUFFICIENT))
+    assert found.calibration.status is Status.CALIBRATED
     assert found.missing == ""
 
 

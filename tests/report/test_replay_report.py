@@ -110,9 +110,9 @@ def test_the_page_is_complete_and_stands_alone(told):
 
 
 @pytest.mark.slow
-def test_a_recording_without_flight_says_so_and_what_to_fly(tmp_path):
+def test_a_recording_of_a_hop_says_so_and_what_to_fly(tmp_path):
     path = tmp_path / "dull.tlog"
-    spec = FlightSpec(vehicle="copter", duration=60.0, imus=(TRUE,), dull=True)
+    spec = FlightSpec(vehicle="copter", duration=32.0, imus=(TRUE,), dull=True)
     recording.write_tlog(spec, path)
     recorded = Recorded(watched=True)
     page = Page.of(replay_html(replay([path], recorded), recorded.chronicle))

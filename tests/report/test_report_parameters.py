@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -86,7 +87,16 @@ def test_cures_of_effects_not_told_apart_are_only_comments():
 
 
 def test_nothing_to_load_from_a_flight_that_says_too_little():
-    assert loaded(param_file(diagnosis(verdict=Verdict.INSUFFICIENT))) == {}
+    little = replace(calibration(), status=Status.INSUFFICIENT)
+    silent = diagnosis(verdict=Verdict.INSUFFICIENT, calibration=little)
+    assert loaded(param_file(silent)) == {}
+
+
+def test_a_flight_too_dull_for_physics_may_show_numbers_all_the_same():
+    dull = diagnosis(verdict=Verdict.INSUFFICIENT, effects=())
+    names = set(loaded(param_file(dull)))
+    assert names
+    assert names <= set(parameter_names(1).six)
 
 
 def test_values_that_are_not_finite_do_not_come():

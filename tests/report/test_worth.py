@@ -15,21 +15,27 @@ from sitl.recording import FlightSpec, write_tlog
 SLOW_STREAMS = {"RAW_IMU": 25.0, "ATTITUDE": 10.0}
 
 
-def flight(tmp_path, seed):
-    """A minute and a half of a copter or a plane, two thirds of it in the air."""
+def flight(tmp_path, seed, *, dull):
+    """A minute and a half of a copter or a plane, two thirds of it in the air.
+
+    If ``dull``, it hovers or flies straight on.
+    """
     (imu,) = random_imus(seed, 1)
     path = tmp_path / f"{seed}.tlog"
     vehicle = ("copter", "plane")[seed % 2]
-    spec = FlightSpec(vehicle=vehicle, duration=90.0, imus=(imu,), seed=seed, rates=SLOW_STREAMS)
+    spec = FlightSpec(
+        vehicle=vehicle, duration=90.0, imus=(imu,), seed=seed, rates=SLOW_STREAMS, dull=dull
+    )
     write_tlog(spec, path)
     return path, np.array((*imu.scale, *imu.offset))
 
 
 @pytest.mark.slow
-def test_what_may_be_set_makes_the_force_better(tmp_path):
+@pytest.mark.parametrize("dull", [False, True])
+def test_what_may_be_set_makes_the_force_better(tmp_path, dull):
     settable = 0
     for seed in range(700, 710):
-        path, truth = flight(tmp_path, seed)
+        path, truth = flight(tmp_path, seed, dull=dull)
         result = replay([path], Recorded())
         (c,), (advice,) = result.calibrations, result.advice
         if not advice.settable:

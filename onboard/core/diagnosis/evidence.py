@@ -37,7 +37,7 @@ from onboard.core.diagnosis.regimes import (
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fit
 from onboard.core.diagnosis.undecided import in_words, left_open, undecided
-from onboard.core.estimate.calibration_record import too_far
+from onboard.core.estimate.calibration_status import too_far
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration

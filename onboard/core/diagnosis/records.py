@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.estimate.result import Calibration, Estimate, Six
+from onboard.core.estimate.result import Calibration, Estimate, Six, Status
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN, Finding, Where
 
@@ -174,3 +174,9 @@ class Diagnosis:
     plain: Plain | None = None
     unused: tuple[Unused, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+
+    @property
+    def silent(self) -> bool:
+        """Whether the flight says nothing: neither what is missing, nor what the six are."""
+        too_little = self.verdict is Verdict.INSUFFICIENT
+        return too_little and self.calibration.status is not Status.CALIBRATED

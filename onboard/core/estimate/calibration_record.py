@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.estimate.calibration_model import beyond_range
+from onboard.core.estimate.calibration_status import force_known, judged
 from onboard.core.estimate.certificate import certify
 from onboard.core.estimate.dead_reckoning import Drift, free_drift
-from onboard.core.estimate.determined import determine, flown_loads, force_moments
+from onboard.core.estimate.determined import flown_loads
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.gyro_axes import gyro_sigma
 from onboard.core.estimate.limits import (
     APART_S,
-    CONTRADICTION,
     LONG_DRIFT_S,
     LONG_DRIFTS,
     OFFSET_FLOOR,
@@ -26,7 +25,7 @@ from onboard.core.estimate.limits import (
     SHORT_DRIFTS,
     TIMING_FLOOR_S,
 )
-from onboard.core.estimate.observability import Needs, assess
+from onboard.core.estimate.observability import assess
 from onboard.core.estimate.result import (
     Calibration,
     Certificate,
@@ -85,14 +84,14 @@ def calibration_of(
     )
 
 
-def calibrated(imu: int, engine: Engine, parameters: ParametersInForce) -> bool:
-    """Whether :func:`calibration_of` says so, without what takes time and does not decide it.
+def known_well_enough(imu: int, engine: Engine, parameters: ParametersInForce) -> bool:
+    """Whether it is calibrated, and no more flight is needed; without what takes time to say.
 
     Raises:
         KeyError: no flight was processed.
     """
     made = _record(imu, engine, parameters, _NOT_ASKED, finished=False, rejected={}, kind="")
-    return made.status is Status.CALIBRATED
+    return made.status is Status.CALIBRATED and force_known(made, engine.settings.needs)
 
 
 def _record(
@@ -143,7 +142,7 @@ def _record(
         dead_reckoning=residuals.dead_reckoning,
         temperature=_temperature(engine),
     )
-    return _judged(made, engine, solution, parameters)
+    return judged(made, engine, solution, parameters)
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,45 +281,6 @@ def timing_of(engine: Engine, solution: Solution) -> dict[str, Estimate]:
     }
 
 
-def _judged(
-    made: Calibration, engine: Engine, solution: Solution, parameters: ParametersInForce
-) -> Calibration:
-    """The record with the status that the flight deserves."""
-    if not parameters.representable:
-        note = (
-            "AHRS_ORIENTATION is unknown or not a multiple of 90 degrees: scale and offset of the "
-            "sensor's axes cannot be separated from here. "
-        )
-        return replace(made, status=Status.INVALID, note=note + made.note)
-    if doubt := doubt_of(engine, solution):
-        return replace(made, note=f"{doubt}. {made.note}")
-    if engine.trusted_s < engine.settings.minimum_s or not good_enough(made, engine.settings.needs):
-        return made
-    return replace(made, status=Status.CALIBRATED)
-
-
-def doubt_of(engine: Engine, solution: Solution) -> str:
-    """Why the sigmas of a flight may not be believed, in words; empty if they may."""
-    if not engine.moving:
-        return "hovering or standing: fly fast, brake hard, turn both ways"
-    if solution.variance_inflation > CONTRADICTION:
-        return (
-            "the flight contradicts itself: something is missing from the model, "
-            "see onboard explain"
-        )
-    if beyond := too_far(engine, solution):
-        return f"{' and '.join(beyond)}: something is missing from the model, see onboard explain"
-    return ""
-
-
-def too_far(engine: Engine, solution: Solution) -> list[str]:
-    """What the flight wants further off than anything of it can be, in words."""
-    found = solution.theta, solution.covariance
-    # Sums of earlier flights alone have followed what their fixes showed.
-    shaped = engine.shaped or not engine.batches
-    return beyond_range(engine.point, engine.model, *found, shaped=shaped)
-
-
 def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Calibration:
     """The same with its residuals against other parameters than those in force in the flight.
 
@@ -341,21 +301,6 @@ def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Cal
         predictive_gain=residuals.predictive_gain,
         dead_reckoning=residuals.dead_reckoning,
     )
-
-
-def good_enough(made: Calibration, needs: Needs) -> bool:
-    """Whether the force over the loads flown is known as well as from numbers known well enough.
-
-    That takes no number by itself: a hover knows the z axis at one load, and flies at no other.
-    """
-    in_force = made.in_force_scale + made.in_force_offset
-    M = force_moments(made.load_mean, made.load_square, in_force)
-    needed = float(np.diag(M) @ needs.target**2)
-    try:
-        found = determine(made, in_force)
-    except ValueError:  # numbers that are none
-        return False
-    return found.directions > 0 and found.error_after**2 <= needed
 
 
 def _certificate(engine: Engine) -> Certificate | None:

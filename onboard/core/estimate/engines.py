@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
-from onboard.core.estimate.calibration_record import calibrated
+from onboard.core.estimate.calibration_record import known_well_enough
 from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.settings import CalibratorSettings
@@ -47,7 +47,7 @@ class Engines:
     def add(self, batches: Mapping[int, list[Batch]]) -> float | None:
         """Process batches of flight by accelerometer; time of the last fix in them, s.
 
-        A refinement that is due waits while the accelerometer is calibrated without it: it would
+        A refinement that is due waits while the force is known well enough without it: it would
         say the same with smaller sigmas, and goes several times over all that was flown.
         """
         newest: float | None = None
@@ -61,7 +61,7 @@ class Engines:
                     self._engines[imu] = Engine(self._settings, prior)
                 engine = self._engines[imu]
                 engine.add(batch)
-                if engine.due and not calibrated(imu, engine, self._parameters):
+                if engine.due and not known_well_enough(imu, engine, self._parameters):
                     engine.refine()
                 end = float(batch.fixes.t[-1])
                 newest = end if newest is None else max(newest, end)

@@ -126,6 +126,13 @@ APART_S: Final = 10.0
 """s; put between the flights of two boots, so that no window spans both [cost: any
 number above the longest gap]."""
 
+SURE: Final = 0.99
+"""Probability that the force becomes better over the loads flown, from which a calibration is one:
+one in a hundred may make it worse, by less than it is uncertain [probability]."""
+LEAST_CHANGE: Final = 0.01
+"""m/s^2, root mean square over the flight.  Tilts the horizon by 0.06 degrees, and a receiver of
+0.05 m/s shows it after five seconds: less changes nothing that anybody could notice [physics]."""
+
 # Observability.
 
 COUPLED: Final = 0.85

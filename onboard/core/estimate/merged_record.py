@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from onboard.core.estimate.calibration_record import good_enough
+from onboard.core.estimate.calibration_status import good_enough
 from onboard.core.estimate.joint import FLOOR
 from onboard.core.estimate.merged_flights import Merged
 from onboard.core.estimate.observability import Needs, Observability, assess

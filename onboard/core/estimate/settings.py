@@ -22,7 +22,8 @@ class CalibratorSettings:
         refine: estimate timing and noise at all; False where a diagnosis will do it itself.
         at_once: go through flight as it comes; False where nobody asks before a diagnosis, which
             goes through it by itself.
-        minimum_s: trusted seconds below which nothing is called calibrated.
+        minimum_s: trusted seconds below which nothing is called calibrated: noise levels are not
+            looked for earlier than after the first of ``refine_at_s``.
         coast_s: longest segment without an accepted fix that is bridged inertially, s.
         brisk_speed: m/s; a hover wanders slower.
         brisk_s: seconds faster than that which are enough however long the vehicle hovered.
@@ -37,7 +38,7 @@ class CalibratorSettings:
     refine_at_s: tuple[float, ...] = (30.0, 120.0, 480.0)
     refine: bool = True
     at_once: bool = True
-    minimum_s: float = 45.0
+    minimum_s: float = 30.0
     coast_s: float = 30.0
     brisk_speed: float = 1.5
     brisk_s: float = 30.0

@@ -24,6 +24,7 @@ from onboard.answers.explain_document import explain_document
 from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.determined import determine
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.chi_square import CHI_SQUARE_999
@@ -145,18 +146,16 @@ class Examiner:
 
 
 def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
-    """With the answer of all flights, where this one says too little by itself but supports it.
+    """With the answer of all flights, where that says more than this one, which supports it.
 
     Support is the flight's own: by its likelihood alone it must prefer those values to the ones in
     force, past the 0.999 quantile of what six numbers that change nothing gain by chance.
     """
     alone = found.calibration
-    if found.missing or alone.status is Status.CALIBRATED:
-        return found
-    if not flight.engine(found.imu).aged:
+    if found.missing or not flight.engine(found.imu).aged:
         return found
     together = flight.calibration(found.imu)
-    if together.status is not Status.CALIBRATED:
+    if together.status is not Status.CALIBRATED or _directions(together) <= _directions(alone):
         return found
     gain = preference(
         np.array(together.in_force_scale + together.in_force_offset),
@@ -166,6 +165,13 @@ def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
     if gain is None or gain < CHI_SQUARE_999[6]:
         return found
     return replace(found, calibration=_added(together))
+
+
+def _directions(c: Calibration) -> int:
+    """Of the six, how many can be set."""
+    if c.status is not Status.CALIBRATED:
+        return 0
+    return determine(c, c.in_force_scale + c.in_force_offset).directions
 
 
 def _added(together: Calibration) -> Calibration:

@@ -13,8 +13,11 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
+from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.effect import Bearing
 from onboard.daemon.learning.meaning import in_force
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.diagnosed import Diagnosed
@@ -58,6 +61,13 @@ class JudgedFlight:
             for found in self.diagnosed.values()
         )
 
+    def overrules(self, before: JudgedFlight) -> bool:
+        """Whether it says enough to take the place of what an earlier flight has said."""
+        return not self.says_nothing and all(
+            _would_have_shown(found, before.diagnosed.get(imu))
+            for imu, found in self.diagnosed.items()
+        )
+
     def outdated(self) -> JudgedFlight:
         """The same after a gap in which the board may have been changed for another."""
         return replace(self, current=False)
@@ -70,6 +80,20 @@ class JudgedFlight:
             if parameters.device_id(imu) in (None, judged.device_id)
         }
         return replace(self, imus=there) if there else None
+
+
+def _would_have_shown(found: Diagnosed, before: Diagnosed | None) -> bool:
+    """Whether a flight could have shown what an earlier one was withheld for.
+
+    An antenna does not move to its place because a hover cannot see where it is.  What held for
+    the earlier flight alone, a jump or a drift, is gone with it.
+    """
+    if before is None or not before.missing or found.missing:
+        return True
+    if found.verdict == Verdict.INSUFFICIENT.value:
+        return False
+    lasting = {e for e in before.effects if bearing_of(e) in (Bearing.BESIDE, Bearing.WITHIN)}
+    return not lasting & {n["name"] for n in found.document.get("not_testable", ())}
 
 
 def compared_now(then: Calibration, live: Calibration | None, now: Six) -> Calibration:

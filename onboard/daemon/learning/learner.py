@@ -105,7 +105,7 @@ class Learner:
         self._windows = 0
         self._opening = Opening()
         self._answers: dict[int, Calibration] = {}
-        self._calibrated: set[int] = set()
+        self._calibrated: dict[int, bool] = {}
         self._stale = self._urgent = False
         self._next_solution = 0.0
         self._counters: Counter[str] = Counter()
@@ -243,7 +243,7 @@ class Learner:
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what the diagnosis said; a flight that says nothing takes nothing away."""
         self._unjudged = False
-        if flight.says_nothing and self._flight is not None:
+        if self._flight is not None and not flight.overrules(self._flight):
             self._tell(
                 "flight_too_short", "the flight says too little: what was known before stays"
             )
@@ -252,7 +252,7 @@ class Learner:
         for imu, found in flight.diagnosed.items():
             if found.missing:
                 self._calibrator.begin_anew(imu)
-                self._calibrated.discard(imu)
+                self._calibrated.pop(imu, None)
                 self._stale = self._urgent = True
                 self._tell("begun_anew", f"IMU {imu}: learning anew, physics was missing")
 
@@ -286,12 +286,18 @@ class Learner:
         trim()  # what a refinement and the solution have left
         self._next_solution = began + (self._clock() - began) / limits.SOLVING_SHARE
         for imu, answer in self._answers.items():
-            if answer.status is Status.CALIBRATED and imu not in self._calibrated:
-                self._calibrated.add(imu)
-                self._tell("calibrated", f"IMU {imu} is calibrated")
-            elif answer.status is Status.INVALID and imu in self._calibrated:
-                self._calibrated.discard(imu)
+            if answer.status is Status.CALIBRATED:
+                self._tell_of_calibration(imu, whole=all(answer.observable))
+            elif answer.status is Status.INVALID and self._calibrated.pop(imu, None) is not None:
                 self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
+
+    def _tell_of_calibration(self, imu: int, *, whole: bool) -> None:
+        """Once when there is something to set, once when there is no more to learn."""
+        told = self._calibrated.get(imu)
+        if told is None or whole > told:
+            self._calibrated[imu] = whole
+            more = "" if whole else " in part; fly on for more"
+            self._tell("calibrated", f"IMU {imu} is calibrated{more}")
 
     # How
 

@@ -102,7 +102,7 @@ class EstimatorSettings(Section, frozen=True, kw_only=True):
     constant ``memory_s``.
     """
 
-    minimum_trusted_s: NotNegative = 45.0
+    minimum_trusted_s: NotNegative = 30.0
     window_s: NotNegative = 0.0
     satellites_min: Annotated[int, Meta(ge=0, le=50)] = 6
     hdop_max: Positive = 2.5

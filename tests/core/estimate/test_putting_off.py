@@ -1,4 +1,4 @@
-"""A refinement in flight that is due waits while the accelerometer is calibrated without it."""
+"""A refinement in flight that is due waits while the force is known well enough without it."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def refined(monkeypatch):
     return out
 
 
-def calibrated_from(trusted_s, monkeypatch, until_s=np.inf):
-    """Have a flight called calibrated after so many seconds."""
+def known_from(trusted_s, monkeypatch, until_s=np.inf):
+    """Have a flight know enough after so many seconds."""
 
     def said(_imu, engine, _parameters):
         return trusted_s <= engine.trusted_s < until_s
 
-    monkeypatch.setattr("onboard.core.estimate.engines.calibrated", said)
+    monkeypatch.setattr("onboard.core.estimate.engines.known_well_enough", said)
 
 
 def fed(samples):
@@ -53,7 +53,7 @@ def test_after_the_landing_it_says_the_same(samples, refined, monkeypatch):
     answers = []
     for last, times in ((SECOND_S, 2), (np.inf, 3)):
         refined.clear()
-        calibrated_from(last, monkeypatch)
+        known_from(last, monkeypatch)
         made = fed(samples)
         assert FIRST_S <= refined[0] < SECOND_S < refined[-1] == made.flown_s
         assert len(refined) == times
@@ -65,10 +65,8 @@ def test_after_the_landing_it_says_the_same(samples, refined, monkeypatch):
 
 
 @pytest.mark.slow
-def test_it_is_made_up_for_once_the_flight_is_not_calibrated_any_more(
-    samples, refined, monkeypatch
-):
-    calibrated_from(SECOND_S, monkeypatch, until_s=SECOND_S + 5.0)
+def test_it_is_made_up_for_once_the_flight_is_not_known_any_more(samples, refined, monkeypatch):
+    known_from(SECOND_S, monkeypatch, until_s=SECOND_S + 5.0)
     fed(samples)
     assert len(refined) == 3
     assert SECOND_S + 5.0 <= refined[1] < refined[2]
