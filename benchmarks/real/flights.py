@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real.beside import NOTHING, Beside, beside
+from benchmarks.real.offer import Offer, offer_of
 from benchmarks.real.split import RealFlight
 from benchmarks.real.whiteness import Whiteness, whiteness
+from onboard.answers.answer import judged as answered
 from onboard.answers.recorded import Recorded
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
@@ -59,7 +61,7 @@ class Fit:
         flight: its name.
         vehicle: whose.
         imu: accelerometer.
-        status: of the calibration, ``failed`` if there is none; then all below is empty.
+        status: of the answer, ``failed`` if there is none; then all below is empty.
         moved: whether the flight went anywhere: a hover excites nothing.
         verdict: of the diagnosis.
         effects: names that were said.
@@ -88,6 +90,7 @@ class Fit:
             there is none.
         rest: (3,) the force on the ground with the parameters in force, sensor axes, m/s^2; NaN
             where the vehicle was not seen standing.
+        offer: what a person is told to set; None if there is no estimate.
     """
 
     flight: str
@@ -121,6 +124,7 @@ class Fit:
     beside: Beside = NOTHING
     whole: Calibration | None = None
     rest: Array = field(default_factory=lambda: np.full(3, np.nan))
+    offer: Offer | None = None
 
     @property
     def failed(self) -> bool:
@@ -172,7 +176,8 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         diagnosis = judge.diagnosis()
     except (ArithmeticError, LookupError, ValueError) as error:
         return _failed(flight, imu, str(error))
-    engine, c = judge.engine, judge.calibration
+    given = answered(diagnosis)
+    engine, c = judge.engine, given.calibration
     solution = engine.found()
     square = engine.model.index["window_squared"]
     asked = engine.point.window**2 + float(solution.theta[square])
@@ -209,6 +214,7 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         beside=beside(engine, MOVING_M_S, flight.ends_s),
         whole=in_the_mean(c, engine),
         rest=recorded.calibrator.parameters.R_bs.T @ resting_force(samples, imu),
+        offer=offer_of(given, recorded.calibrator.parameters.values),
     )
 
 

@@ -1,6 +1,6 @@
 """All parts in one run, side by side, for a person and as JSON to compare before and after.
 
-Each accelerometer is estimated once, for levels, rest, pairs and repeats.
+Each accelerometer is estimated once, for all parts but the concealed errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.real import conceal, levels, outcomes, pair_parts, pairs, repeats, rest
+from benchmarks.real import conceal, levels, offered, outcomes, pair_parts, pairs, repeats, rest
 from benchmarks.real.flights import Fit, fits
 from benchmarks.real.pairs import Agreement, Pair
 from benchmarks.real.split import (
@@ -29,7 +29,7 @@ from benchmarks.real.split import (
 )
 
 SCHEMA = "onboard.benchmarks.real/1"
-CONTENTS = ("levels", "rest", "pairs", "repeats", "conceal")
+CONTENTS = ("levels", "offered", "rest", "pairs", "repeats", "conceal")
 BULKY = ("chain", "states")
 """Of a fit, what is no result."""
 
@@ -41,6 +41,8 @@ class Results:
     part: Part
     made: tuple[Fit, ...] = ()
     shares: tuple[levels.Share, ...] = ()
+    elsewhere: tuple[offered.Elsewhere, ...] = ()
+    apart: tuple[offered.Apart, ...] = ()
     rests: tuple[rest.Rest, ...] = ()
     pairs: tuple[Pair, ...] = ()
     agreements: tuple[Agreement, ...] = ()
@@ -59,6 +61,7 @@ class Results:
                 _json(f) | {"at_limit": list(f.at_limit), "clipped": f.clipped} for f in self.made
             ],
             "criteria": _json(self.shares),
+            "offered": {"elsewhere": _json(self.elsewhere), "apart": _json(self.apart)},
             "rest": [_json(r) | {"off": r.off} for r in self.rests],
             "pairs": [_json(p) | {"chi_square": p.chi_square} for p in self.pairs],
             "agreements": _json(self.agreements),
@@ -119,6 +122,8 @@ def run(
         part,
         made,
         tuple(levels.run(made)) if "levels" in contents else (),
+        tuple(offered.elsewhere(made)) if "offered" in contents else (),
+        tuple(offered.apart(made)) if "offered" in contents else (),
         tuple(rest.run(made)) if "rest" in contents else (),
         tuple(pairs.run(made)) if "pairs" in contents else (),
         tuple(pairs.agreements(made)) if "pairs" in contents else (),
@@ -135,6 +140,10 @@ def show(found: Results, contents: Sequence[str]) -> None:
     if "levels" in contents:
         print("\n### Levels")
         levels.show(found.made)
+    if "offered" in contents:
+        print("\n### Offered to be set")
+        print(offered.table(found.made))
+        print("\n".join(offered.summary(found.made, found.elsewhere, found.apart)))
     if "rest" in contents:
         print("\n### At rest, more than gravity, m/s^2")
         print(rest.table(found.rests))

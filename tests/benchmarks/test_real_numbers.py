@@ -8,6 +8,10 @@ import pytest
 from benchmarks.real.concealed import KINDS
 from benchmarks.real.flights import Fit, moving_force
 from benchmarks.real.levels import gate_table
+from benchmarks.real.offer import Offer
+from benchmarks.real.offered import apart
+from benchmarks.real.offered import summary as offered_summary
+from benchmarks.real.offered import table as offered_table
 from benchmarks.real.outcomes import Said, compared, table
 from benchmarks.real.pair_parts import run as in_parts
 from benchmarks.real.pair_parts import table as parts_table
@@ -243,6 +247,26 @@ def test_an_effect_that_the_flight_is_said_not_to_show_was_not_to_be_seen() -> N
     assert compared("a", kind, said({}), said({}), {"bias_step.x": 0.5}).seen
 
 
+def offering(f: Fit, six: np.ndarray, *objections: str) -> Fit:
+    """The fit with these to be set, if nothing speaks against it."""
+    set_to = f.in_force if objections else six
+    return replace(f, offer=Offer(set_to, 3, 0.2, 0.21, 0.02, 0.999, 31.0, objections))
+
+
+def test_what_is_offered_brings_accelerometers_together_or_not() -> None:
+    """The second reads 0.3 m/s^2 too much in x: its own offset says so, or the first one's does."""
+    force = np.array([0.3, -0.2, -9.8])
+    one = replace(drawn(1), force=force)
+    other = replace(drawn(2), force=force + np.array([0.3, 0.0, 0.0]))
+    x = np.array([0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
+    right = apart([one, offering(other, PRIOR + x)])
+    assert (right[0].in_force, right[0].offered) == pytest.approx((0.3, 0.0))
+    wrong = apart([offering(one, PRIOR + x), other])
+    assert (wrong[0].in_force, wrong[0].offered) == pytest.approx((0.3, 0.6))
+    assert apart([one, offering(other, PRIOR + x, "not_sure")]) == []
+    assert "closer in 1 of 1" in offered_summary([one, other], [], right)[-1]
+
+
 def test_tables_fit_eighty_columns() -> None:
     kind = next(k for k in KINDS if k.name.startswith("GPS averaged"))
     truth = {"gps_delay": 0.2, "window_squared": 0.123456}
@@ -254,6 +278,7 @@ def test_tables_fit_eighty_columns() -> None:
     made = [drawn(1), drawn(2), drawn(3)]
     lines += pair_table(run(made), agreements(made)).splitlines()
     lines += own_table(run(made)).splitlines()
+    lines += offered_table([offering(a, PRIOR, "no_improvement", "not_sure")]).splitlines()
     assert max(map(len, lines)) <= 80
 
 
