@@ -31,6 +31,7 @@ class Rest:
         in_force: with the parameters in force.
         estimate: with those that were estimated in flight.
         sigma: of that, as the estimate claims.
+        offered: with what a person is told to set; NaN if that is nothing.
     """
 
     flight: str
@@ -38,6 +39,7 @@ class Rest:
     in_force: float
     estimate: float
     sigma: float
+    offered: float
 
     @property
     def off(self) -> float:
@@ -56,6 +58,9 @@ def rest_of(fit: Fit) -> Rest:
     raw = fit.rest / np.array(held.scale) + np.array(held.offset)
     scale, offset = fit.estimate[:3], fit.estimate[3:]
     felt = scale * (raw - offset)
+    offered = np.full(3, np.nan)
+    if fit.offer is not None and fit.offer.offered:
+        offered = fit.offer.six[:3] * (raw - fit.offer.six[3:])
     along = felt / np.linalg.norm(felt)
     slope = np.concatenate([along * (raw - offset), -along * scale])
     return Rest(
@@ -64,6 +69,7 @@ def rest_of(fit: Fit) -> Rest:
         float(np.linalg.norm(fit.rest)) - STANDARD_GRAVITY,
         float(np.linalg.norm(felt)) - STANDARD_GRAVITY,
         float(np.sqrt(slope @ fit.covariance @ slope)),
+        float(np.linalg.norm(offered)) - STANDARD_GRAVITY,
     )
 
 
@@ -71,9 +77,12 @@ def table(rests: Sequence[Rest]) -> str:
     """One line for each accelerometer, and what they come to."""
     if not rests:
         return "nobody was seen standing"
-    head = f"{'flight, IMU':26}{'in force':>10}{'estimate':>10}{'sigma':>8}{'off':>7}"
+    head = (
+        f"{'flight, IMU':26}{'in force':>10}{'estimate':>10}{'sigma':>8}{'off':>7}{'offered':>10}"
+    )
     lines = [
         f"{r.flight[:22]:23}{r.imu:3}{r.in_force:10.3f}{r.estimate:10.3f}{r.sigma:8.3f}{r.off:7.1f}"
+        + ("" if np.isnan(r.offered) else f"{r.offered:10.3f}")
         for r in rests
     ]
     before, after, off = (
@@ -84,6 +93,11 @@ def table(rests: Sequence[Rest]) -> str:
         f"root mean square {before:.3f} in force, {after:.3f} estimated, {off:.2f} sigma; those of "
         "one flight are not independent"
     )
+    some = [r for r in rests if not np.isnan(r.offered)]
+    if some:
+        then = float(np.sqrt(np.mean([r.offered**2 for r in some])))
+        now = float(np.sqrt(np.mean([r.in_force**2 for r in some])))
+        end += f"\nof {len(some)} with something offered: {now:.3f} in force, {then:.3f} as offered"
     return "\n".join([head, *lines, end])
 
 

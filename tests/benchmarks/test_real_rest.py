@@ -10,7 +10,7 @@ import pytest
 from benchmarks.real.flights import resting_force
 from benchmarks.real.rest import rest_of, run, table
 from onboard.core.inputs.samples import ImuSample
-from tests.benchmarks.test_real_numbers import fit
+from tests.benchmarks.test_real_numbers import fit, offering
 
 TRUE = np.array([1.02, 0.985, 1.015, 0.2, -0.15, 0.3])
 RNG = np.random.default_rng(8)
@@ -27,6 +27,14 @@ def test_what_is_right_feels_gravity_however_it_stands(up) -> None:
     made = replace(fit(TRUE, 1e-6 * np.eye(6)), rest=standing(np.array(up)))
     assert rest_of(made).estimate == pytest.approx(0.0, abs=1e-9)
     assert abs(rest_of(made).in_force) > 0.05
+
+
+def test_what_is_offered_is_asked_at_rest_too() -> None:
+    made = replace(fit(TRUE, 1e-6 * np.eye(6)), rest=standing(np.array([0.0, 0.0, -1.0])))
+    assert np.isnan(rest_of(made).offered)
+    assert rest_of(offering(made, TRUE)).offered == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(rest_of(offering(made, TRUE, "not_sure")).offered)
+    assert "1 with something offered" in table(run([made, offering(made, TRUE)]))
 
 
 def test_estimates_that_scatter_as_they_claim_are_off_by_a_sigma() -> None:
