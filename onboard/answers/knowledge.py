@@ -53,6 +53,11 @@ def seen(c: Calibration) -> tuple[str, ...]:
     )
 
 
+def calibrated(c: Calibration) -> str:
+    """What a calibrated accelerometer is called: some flights show more of it than others."""
+    return "calibrated" if all(c.observable) else "calibrated in part"
+
+
 def knowledge(c: Calibration) -> str:
     """What is known, as part of a sentence: ``known are x and y offset; the rest stays``."""
     words = seen(c)

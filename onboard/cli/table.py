@@ -12,7 +12,7 @@ from rich.text import Text
 
 from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
-from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, seen
+from onboard.answers.knowledge import ROUGHLY, TOGETHER, YES, calibrated, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import LACKING, about_six
 from onboard.answers.words import AUTOPILOTS
@@ -68,7 +68,9 @@ def _recordings(result: Replay) -> RenderableType:
 def _headline(answer: Answer) -> Text:
     calibration = answer.calibration
     words, style = STATUS_WORDS[calibration.status]
-    if calibration.status is Status.INSUFFICIENT and answer.missing:
+    if calibration.status is Status.CALIBRATED:
+        words = calibrated(calibration)
+    elif calibration.status is Status.INSUFFICIENT and answer.missing:
         words = LACKING
     return Text.assemble(f"Accelerometer {calibration.imu}: ", (words, style))
 

@@ -14,7 +14,7 @@ from onboard.answers.advice import Advice
 from onboard.answers.answer import Answer
 from onboard.answers.chronicle import FREE_S, Figures
 from onboard.answers.compared import common_cause
-from onboard.answers.knowledge import ALL_SIX, ROUGHLY, YES, determined, knowledge, seen
+from onboard.answers.knowledge import ALL_SIX, ROUGHLY, YES, calibrated, determined, knowledge, seen
 from onboard.answers.replay import Replay
 from onboard.answers.verdict import LACKING, about_six
 from onboard.core.estimate.comparison import Comparison
@@ -49,6 +49,8 @@ HEADLINES = {
 def _headline(answer: Answer) -> str:
     """The status in words; numbers that the flight shows may be spoiled all the same."""
     status = answer.calibration.status
+    if status is Status.CALIBRATED:
+        return words.capital(calibrated(answer.calibration))
     if status is Status.INSUFFICIENT and answer.missing:
         return words.capital(LACKING)
     return HEADLINES[status]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from onboard.answers.knowledge import knowledge
+from onboard.answers.knowledge import calibrated, knowledge
 from onboard.core.estimate.result import Calibration, Status
 from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView
 
@@ -103,7 +103,7 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
     known = _known(c)
     further = c.coverage.advice if now.flying else ""
     if now.proposal is None:
-        return _state("calibrated", "calibrated", known, GOOD, further)
+        return _state("calibrated", calibrated(c), known, GOOD, further)
     held = now.proposal.held_back
     if now.proposal.rejected:
         why = held.get("refused", "a person rejected it")
@@ -122,13 +122,14 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
     ):
         why = f"{known}; they would hardly do better than the values in force"
         return _state("up_to_date", "up to date", why, GOOD)
-    return _proposed(known, now.proposal, lasting, further)
+    return _proposed(c, now.proposal, lasting, further)
 
 
 def _proposed(
-    known: str, proposal: ProposalView, lasting: Mapping[str, str], further: str
+    c: Calibration, proposal: ProposalView, lasting: Mapping[str, str], further: str
 ) -> StateView:
     """What becomes of values that could be written; ``lasting`` is what a landing leaves."""
+    known, done = _known(c), calibrated(c)
     held, approved = proposal.held_back, "approved, " if proposal.approved else ""
     if not held:
         return _state("calibrated", f"{approved}about to be written", known, GOOD)
@@ -136,15 +137,15 @@ def _proposed(
         then = "it is written after the landing"
         if "diagnosing" in held:
             then = "it is written when the flight has been diagnosed"
-        return _state("calibrated", f"{approved}calibrated", f"{known}; {then}", GOOD, further)
+        return _state("calibrated", f"{approved}{done}", f"{known}; {then}", GOOD, further)
     chosen = [sentence for name, sentence in lasting.items() if name in BY_CHOICE]
     if chosen and lasting.keys() <= BY_CHOICE | {"approval"}:
         why = "; ".join(chosen)
-        return _state("calibrated", "calibrated, not written", f"{known}; {why}", GOOD, further)
+        return _state("calibrated", f"{done}, not written", f"{known}; {why}", GOOD, further)
     if lasting.keys() <= WAITING:
         if len(held) > len(lasting):
             then = "after the landing a person has to approve it"
-            return _state("calibrated", "calibrated", f"{known}; {then}", GOOD, further)
+            return _state("calibrated", done, f"{known}; {then}", GOOD, further)
         todo = "look at the values, then approve or reject them"
         why = f"{known}; {lasting.get('unconfirmed', 'a person has to approve it')}"
         return _state("approval", "waits for your approval", why, WARNING, todo)
