@@ -123,6 +123,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-26",
     "2026-11-26-2",
     "2026-11-27",
+    "2026-11-27-2",
 )
 """Releases that have been judged."""
 
