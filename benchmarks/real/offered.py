@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from benchmarks.real.offer import Offer
+from benchmarks.real.pairs import felt
+from benchmarks.real.repeats import HORIZONS_S, MOST_WINDOWS
 from onboard.core.estimate.dead_reckoning import free_drift
 from onboard.core.maths.accelerometer import linear_of
 
 Array = NDArray[np.float64]
-
-HORIZONS_S = (10.0, 60.0)
-MOST_WINDOWS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +93,7 @@ def apart(made: Sequence[Fit]) -> list[Apart]:
         if a.flight != b.flight or not (_offers(a) or _offers(b)):
             continue
         before = float(np.linalg.norm(a.force - b.force))
-        after = float(np.linalg.norm(_felt(a) - _felt(b)))
+        after = float(np.linalg.norm(felt(a, _set_to(a)) - felt(b, _set_to(b))))
         out.append(Apart(a.flight, (a.imu, b.imu), before, after))
     return out
 
@@ -109,14 +108,6 @@ def _offers(fit: Fit) -> bool:
 
 def _set_to(fit: Fit) -> Array:
     return fit.in_force if fit.offer is None else fit.offer.six
-
-
-def _felt(fit: Fit) -> Array:
-    """(3,) mean force with what is offered, sensor axes."""
-    raw = fit.force / fit.in_force[:3] + fit.in_force[3:]
-    six = _set_to(fit)
-    felt: Array = six[:3] * (raw - six[3:])
-    return felt
 
 
 def table(made: Sequence[Fit]) -> str:

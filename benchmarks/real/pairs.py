@@ -124,7 +124,7 @@ def _of_one_flight(fits: Sequence[Fit]) -> Iterator[Pair]:
         if compared is not None and imus in own:
             sigma, chi_square = np.array(own[imus].own_sigma), own[imus].chi_square
             six = [compared.joint.of(imu)[0] for imu in imus]
-            together = _felt(one, six[0]) - _felt(other, six[1])
+            together = felt(one, six[0]) - felt(other, six[1])
         yield Pair(
             one.flight,
             imus,
@@ -137,7 +137,7 @@ def _of_one_flight(fits: Sequence[Fit]) -> Iterator[Pair]:
         )
 
 
-def _felt(fit: Fit, six: Array) -> Array:
+def felt(fit: Fit, six: Array) -> Array:
     """(3,) mean force by six numbers."""
     return six[:3] * (_raw(fit) - six[3:])
 

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from onboard.core.maths.accelerometer import SixParameters
-from onboard.core.maths.arrays import vector3
+from onboard.core.maths.arrays import Array, vector3
 from onboard.core.maths.earth import STANDARD_GRAVITY
 
 
@@ -54,13 +54,12 @@ def run(made: Sequence[Fit]) -> list[Rest]:
 
 def rest_of(fit: Fit) -> Rest:
     """Of one accelerometer."""
-    held = SixParameters(vector3(fit.in_force[:3]), vector3(fit.in_force[3:]))
-    raw = fit.rest / np.array(held.scale) + np.array(held.offset)
+    raw = _six(fit.in_force).undo(fit.rest)
     scale, offset = fit.estimate[:3], fit.estimate[3:]
     felt = scale * (raw - offset)
     offered = np.full(3, np.nan)
     if fit.offer is not None and fit.offer.offered:
-        offered = fit.offer.six[:3] * (raw - fit.offer.six[3:])
+        offered = _six(fit.offer.six).apply(raw)
     along = felt / np.linalg.norm(felt)
     slope = np.concatenate([along * (raw - offset), -along * scale])
     return Rest(
@@ -71,6 +70,10 @@ def rest_of(fit: Fit) -> Rest:
         float(np.sqrt(slope @ fit.covariance @ slope)),
         float(np.linalg.norm(offered)) - STANDARD_GRAVITY,
     )
+
+
+def _six(values: Array) -> SixParameters:
+    return SixParameters(vector3(values[:3]), vector3(values[3:]))
 
 
 def table(rests: Sequence[Rest]) -> str:

@@ -7,8 +7,7 @@ A flight counts
 * not if its numbers are wrong by nobody knows how much: its residual is not noise, more than half
   of its fixes are refused, what is missing from the model moves the six and is not modelled beside
   them, its parts contradict each other, or nothing of it could be solved;
-* not if it hovered or was shorter than the least trusted time: then its own sigmas cannot be
-  checked, and a hover repeats what the recorded attitude says;
+* not if it was shorter than the least trusted time: then its noise levels are not known;
 * not if it contradicts the others (:mod:`onboard.core.estimate.merged_flights`).
 """
 

@@ -53,9 +53,14 @@ def seen(c: Calibration) -> tuple[str, ...]:
     )
 
 
+def whole(c: Calibration) -> bool:
+    """Whether there is no more to learn: all six are known as well as needed."""
+    return all(c.observable)
+
+
 def calibrated(c: Calibration) -> str:
     """What a calibrated accelerometer is called: some flights show more of it than others."""
-    return "calibrated" if all(c.observable) else "calibrated in part"
+    return "calibrated" if whole(c) else "calibrated in part"
 
 
 def knowledge(c: Calibration) -> str:

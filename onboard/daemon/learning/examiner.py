@@ -21,10 +21,10 @@ import numpy as np
 
 from onboard.answers.answer import answer, diagnosed
 from onboard.answers.explain_document import explain_document
+from onboard.answers.knowledge import determined
 from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.determined import determine
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.chi_square import CHI_SQUARE_999
@@ -169,9 +169,8 @@ def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
 
 def _directions(c: Calibration) -> int:
     """Of the six, how many can be set."""
-    if c.status is not Status.CALIBRATED:
-        return 0
-    return determine(c, c.in_force_scale + c.in_force_offset).directions
+    found = determined(c) if c.status is Status.CALIBRATED else None
+    return 0 if found is None else found.directions
 
 
 def _added(together: Calibration) -> Calibration:

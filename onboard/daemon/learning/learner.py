@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from onboard.answers.knowledge import whole
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Advanced, FlightEnded, Restarted
 from onboard.core.estimate.result import Calibration, Six, Status
@@ -287,16 +288,16 @@ class Learner:
         self._next_solution = began + (self._clock() - began) / limits.SOLVING_SHARE
         for imu, answer in self._answers.items():
             if answer.status is Status.CALIBRATED:
-                self._tell_of_calibration(imu, whole=all(answer.observable))
+                self._tell_of_calibration(imu, answer)
             elif answer.status is Status.INVALID and self._calibrated.pop(imu, None) is not None:
                 self._tell("invalid", f"IMU {imu}: {answer.note}", warning=True)
 
-    def _tell_of_calibration(self, imu: int, *, whole: bool) -> None:
+    def _tell_of_calibration(self, imu: int, answer: Calibration) -> None:
         """Once when there is something to set, once when there is no more to learn."""
-        told = self._calibrated.get(imu)
-        if told is None or whole > told:
-            self._calibrated[imu] = whole
-            more = "" if whole else " in part; fly on for more"
+        all_of_it, told = whole(answer), self._calibrated.get(imu)
+        if told is None or all_of_it > told:
+            self._calibrated[imu] = all_of_it
+            more = "" if all_of_it else " in part; fly on for more"
             self._tell("calibrated", f"IMU {imu} is calibrated{more}")
 
     # How

@@ -100,7 +100,7 @@ def landing_lifts(name: str, held_back: Mapping[str, str]) -> bool:
 
 
 def _calibrated(c: Calibration, now: Circumstances) -> StateView:
-    known = _known(c)
+    known = knowledge(c)
     further = c.coverage.advice if now.flying else ""
     if now.proposal is None:
         return _state("calibrated", calibrated(c), known, GOOD, further)
@@ -129,7 +129,7 @@ def _proposed(
     c: Calibration, proposal: ProposalView, lasting: Mapping[str, str], further: str
 ) -> StateView:
     """What becomes of values that could be written; ``lasting`` is what a landing leaves."""
-    known, done = _known(c), calibrated(c)
+    known, done = knowledge(c), calibrated(c)
     held, approved = proposal.held_back, "approved, " if proposal.approved else ""
     if not held:
         return _state("calibrated", f"{approved}about to be written", known, GOOD)
@@ -160,10 +160,6 @@ def _proposed(
 def _judged(c: Calibration) -> bool:
     """Whether flight that was not fitted has compared old and new values."""
     return math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after)
-
-
-def _known(c: Calibration) -> str:
-    return knowledge(c)
 
 
 def _so_far(c: Calibration) -> str:

@@ -7,15 +7,13 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.determined import determine, force_moments
 from onboard.core.estimate.events import Restarted
 from onboard.core.estimate.gyro_axes import gyro_sigma
-from onboard.core.estimate.limits import GYRO_CROSS_SIGMA, LEAST_CHANGE, SURE
+from onboard.core.estimate.limits import GYRO_CROSS_SIGMA
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ImuSource, ParameterValue
 from onboard.core.inputs.tracks import untruncated
-from onboard.core.maths.accelerometer import parameter_names
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.errors import StateError
 from onboard.mavlink.decode import Decoder
@@ -24,7 +22,6 @@ from sitl.builtin.truth import GpsTruth, ImuTruth
 from sitl.recording import FlightSpec
 
 TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
-SIX = np.array(TRUE.scale + TRUE.offset)
 RATES = {"VFR_HUD": 0, "VIBRATION": 0, "BATTERY_STATUS": 0, "GLOBAL_POSITION_INT": 0}
 MOVED = {"scale": (0.98, 1.01, 1.03), "offset": (-0.1, 0.2, 0.4)}
 
@@ -368,32 +365,6 @@ def test_sums_that_wait_for_their_sensor_are_not_lost(saved):
 def test_damaged_state_is_refused(saved, damage):
     with pytest.raises(StateError):
         Calibrator.from_bytes(damage(saved))
-
-
-@pytest.mark.slow
-def test_a_hover_is_calibrated_as_far_as_it_shows():
-    """It shows the force at its one load: that becomes right, and no scale moves for it."""
-    got = calibrated(flown("copter", 75.0, dull=True)[0])
-    assert got.status is Status.CALIBRATED
-    assert got.note.startswith("hovering")
-    now, truth = (np.array(x) for x in (got.in_force_scale + got.in_force_offset, SIX))
-    found = determine(got, now)
-    assert not any(found.known[:2])
-    then = np.array(found.six.scale + found.six.offset)
-    assert np.array_equal(then[:2], now[:2])
-    M = force_moments(got.load_mean, got.load_square, truth)
-    before, after = (np.sqrt(e @ M @ e) for e in (now - truth, then - truth))
-    assert after < min(before, 3.0 * found.error_after)
-
-
-@pytest.mark.slow
-def test_a_hover_whose_values_are_right_has_nothing_to_set():
-    """Right within what a hover shows: then it says nothing that is surely better."""
-    names = parameter_names(1).six
-    in_force = dict(zip(names, SIX, strict=True))
-    got = calibrated(flown("copter", 75.0, dull=True, parameters=in_force)[0])
-    found = determine(got, np.array(SIX))
-    assert found.probability < SURE or found.change < LEAST_CHANGE
 
 
 @pytest.mark.slow
