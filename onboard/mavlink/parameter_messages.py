@@ -106,6 +106,8 @@ def parameter_event(
 ) -> ParameterEvent | None:
     """Event that a pymavlink message means to the parameter protocol, None if nothing.
 
+    What is no finite number is no value: it is left unheard, and whoever asked for it asks again.
+
     Args:
         message: any decoded message; ``param_id`` and ``text`` are str on receive.
         system: system id of the autopilot; messages of other systems are not its word.
@@ -117,6 +119,8 @@ def parameter_event(
         return None
     kind = message.get_type()
     if kind == "PARAM_VALUE":
+        if not math.isfinite(message.param_value):
+            return None
         return ValueReceived(
             name=message.param_id,
             value=float(message.param_value),

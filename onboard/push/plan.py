@@ -195,7 +195,9 @@ class PushPlan:
         order: list[str] = []
         for i in axes:
             scale, offset = self.changes[i], self.changes[3 + i]
-            errs_old_scale = abs(scale.before / scale.wanted - 1.0) * GRAVITY
+            # A scale of zero, which ArduPilot takes for none, may have been there and go back there.
+            ratio = scale.before / scale.wanted if scale.wanted else math.inf
+            errs_old_scale = abs(ratio - 1.0) * GRAVITY
             errs_old_offset = abs(scale.wanted * (offset.wanted - offset.before))
             through_old_scale = errs_old_scale <= errs_old_offset
             offset_first = through_old_scale != undo
@@ -218,15 +220,15 @@ def propose(
     Whether it may be written is :func:`onboard.push.policy.judge`'s to say.
 
     Raises:
-        PushError: a current value is missing, or the calibration is no usable estimate
-            (not finite, covariance not positive definite).
+        PushError: a current value is missing or not finite, or the calibration is no usable
+            estimate (not finite, covariance not positive definite).
     """
     names = parameter_names(calibration.imu)
     missing = [n for n in (*names.six, names.device_id) if n not in current]
     if missing:
         raise PushError(f"the autopilot has not told {', '.join(missing)}")
-    before = [to_float32(current[n]) for n in names.six]
     try:
+        before = [to_float32(current[n]) for n in names.six]
         found = determine(calibration, before)
         wanted = [to_float32(v) for v in found.six.scale + found.six.offset]
     except ValueError as error:

@@ -1,5 +1,7 @@
 """Events and actions against the real codec: what is packed is what is parsed."""
 
+import math
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -38,6 +40,11 @@ def test_value_keeps_all_its_bits_and_sixteen_characters():
     value = to_float32(0.9876543)
     message = mavlink.MAVLink_param_value_message(b"INS_ACC2OFFS_XYZ", value, 9, 1200, 65535)
     assert event(message) == ValueReceived("INS_ACC2OFFS_XYZ", value, 65535, 1200)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_no_finite_number_is_no_value(value):
+    assert event(mavlink.MAVLink_param_value_message(b"INS_ACCOFFS_X", value, 9, 10, 0)) is None
 
 
 def test_words_of_other_components_and_systems_are_not_the_autopilots():

@@ -51,6 +51,12 @@ def test_missing_current_value_is_named():
         propose(calibration(), values, system_id=1)
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_no_number_in_force_makes_no_plan(value):
+    with pytest.raises(PushError, match="IMU 1"):
+        propose(calibration(), current() | {"INS_ACCOFFS_Y": value}, system_id=1)
+
+
 @pytest.mark.parametrize(
     "bad",
     [
@@ -137,6 +143,12 @@ class TestOrder:
             (sibling,) = both - {name}
             other[sibling] = target[sibling]
             assert passed <= _error(other, plan, axis, truth) + 1e-6
+
+    def test_a_scale_of_zero_can_be_left_and_gone_back_to(self):
+        plan = make_plan(((0.0, 1.0, 1.0), (0.1,) * 3), ((1.01, 1.0, 1.0), (0.2, 0.1, 0.1)))
+        assert set(plan.write_order(plan.before)) == {plan.names[0], plan.names[3]}
+        back = plan.reversed()
+        assert set(back.write_order(back.before)) == {plan.names[0], plan.names[3]}
 
     def test_one_axis_is_finished_before_the_next_begins(self):
         for scale, offset in itertools.permutations([0.01, 0.1, 0.5], 2):
