@@ -172,7 +172,7 @@ class Recovery:
 
 
 def audit(completed: Planned, values: Mapping[str, float]) -> Recovery | None:
-    """What a completed push needs after a reboot of the autopilot, None if nothing.
+    """What a completed push, or roll-back, needs after a reboot of the autopilot, None if nothing.
 
     That a value is *stored* cannot be proved over MAVLink: the announcement "stored" and a
     (duplicated, late) answer to a read look alike.  So after each boot compare: where any of
@@ -181,7 +181,7 @@ def audit(completed: Planned, values: Mapping[str, float]) -> Recovery | None:
     set values meanwhile, nothing is touched.
 
     Args:
-        completed: the push in force (:meth:`onboard.push.journal.Journal.last_completed`).
+        completed: what was written last (:meth:`onboard.push.journal.Journal.last_written`).
         values: the autopilot's parameters by name, read after the boot.
     """
     changes = [c for c in completed.plan.changes if c.differs]

@@ -75,7 +75,7 @@ class Journal:
             limit_bytes: size from which on old transactions are dropped.
             keep: closed transactions and diagnoses kept then.  Open ones, and of each
                 accelerometer the first completed push (what calibrating was good for) and the
-                last (what a roll-back goes to), are always kept.
+                last (what a roll-back takes back), with the way back from it, are always kept.
         """
         self._path = path
         self._limit = limit_bytes
@@ -158,19 +158,39 @@ class Journal:
 
         None if there is none, or it was rolled back already.
         """
+        last = self.last_written(imu)
+        return last if last is not None and last.purpose is Purpose.PUSH else None
+
+    def last_written(self, imu: int) -> Planned | None:
+        """What put this accelerometer's values there: the push in force, or the way back from it.
+
+        None if nothing did, or it did not last.
+        """
+        written = self._written(imu)
+        return written[-1] if written else None
+
+    def _written(self, imu: int) -> list[Planned]:
+        """The last push that was completed, and the way back from it if there was one.
+
+        Of either nothing is left once it has come to another end: an audit found that it did not
+        last.  Of a way back that did not, the push is in force again.
+        """
         plans = self._plans()
-        found: Planned | None = None
+        written: list[Planned] = []
         for _, entry in self._lines:
             if not isinstance(entry, Closed):
                 continue
             planned = plans.get(entry.transaction)
             if planned is None or planned.plan.imu != imu:
                 continue
-            if entry.result is Result.COMPLETED:
-                found = planned if planned.purpose is Purpose.PUSH else None
-            elif found is not None and found.transaction == entry.transaction:
-                found = None  # completed once, undone by an audit
-        return found
+            if entry.result is not Result.COMPLETED:
+                if written and written[-1].transaction == entry.transaction:
+                    written.pop()
+            elif planned.purpose is Purpose.PUSH:
+                written = [planned]
+            else:
+                written = [*(p for p in written if p.purpose is Purpose.PUSH), planned]
+        return written
 
     def refusals(self) -> dict[int, str]:
         """Accelerometers that are held back until a person approves, and why."""
@@ -285,9 +305,8 @@ class Journal:
         """Rewrite the file with what is still needed; on failure the old file stays in use."""
         keep = set(self._open_transactions())
         for imu in range(1, 6):
-            last = self.last_completed(imu)
-            if last is not None:
-                keep.add(last.transaction)
+            # A way back, too: without it the push that it took back would be in force again.
+            keep.update(planned.transaction for planned in self._written(imu))
         keep.update(self._first_completed())
         said = {e.imu: e.transaction for _, e in self._lines if isinstance(e, Refused)}
         keep.update(said.values())

@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from onboard.push.entries import Verdict, Watched
 from tests.daemon.daemons import (
     SIX,
     WANTED,
@@ -108,6 +109,40 @@ async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, dae
         assert in_force(vehicle) == before
         kinds = [line.kind for line in service.snapshot().journal]
         assert kinds[-1] == "closed"
+
+
+async def test_a_way_back_that_a_reboot_has_lost_is_said_and_offered_again(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        await pushed(service, vehicle)
+        values = in_force(vehicle)
+        await until(lambda: service.snapshot().push.state == "idle")
+        await service.rollback((1,))
+        await until(lambda: service.snapshot().push.can_roll_back == ())
+        assert in_force(vehicle) == before
+        vehicle.parameters.update(zip(SIX, values, strict=True))  # was not stored
+        vehicle.reboot()
+        await until(lambda: notices(service, "roll_back_not_stored"))
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert in_force(vehicle) == values, "nobody has said that they are worse"
+        assert "refused" in held_back(service)
+
+
+async def test_of_values_found_worse_a_way_back_that_was_lost_is_gone_again(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        await pushed(service, vehicle)
+        values = in_force(vehicle)
+        push = service.parts.pusher
+        transaction = push._ledger.in_force(1).transaction
+        push.judge([Watched(transaction, Verdict.WORSE, "it flew worse")])
+        await until(lambda: service.snapshot().push.can_roll_back == ())
+        assert in_force(vehicle) == before
+        vehicle.parameters["INS_ACCSCAL_Y"] = values[1]  # was not stored
+        vehicle.reboot()
+        await until(lambda: notices(service, "roll_back_not_stored"))
+        await until(lambda: len(notices(service, "roll_back_completed")) == 2)
+        assert in_force(vehicle) == before
 
 
 @pytest.mark.slow

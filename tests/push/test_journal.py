@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from onboard.errors import StateError
 from onboard.push.entries import (
     Closed,
+    Found,
     Planned,
     Purpose,
     ReadBack,
@@ -276,6 +277,17 @@ class TestSize:
             assert "in vain" not in {e.transaction for _, e in journal.entries}
         assert [p.name for p in path.parent.iterdir()] == [path.name]
 
+    def test_shrinking_does_not_put_a_push_in_force_that_was_taken_back(self, path):
+        with Journal(path, limit_bytes=20_000, keep=3) as journal:
+            for entry in story("push") + story("back", purpose=Purpose.ROLL_BACK):
+                journal.append(entry, 1.0)
+            for i in range(400):
+                journal.append(Found(f"f{i}", 1, "clean", (), ""), float(i))
+            assert path.stat().st_size < 40_000
+        with Journal(path) as journal:
+            assert journal.last_completed(1) is None
+            assert journal.last_written(1).transaction == "back"
+
     def test_shrinking_keeps_no_descriptor(self, path):
         with Journal(path, limit_bytes=4_000, keep=1) as journal:
             there = len(os.listdir("/proc/self/fd"))
@@ -336,6 +348,13 @@ class TestWhatIsInForce:
         write(path, story("a") + story("back", purpose=Purpose.ROLL_BACK))
         with Journal(path) as journal:
             assert journal.last_completed(1) is None
+
+    def test_a_way_back_that_did_not_last_leaves_the_push_in_force(self, path):
+        back = story("back", purpose=Purpose.ROLL_BACK)
+        write(path, story("a") + back + [closed("back", Result.ROLLED_BACK)])
+        with Journal(path) as journal:
+            assert journal.last_completed(1).transaction == "a"
+            assert journal.last_written(1).transaction == "a"
 
     def test_roll_back_that_failed_leaves_the_push_in_force(self, path):
         back = story("back", purpose=Purpose.ROLL_BACK, result=Result.ROLLED_BACK)

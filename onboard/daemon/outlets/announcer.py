@@ -67,6 +67,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "roll_back_rolled_back": Line(ERROR, "{imu} roll-back failed", "push {imu}"),
         "roll_back_aborted": Line(WARNING, "{imu} not rolled back", "push {imu}"),
         "roll_back_interrupted": Line(ERROR, "{imu} roll-back interrupted", "push {imu}"),
+        "roll_back_not_stored": Line(WARNING, "{imu} values rolled back are back", "push {imu}"),
         "physics_missing": Line(WARNING, "", "physics"),
         "worth_knowing": Line(INFO, "", "physics"),
         "heartbeats_contradict": Line(WARNING, "two speak as the vehicle, not writing"),

@@ -10,7 +10,7 @@ from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.view.notices import Notices
-from onboard.push.entries import Planned, Recovery, Result, Verdict, Watched
+from onboard.push.entries import Planned, Purpose, Recovery, Result, Verdict, Watched
 from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import Outcome, Reason
 
@@ -76,7 +76,10 @@ class Duties:
         return bool(verdicts)
 
     def audit(self, values: Mapping[str, float], confirmed: Collection[str]) -> None:
-        """Once after each start of the autopilot: whether what was pushed is still there.
+        """Once after each start of the autopilot: whether what was written is still there.
+
+        Of a way back that is gone the push is in force again: if a flight found it worse, it is
+        taken back anew, else a person may.
 
         Args:
             values: the autopilot's parameters by name.
@@ -85,11 +88,15 @@ class Duties:
         if not self._to_audit or self.unfinished:
             return
         self._to_audit = False
-        for imu, recovery in self._ledger.audited(values, confirmed):
-            if recovery is not None:
+        for planned, recovery in self._ledger.audited(values, confirmed):
+            imu, pushed = planned.plan.imu, planned.purpose is Purpose.PUSH
+            if recovery is not None and pushed:
                 text = f"IMU {imu}: values that were written are gone: the push is taken back"
                 self._notices.post("push_not_stored", text, warning=True)
-            else:
+            elif recovery is not None:
+                text = f"IMU {imu}: values that were rolled back are there again"
+                self._notices.post("roll_back_not_stored", text, warning=True)
+            elif pushed:
                 text = f"IMU {imu}: the autopilot has the values of the last push"
                 self._notices.post("push_stored", text)
 

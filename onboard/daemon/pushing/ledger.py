@@ -66,7 +66,10 @@ class Ledger:
 
     def in_force(self, imu: int) -> Planned | None:
         """The push that is in force on the board that is there, as far as it tells which it is."""
-        planned = self._journal.last_completed(imu)
+        return self._here(self._journal.last_completed(imu))
+
+    def _here(self, planned: Planned | None) -> Planned | None:
+        """It, if it was written to the board that is there."""
         if planned is None or self.system_id is None:
             return planned
         here = planned.plan.vehicle.same_airframe(self.system_id, self.board)
@@ -97,26 +100,29 @@ class Ledger:
 
     def audited(
         self, values: Mapping[str, float], confirmed: Collection[str]
-    ) -> Iterator[tuple[int, Recovery | None]]:
-        """Whether what was pushed is still there, now that the autopilot has (perhaps) rebooted.
+    ) -> Iterator[tuple[Planned, Recovery | None]]:
+        """Whether what was written is still there, now that the autopilot has (perhaps) rebooted.
+
+        That is a push, or the way back from one, which has to last no less.
 
         Args:
             values: the autopilot's parameters by name.
             confirmed: names whose values were read since it was there again.
 
         Yields:
-            Accelerometers whose push is still there (with None), or is gone (with what has to be
+            What was written and is still there (with None), or is gone (with what has to be
             taken up, which is from then on open); those of which neither can be said are left out.
         """
         names = set(confirmed)
-        for imu, planned in self.all_in_force().items():
-            wanted = planned.plan.wanted
-            if not wanted.keys() <= names:
+        for imu in IMUS:
+            planned = self._here(self._journal.last_written(imu))
+            if planned is None or not planned.plan.wanted.keys() <= names:
                 continue
+            wanted = planned.plan.wanted
             self.counters["audits"] += 1
             recovery = audit(planned, values)
             if recovery is not None:
                 self.open.append(recovery)
-                yield imu, recovery
+                yield planned, recovery
             elif all(values[name] == value for name, value in wanted.items()):
-                yield imu, None
+                yield planned, None

@@ -284,7 +284,8 @@ class Pusher:
         if self._writer.target is None:
             return
         self._counts["resumed"] += 1
-        text = f"IMU {recovery.plan.imu}: an interrupted push is taken up"
+        what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
+        text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
         self._notices.post("push_resumed", text, warning=True)
         self._in_flight_since = None
         self._run(
