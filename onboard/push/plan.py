@@ -25,10 +25,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self, cast
 
-from onboard.core.estimate.determined import determine
+from onboard.core.estimate.determined import determine, improvement
 from onboard.core.estimate.result import Calibration, Six
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
@@ -262,6 +262,33 @@ def propose(
         ),
         contradiction=found.contradiction,
         contradiction_limit=found.contradiction_limit,
+    )
+
+
+def as_known_now(earlier: PushPlan, known: PushPlan, calibration: Calibration) -> PushPlan:
+    """An earlier plan, its values as they are, with what they are worth by what is known now.
+
+    Args:
+        earlier: of the same accelerometer with the same values in force.
+        known: the plan that would be made now.
+        calibration: what that is made from.
+
+    Raises:
+        PushError: the calibration is no usable estimate.
+    """
+    try:
+        found = improvement(calibration, list(known.before.values()), list(earlier.wanted.values()))
+    except ValueError as error:
+        raise PushError(f"IMU {calibration.imu}: {error}") from None
+    directions = 0 if known.worth is None else known.worth.directions
+    return replace(
+        earlier,
+        baseline=known.baseline,
+        worth=Worth(
+            found.change, found.error_before, found.error_after, found.probability, directions
+        ),
+        contradiction=known.contradiction,
+        contradiction_limit=known.contradiction_limit,
     )
 
 

@@ -240,10 +240,20 @@ def objections(
         sentence = "all three offsets would be zero, which ArduPilot takes for 'not calibrated'"
         found.append(_no(Objection.ZERO_OFFSETS, sentence))
     found += _temperature(plan.imu, values or {})
-    threshold = (values or {}).get(ARMING_THRESHOLD_NAME, settings.arming_threshold)
-    for other in others:
-        found += _consistency(plan, other, threshold)
+    found += consistency(plan, settings, values=values, others=others)
     return tuple(found)
+
+
+def consistency(
+    plan: PushPlan,
+    settings: PolicySettings,
+    *,
+    values: Mapping[str, float] | None = None,
+    others: Sequence[Accelerometer] = (),
+) -> tuple[Refusal, ...]:
+    """Those of :func:`objections` that are about the other accelerometers."""
+    threshold = (values or {}).get(ARMING_THRESHOLD_NAME, settings.arming_threshold)
+    return tuple(r for other in others for r in _consistency(plan, other, threshold))
 
 
 def _estimate(plan: PushPlan, calibration: Calibration, settings: PolicySettings) -> list[Refusal]:

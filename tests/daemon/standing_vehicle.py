@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.pushing.parameters import MEANING
+from onboard.push.limits import ARMING_THRESHOLD
+from onboard.push.policy import ARMING_THRESHOLD_NAME
 
 ARDUPILOT, PX4 = 3, 12
 
@@ -19,7 +21,7 @@ def float32(value):
 
 
 def ardupilot_parameters(imus=(1, 2, 3)):
-    parameters = dict.fromkeys(MEANING, 0.0)
+    parameters = dict.fromkeys(MEANING, 0.0) | {ARMING_THRESHOLD_NAME: ARMING_THRESHOLD}
     for imu in imus:
         names = parameter_names(imu)
         parameters |= dict.fromkeys(names.scale, 1.0)

@@ -79,6 +79,51 @@ class Determined:
     contradiction_limit: float
 
 
+@dataclass(frozen=True, slots=True)
+class Improvement:
+    """What other values than those in force are worth, over a flight; m/s^2, root mean square.
+
+    Attributes:
+        change: how far the force changes.
+        error_before: expected error of the force with what is in force.
+        error_after: the same with the other values.
+        probability: that the error becomes smaller.
+    """
+
+    change: float
+    error_before: float
+    error_after: float
+    probability: float
+
+
+def improvement(
+    calibration: Calibration, in_force: Sequence[float] | Array, wanted: Sequence[float] | Array
+) -> Improvement:
+    """What setting some values is worth by a calibration.
+
+    Args:
+        calibration: the estimate with its covariance and the loads flown.
+        in_force: (6,) scale (1) and offset (m/s^2), sensor axes.
+        wanted: (6,) to be set instead.
+
+    Raises:
+        ValueError: the covariance is not finite, symmetric and positive definite.
+    """
+    x = np.array((*calibration.scale, *calibration.offset))
+    P = _checked(x, calibration.with_its_gyroscope)
+    k = np.asarray(in_force, dtype=np.float64)
+    M = force_moments(calibration.load_mean, calibration.load_square, k)
+    d = np.asarray(wanted, dtype=np.float64) - k
+    gain = 2.0 * d @ M @ (x - k) - d @ M @ d
+    spread = 2.0 * math.sqrt(max(float(d @ M @ P @ M @ d), 0.0))
+    return Improvement(
+        change=math.sqrt(max(float(d @ M @ d), 0.0)),
+        error_before=_error(x - k, M, P),
+        error_after=_error(x - k - d, M, P),
+        probability=0.5 * math.erfc(-gain / (math.sqrt(2.0) * spread)) if spread > 0.0 else 0.5,
+    )
+
+
 def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined:
     """What a calibration determines beyond the values in force now.
 
@@ -100,10 +145,7 @@ def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined
     free = known | contradicted | np.tile(_combination_known(P, prior) & ~alone, 2)
     values, covariance, contradiction = _held(x, P, free, k)
     values, covariance, directions = _in_known_directions(values, covariance, free, k, prior)
-    M = force_moments(calibration.load_mean, calibration.load_square, k)
-    d = values - k
-    gain = 2.0 * d @ M @ (x - k) - d @ M @ d
-    spread = 2.0 * math.sqrt(max(float(d @ M @ P @ M @ d), 0.0))
+    worth = improvement(calibration, k, values)
     flags = [tuple(bool(f) for f in which) for which in (free, known)]
     held = int(np.sum(~free))
     return Determined(
@@ -112,10 +154,10 @@ def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined
         known=_flags(flags[1]),
         directions=directions,
         sigma=_six(np.sqrt(np.maximum(np.diag(covariance), 0.0))),
-        change=math.sqrt(max(float(d @ M @ d), 0.0)),
-        error_before=_error(x - k, M, P),
-        error_after=_error(x - values, M, P),
-        probability=0.5 * math.erfc(-gain / (math.sqrt(2.0) * spread)) if spread > 0.0 else 0.5,
+        change=worth.change,
+        error_before=worth.error_before,
+        error_after=worth.error_after,
+        probability=worth.probability,
         contradiction=contradiction,
         contradiction_limit=CHI_SQUARE_999[held],
     )

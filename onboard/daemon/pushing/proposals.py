@@ -30,14 +30,24 @@ from onboard.daemon.pushing import limits
 from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 from onboard.errors import PushError, RefusedError
 from onboard.push.diagnosed import Diagnosed
-from onboard.push.plan import PushPlan, propose
-from onboard.push.policy import Accelerometer, Mode, PolicySettings, VehicleCondition, judge
+from onboard.push.plan import PushPlan, as_known_now, propose
+from onboard.push.policy import (
+    Accelerometer,
+    Mode,
+    PolicySettings,
+    VehicleCondition,
+    consistency,
+    judge,
+)
 
 PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
 """Reasons that a person lifts."""
 DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
 """Reasons that a person lifts by saying so explicitly."""
 
+
+UNWRITABLE = frozenset({"out_of_bounds", "zero_offsets", "name_not_allowed"})
+"""Reasons against the very values that an approval would be for."""
 
 NOT_DIAGNOSED = object()
 """Stands for the diagnosis that there is not."""
@@ -128,33 +138,47 @@ class Proposals:
         plans: dict[int, PushPlan] = {}
         for imu, calibration in calibrations.items():
             try:
-                plans[imu] = self._plan(calibration, parameters, system_id, board)
+                known = self._plan(calibration, parameters, system_id, board)
+                plans[imu] = self._to_write(known, calibration)
             except PushError:
                 self.counters["not_proposed"] += 1
-        alone = {
-            imu: judge(plan, calibrations[imu], condition, self.settings, values=parameters)
-            for imu, plan in plans.items()
-        }
+        held = {}
+        for imu, plan in plans.items():
+            held[imu] = self._beyond_policy(imu, plan, now)
+            held[imu] |= self._physics(imu, diagnosing=bool(learned.diagnosing))
+            found = judge(plan, calibrations[imu], condition, self.settings, values=parameters)
+            for refusal in found:  # several of one name (six sigmas): the first says enough
+                held[imu].setdefault(refusal.objection.value, refusal.sentence)
         self.current = {}
         for imu, plan in plans.items():
             others = [
                 Accelerometer(
                     other,
                     SixParameters(calibrations[other].scale, calibrations[other].offset),
-                    # Those that nothing holds back are written in the same sitting.
-                    plans[other].six_before() if alone[other] else plans[other].six_wanted(),
+                    # Written in the same sitting is what nothing holds back that does not hold
+                    # this one back as well.
+                    its.six_wanted() if held[other].keys() <= held[imu].keys() else its.six_before(),
                 )
-                for other in plans
+                for other, its in plans.items()
                 if other != imu and calibrations[other].status is Status.CALIBRATED
             ]
-            refusals = judge(
-                plan, calibrations[imu], condition, self.settings, values=parameters, others=others
-            )
-            held_back = self._beyond_policy(imu, plan, now)
-            held_back |= self._physics(imu, diagnosing=bool(learned.diagnosing))
-            for refusal in refusals:  # several of one name (six sigmas): the first says enough
+            held_back = dict(held[imu])
+            for refusal in consistency(plan, self.settings, values=parameters, others=others):
                 held_back.setdefault(refusal.objection.value, refusal.sentence)
-            self.current[imu] = Proposal(self.standing(imu).approved or plan, held_back)
+            self.current[imu] = Proposal(plan, held_back)
+
+    def _to_write(self, known: PushPlan, calibration: Calibration) -> PushPlan:
+        """What a person approved, as long as that is for what is there and known; else ``known``.
+
+        It is judged as it would be written: what is known has moved a little since.
+        """
+        standing = self.standing(known.imu)
+        if standing.approved is not None and _lapsed(standing.approved, known):
+            standing.approved = standing.despite = None
+            self.counters["approvals_lapsed"] += 1
+        if standing.approved is None:
+            return known
+        return as_known_now(standing.approved, known, calibration)
 
     def _plan(
         self, calibration: Calibration, parameters: Mapping[str, float], system_id: int, board: str
@@ -336,9 +360,6 @@ class Proposals:
         if now < standing.not_before:
             wait = standing.not_before - now
             found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
-        if standing.approved is not None and _lapsed(standing.approved, plan):
-            standing.approved = standing.despite = None
-            self.counters["approvals_lapsed"] += 1
         unconfirmed = self._unconfirmed(imu, plan)
         if unconfirmed and standing.approved is None:
             found["unconfirmed"] = f"{unconfirmed}: fly, or `onboard approve {imu}`"
@@ -350,10 +371,11 @@ class Proposals:
 def approvable(held_back: Mapping[str, str]) -> bool:
     """Whether a person's approval would lift one of the reasons, and something is to be gained.
 
+    Values that are never written are not approved: better ones would wait for them to lapse.
     That this flight is not diagnosed yet, which it will be after the landing, is none of them.
     """
     lifted = [n for n in held_back if n in PEOPLE | DIAGNOSIS and not landing_lifts(n, held_back)]
-    return bool(lifted) and not held_back.keys() & NOTHING_GAINED
+    return bool(lifted) and not held_back.keys() & (NOTHING_GAINED | UNWRITABLE)
 
 
 def named(imus: Sequence[int]) -> str:

@@ -1,0 +1,115 @@
+"""What is written is what is judged, beside what the other accelerometers really have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from onboard.core.gps.trust import TrustWindow
+from onboard.daemon.learning.flight import Judged, JudgedFlight
+from onboard.daemon.learning.learner import Learned
+from onboard.daemon.pushing.proposals import Proposals
+from onboard.daemon.view.trust import trust_view
+from onboard.errors import RefusedError
+from onboard.mavlink.parameter_messages import to_float32
+from onboard.push.diagnosed import Diagnosed
+from onboard.push.entries import Support
+from onboard.push.policy import Mode, PolicySettings, VehicleCondition
+from tests.push.calibrations import calibration, covariance, current
+
+LANDED = VehicleCondition(armed=False, disarmed_for=10.0, landed=True)
+FLYING = VehicleCondition(armed=True, landed=False, ekf_flags=0x37)
+FINE = covariance((0.0004,) * 3 + (0.002,) * 3)
+FAR_OFF = {"scale": (1.0, 1.0, 1.0), "offset": (1.2, 0.1, 0.1)}
+"""Both sensors of a board alike: they agree as they are, and as they should be."""
+
+
+def learned(*calibrations):
+    def judged(c):
+        in_force = tuple(map(to_float32, (*c.in_force_scale, *c.in_force_offset)))
+        return Judged(3e6, in_force, Diagnosed(c.imu, "clean", (), c))
+
+    flight = JudgedFlight(Support("f", 0.0, "", 300.0), {c.imu: judged(c) for c in calibrations})
+    trust = trust_view(TrustWindow(), told=False, windows=0)
+    return Learned({c.imu: c for c in calibrations}, trust, {}, flight=flight)
+
+
+def update(proposals, *calibrations, condition=LANDED):
+    parameters = {}
+    for c in calibrations:
+        parameters |= current(c.imu)
+    known = learned(*calibrations)
+    proposals.update(0.0, system_id=1, learned=known, parameters=parameters, condition=condition)
+    return {imu: set(p.held_back) for imu, p in proposals.current.items()}
+
+
+def test_in_flight_a_step_that_was_approved_too_large_waits_for_the_landing():
+    proposals = Proposals(PolicySettings(mode=Mode.IN_FLIGHT), approval=True)
+    large = calibration(scale=(1.0055, 1.004, 1.003), offset=(0.05, -0.05, 0.06), covariance=FINE)
+    assert "step_too_large" in update(proposals, large, condition=FLYING)[1]
+    proposals.approve((1,))
+    smaller = replace(large, scale=(1.00495, 1.004, 1.003))
+    assert update(proposals, smaller, condition=FLYING)[1] == {"step_too_large"}
+    assert proposals.ready() is None
+    assert update(proposals, smaller)[1] == set()
+    assert proposals.ready().wanted["INS_ACCSCAL_X"] == to_float32(1.0055)
+
+
+def test_values_that_are_never_written_are_not_approved():
+    proposals = Proposals(PolicySettings(), approval=True)
+    update(proposals, calibration(scale=(1.2006, 0.988, 1.007)))
+    with pytest.raises(RefusedError, match="nothing waits"):
+        proposals.approve((1,))
+    assert update(proposals, calibration(scale=(1.1994, 0.988, 1.007)))[1] == {"approval"}
+    proposals.approve((1,))
+    update(proposals, calibration(scale=(1.2006, 0.988, 1.007)))
+    assert proposals.ready().wanted["INS_ACCSCAL_X"] == to_float32(1.1994)
+
+
+def test_what_was_approved_is_worth_what_is_known_now():
+    proposals = Proposals(PolicySettings(), approval=True)
+    early = calibration(
+        scale=(1.0005, 1.0, 1.0), offset=(0.05, -0.03, 0.04), covariance=covariance()
+    )
+    assert update(proposals, early)[1] == {"approval", "not_sure"}
+    proposals.approve((1,))
+    assert update(proposals, early)[1] == {"not_sure"}
+    assert update(proposals, replace(early, covariance=FINE))[1] == set()
+    assert proposals.ready().worth.probability > proposals.settings.sure
+
+
+class TestAnotherAccelerometer:
+    def both(self):
+        return (
+            calibration(imu=1, **FAR_OFF, in_force_offset=(0.02, -0.03, 0.04)),
+            calibration(imu=2, **FAR_OFF, in_force_offset=(0.02, -0.03, 0.04)),
+        )
+
+    def test_is_written_in_the_same_sitting_where_nothing_is_against_either(self):
+        assert update(Proposals(PolicySettings(), approval=False), *self.both()) == {
+            1: set(),
+            2: set(),
+        }
+
+    def test_that_is_not_to_be_written_stays_as_it_is(self):
+        proposals = Proposals(PolicySettings(), approval=False, imus=(1,))
+        assert update(proposals, *self.both())[1] == {"imus_inconsistent"}
+
+    def test_that_a_person_refused_stays_as_it_is(self):
+        proposals = Proposals(PolicySettings(), approval=False)
+        proposals.refuse(2, "a person rejected it")
+        assert update(proposals, *self.both())[1] == {"imus_inconsistent"}
+
+    def test_waits_for_a_person_as_well_and_both_are_approved_together_or_none_is_written(self):
+        proposals = Proposals(PolicySettings(), approval=True)
+        assert update(proposals, *self.both()) == {1: {"approval"}, 2: {"approval"}}
+        proposals.approve((1,))
+        assert update(proposals, *self.both())[1] == {"imus_inconsistent"}
+        assert proposals.ready() is None
+        proposals.approve((2,))
+        assert update(proposals, *self.both()) == {1: set(), 2: set()}
+
+    def test_that_flies_as_well_is_no_other_case(self):
+        held = update(Proposals(PolicySettings(), approval=False), *self.both(), condition=FLYING)
+        assert held == {1: {"armed"}, 2: {"armed"}}
