@@ -59,11 +59,11 @@ def seen(monkeypatch):
 @pytest.mark.slow
 def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, tmp_path, seen):
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     assert one.examine().diagnosing == (1, 2), "none is judged before all are"
     later = [replace(s, t=s.t + 150.0) for s in flight if s.t is not None]
     ahead = [s for s in later if not isinstance(s, VehicleState)]
-    one.learn([VehicleState(151.0, True, False), *ahead], judging=False)  # it flies on meanwhile
+    one.learn([VehicleState(151.0, True, False), *ahead], judging=())  # it flies on meanwhile
     assert one.examine().diagnosing == ()
     assert [imu for imu, *_ in seen] == [1, 2]
     assert seen[0][1:] == seen[1][1:]
@@ -72,7 +72,7 @@ def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, t
 @pytest.mark.slow
 def test_being_armed_on_the_ground_is_no_flight_to_be_judged(flight, tmp_path, seen):
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     while one.examine().diagnosing:
         pass
     judged = len(seen)
@@ -84,7 +84,7 @@ def test_being_armed_on_the_ground_is_no_flight_to_be_judged(flight, tmp_path, s
             replace(s, armed=k == 2) if isinstance(s, VehicleState) and s.armed is not None else s
             for s in shifted
         ]
-        learned = one.learn(armed, judging=False)
+        learned = one.learn(armed, judging=())
         assert learned.diagnosing == ()
     assert len(seen) == judged == 2
 
@@ -120,16 +120,16 @@ def judge(one):
 @pytest.mark.slow
 def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path, believed):
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     before = judge(one).flight
     assert before.current
     assert set(before.imus) == {1, 2}
     one.save(1e9)
     two = learner(tmp_path)
     told = [s for s in flight if isinstance(s, ParameterValue)]
-    two.learn(told, judging=False)
+    two.learn(told, judging=())
     armed = [VehicleState(5.0, armed=True), VehicleState(15.0, armed=False)]
-    after = two.learn(armed, judging=False).flight
+    after = two.learn(armed, judging=()).flight
     assert after.support == before.support
     assert not after.current
     assert {imu: j.diagnosed.calibration for imu, j in after.imus.items()} == {
@@ -140,16 +140,16 @@ def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path
 @pytest.mark.slow
 def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_path, believed):
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     judge(one)
     one.gap()
     told = [s for s in flight if isinstance(s, ParameterValue)]
     one.identify(BOARD, told)
-    assert one.learn((), judging=False).flight.current, "the same board, the same values"
+    assert one.learn((), judging=()).flight.current, "the same board, the same values"
     one.gap()
     changed = [replace(s, value=0.5) if s.name == "INS_ACCOFFS_X" else s for s in told]
     one.identify(BOARD, changed)
-    learned = one.learn(changed, judging=False)
+    learned = one.learn(changed, judging=())
     assert not learned.flight.current
     assert learned.trust.trusted_s == 0.0
 
@@ -158,14 +158,14 @@ def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_
 def test_another_board_begins_with_what_was_learned_of_it(flight, tmp_path, believed):
     other = Identity(1, board="0d0e0f")
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     first = judge(one).flight
     one.gap()
     one.identify(other)
-    assert one.learn((), judging=False).flight is None
+    assert one.learn((), judging=()).flight is None
     one.gap()
     one.identify(BOARD)
-    back = one.learn((), judging=False).flight
+    back = one.learn((), judging=()).flight
     assert back.support == first.support
     assert not back.current
 
@@ -173,7 +173,7 @@ def test_another_board_begins_with_what_was_learned_of_it(flight, tmp_path, beli
 @pytest.mark.slow
 def test_the_stand_is_not_in_the_frozen_flight(flight, tmp_path, seen):
     one = learner(tmp_path)
-    one.learn(flight, judging=False)
+    one.learn(flight, judging=())
     one.examine()
     one.examine()
     flown = [s.t for s in flight if isinstance(s, ImuSample)]

@@ -38,7 +38,7 @@ async def learned(flight, directory, *, told_at):
     """What is learned where some parameters come not before ``told_at`` (s)."""
     now, there = (
         0.0,
-        SimpleNamespace(identity=Identity(1), introduced=False, judging=False, in_flight=False),
+        SimpleNamespace(identity=Identity(1), introduced=False, judging=(), in_flight=False),
     )
     learning = Handover(
         Learner(Store(directory), CalibratorSettings(), clock=lambda: now, wall_clock=lambda: now),

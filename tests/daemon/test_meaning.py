@@ -34,7 +34,7 @@ def learner(tmp_path):
     made = Learner(Store(tmp_path), Calibrator().settings, clock=float, wall_clock=float)
     made.identify(Identity(1, board="aa"))
     values = [ParameterValue(name, 1.02) for name in (*SIX, "FRAME_CLASS")]
-    made.learn(values, judging=False)
+    made.learn(values, judging=())
     return made
 
 

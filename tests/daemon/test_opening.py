@@ -30,7 +30,7 @@ def heard(learner, start, end, flags=None):
             samples.append(GpsFix(t, 1, 3, 0.82, 0.14, 400.0, 0.0, 0.0, satellites=11, hdop=0.9))
         if flags is not None and k % 5 == 4:
             samples.append(EkfHealth(t, flags))
-        learned = learner.learn(samples, judging=False)
+        learned = learner.learn(samples, judging=())
         told += [news.text for news in learned.news if news.kind.startswith("window")]
         trusted |= learned.trust.open
     return told, trusted, learned.trust

@@ -215,7 +215,7 @@ async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
         learner = service.handover._learner
         monkeypatch.setattr(type(learner._examiner), "waiting", (1,))
         monkeypatch.setattr(
-            learner, "examine", lambda: examined.append(1) or learner.learn((), judging=False)
+            learner, "examine", lambda: examined.append(1) or learner.learn((), judging=())
         )
         vehicle.stop_talking()
         await until(lambda: service.snapshot().link.state == "silent")

@@ -38,8 +38,8 @@ class There(Protocol):
         """Whether it has said who it is, and the parameters that say what its messages mean."""
 
     @property
-    def judging(self) -> bool:
-        """Whether a push waits for the flight that judges it."""
+    def judging(self) -> frozenset[str]:
+        """Pushes that wait for the flight that judges them, by transaction."""
 
     @property
     def in_flight(self) -> bool:

@@ -17,7 +17,7 @@ be wrong and must not be added to those of a flight that is right.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -181,15 +181,16 @@ class Learner:
     # What comes in
 
     def learn(
-        self, samples: Iterable[Sample], *, judging: bool, in_flight: bool = False
+        self, samples: Iterable[Sample], *, judging: Collection[str], in_flight: bool = False
     ) -> Learned:
         """Take a batch.
 
         Args:
             samples: in the order in which they came.
-            judging: a push waits for the verdict of a flight.
+            judging: pushes that wait for the verdict of a flight, by transaction.
             in_flight: values may be written in flight, so diagnose there, too.
         """
+        self._proof.expect(judging)
         for sample in samples:
             if type(sample) is ParameterValue:
                 self._parameter(sample)
@@ -201,8 +202,6 @@ class Learner:
             if judging:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
-        if not judging:
-            self._proof.drop()
         if self._flight is not None and not self._flight.current:
             # Of before the restart: forgotten where other sensors say who they are.
             self._flight = self._flight.of_these_sensors(self._calibrator.parameters)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.settings import CalibratorSettings
@@ -18,9 +20,20 @@ class ProofFlight:
         self._settings = settings
         self._calibrator: Calibrator | None = None
         self._ground = Ground()
+        self._waiting: frozenset[str] = frozenset()
+
+    def expect(self, waiting: Collection[str]) -> None:
+        """These pushes wait for a flight: of what was flown before one of them came it is told anew.
+
+        Args:
+            waiting: transactions.
+        """
+        before, self._waiting = self._waiting, frozenset(waiting)
+        if not self._waiting or self._waiting - before:
+            self.drop()
 
     def drop(self) -> None:
-        """No push waits for a flight, or another board is there."""
+        """What was flown is forgotten: no push waits for it, or another board is there."""
         self._calibrator = None
 
     def feed(self, sample: Sample, parameters: ParametersInForce) -> dict[int, Calibration] | None:

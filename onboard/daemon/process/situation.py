@@ -39,8 +39,8 @@ class Situation:
         return told and self.board.answered
 
     @property
-    def judging(self) -> bool:
-        """Whether a push waits for the flight that judges it."""
+    def judging(self) -> frozenset[str]:
+        """Pushes that wait for the flight that judges them, by transaction."""
         return self.witness.waiting
 
     @property

@@ -157,7 +157,9 @@ class Proposals:
                     SixParameters(calibrations[other].scale, calibrations[other].offset),
                     # Written in the same sitting is what nothing holds back that does not hold
                     # this one back as well.
-                    its.six_wanted() if held[other].keys() <= held[imu].keys() else its.six_before(),
+                    its.six_wanted()
+                    if held[other].keys() <= held[imu].keys()
+                    else its.six_before(),
                 )
                 for other, its in plans.items()
                 if other != imu and calibrations[other].status is Status.CALIBRATED

@@ -21,9 +21,9 @@ class Witness:
         self.judged: dict[int, JudgedView] = {}
 
     @property
-    def waiting(self) -> bool:
-        """Whether some push waits for a flight."""
-        return bool(self._watches)
+    def waiting(self) -> frozenset[str]:
+        """Pushes that wait for a flight, by transaction."""
+        return frozenset(transaction for transaction, _ in self._watches.values())
 
     def watch(self, pushed: Planned, *, in_flight_since: float | None = None) -> None:
         """Wait for the flight that judges this push."""
