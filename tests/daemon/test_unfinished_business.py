@@ -14,7 +14,7 @@ from tests.daemon.daemons import (
     made,
     until,
 )
-from tests.daemon.standing_vehicle import Vehicle
+from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
 
 pytestmark = pytest.mark.virtual_time
 
@@ -72,6 +72,23 @@ async def test_an_open_write_of_another_vehicle_is_said_once_and_waits(document,
             vehicle.reboot()
             await until(lambda: service.snapshot().push.state == "idle")
             assert "rolled back" in service.snapshot().push.last_outcome
+
+
+async def test_an_open_write_of_another_board_does_not_stand_in_the_way(document, daemon, port):
+    async with Vehicle(port) as vehicle:
+        await crashed_in_the_middle(document, vehicle)
+        vehicle.board = "0badc0ffee"
+        vehicle.parameters = ardupilot_parameters()
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            await until(lambda: notices(service, "push_other_vehicle"))
+            convinced(service, WANTED)
+            await until(lambda: service.snapshot().push.can_roll_back == (1,))
+            assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
+            assert service.snapshot().push.state == "interrupted", "there is the other one"
+            await service.rollback((1,))
+            await until(lambda: service.snapshot().push.can_roll_back == ())
+            assert in_force(vehicle) == before
 
 
 async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, daemon, port):

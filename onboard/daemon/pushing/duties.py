@@ -38,8 +38,11 @@ class Duties:
 
     @property
     def unfinished(self) -> bool:
-        """Whether transactions are open that have to be taken up."""
-        return bool(self._ledger.open)
+        """Whether transactions are open that have to be taken up.
+
+        One that turned out to be of another vehicle waits for that one, and nothing waits for it.
+        """
+        return any(self.not_before.get(r.transaction) != math.inf for r in self._ledger.open)
 
     def begin(self) -> None:
         """An autopilot is there (again): pauses are over, and pushes have to show."""

@@ -203,7 +203,7 @@ class Pusher:
             raise RefusedError(f"pushes of {named(chosen)} are in force: one at a time")
         if self._writer.target is None or self._proposals.forbidden:
             raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
-        if self.busy or self._ledger.open:
+        if self.busy or self._duties.unfinished:
             raise RefusedError("another transaction is under way")
         against = self._duties.against(self._condition)
         if against:
