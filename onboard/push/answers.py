@@ -88,6 +88,7 @@ class Answers:
     def _set_done(self, done: SetDone, now: float) -> None:
         course, progress = self._course, self._course.progress
         progress.values[done.name] = done.value
+        course.answered(done.name)
         course.record(ReadBack(course.identifier, done.name, done.value, done.saved))
         if not done.saved:
             progress.undo_unsaved |= course.state is State.UNDOING

@@ -166,6 +166,10 @@ class Course:
         self.record(Writing(self.identifier, name, previous, value, undo))
         return self.client.set(name, value, now, before=previous)
 
+    def answered(self, name: str) -> None:
+        """A write is read back: what was held of it, to repeat it, is not sent any more."""
+        self._held.pop(name, None)
+
     # Armed or not
 
     def disarmed(self, now: float) -> None:

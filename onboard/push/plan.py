@@ -195,7 +195,7 @@ class PushPlan:
         order: list[str] = []
         for i in axes:
             scale, offset = self.changes[i], self.changes[3 + i]
-            # A scale of zero, which ArduPilot takes for none, may have been there and go back there.
+            # A scale of zero, which ArduPilot takes for none, may have been there.
             ratio = scale.before / scale.wanted if scale.wanted else math.inf
             errs_old_scale = abs(ratio - 1.0) * GRAVITY
             errs_old_offset = abs(scale.wanted * (offset.wanted - offset.before))

@@ -80,7 +80,7 @@ class LinkLost:
 
 @dataclass(frozen=True, slots=True)
 class Cancelled:
-    """A person, or the daemon's shutdown, wants it undone."""
+    """It is wanted undone: nobody may write here now, or somebody else does."""
 
     sentence: str
 

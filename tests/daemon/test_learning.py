@@ -1,12 +1,15 @@
 """The learner in its thread: saved, damaged, hanging, late and reset."""
 
+import errno
 import itertools
 import threading
+from pathlib import Path
 
 import pytest
 
 from onboard.core.inputs.samples import ImuSample
-from tests.daemon.daemons import until
+from onboard.errors import StateError
+from tests.daemon.daemons import WANTED, convinced, held_back, until
 from tests.daemon.standing_vehicle import Vehicle
 
 pytestmark = pytest.mark.virtual_time
@@ -88,6 +91,30 @@ async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
         await service.reset(())
         assert service.handover._learner._calibrator is not before
         assert service.snapshot().counters["resets"] == 1
+
+
+async def test_what_the_disk_does_not_forget_is_said_and_nothing_else_is_kept(
+    document, daemon, port, tmp_path, monkeypatch
+):
+    document["push"]["approval"] = True
+    document["estimator"] = {"save_every_s": 0.01}
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
+        await until(file.exists)
+        convinced(service, WANTED)
+        await until(lambda: "approval" in held_back(service))
+        vehicle.armed = True
+        await until(lambda: "armed" in held_back(service))
+        await service.approve((1,))
+
+        def read_only(*_, **__):
+            raise OSError(errno.EROFS, "Read-only file system")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "unlink", read_only)
+            with pytest.raises(StateError, match="there again at the next start"):
+                await service.reset(())
+        assert service.parts.proposals.standing(1).approved is None
 
 
 async def test_before_the_first_flight_it_says_what_to_do(document, daemon, port):

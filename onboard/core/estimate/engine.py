@@ -39,7 +39,7 @@ from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block, Seconds, merged, total
+from onboard.core.maths.blocks import Block, Seconds, merged
 from onboard.core.model import ekf3
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
@@ -394,7 +394,3 @@ class Engine:
     def known(self) -> Solution | None:
         """What is known without going through anything that waits."""
         return self._seed if self._waiting else self.solution() or self._seed
-
-    def total_rows(self) -> float:
-        """Rows behind the solution."""
-        return total(self.all_blocks).rows if self.all_blocks else 0.0

@@ -118,32 +118,6 @@ class NormalSums:
         """``sum (y - h theta)^2``, the normalised innovation squared at ``theta`` (m,)."""
         return float(self.s - 2.0 * theta @ self.b + theta @ self.N @ theta)
 
-    def eliminate(self, keep: Sequence[int]) -> tuple[Array, Array]:
-        """Eliminate all unknowns that are not in ``keep`` (Schur complement).
-
-        Args:
-            keep: indices of the k unknowns that stay.
-
-        Returns:
-            ``(S, c)``: (k, k) and (k,), the normal equations ``S x = c`` of the kept unknowns
-            after the others were minimised over.
-
-        Raises:
-            numpy.linalg.LinAlgError: the eliminated block is singular.
-        """
-        kept = list(keep)
-        gone = [i for i in range(self.size) if i not in set(kept)]
-        if not gone:
-            return self.N[np.ix_(kept, kept)].copy(), self.b[kept].copy()
-        cross = self.N[np.ix_(kept, gone)]
-        solved = np.linalg.solve(
-            self.N[np.ix_(gone, gone)], np.column_stack([cross.T, self.b[gone]])
-        )
-        return (
-            self.N[np.ix_(kept, kept)] - cross @ solved[:, :-1],
-            self.b[kept] - cross @ solved[:, -1],
-        )
-
     def to_bytes(self) -> bytes:
         """Little-endian doubles behind a head of 12 bytes."""
         tail = np.array([self.s, self.rows, self.log_det])

@@ -13,8 +13,6 @@ from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
 
 AXIS = "xyz"
-ATTITUDE_UNKNOWNS = frozenset({"attitude_delay", "tilt_roll", "tilt_pitch", "heading"})
-"""Unknowns of the recorded attitude."""
 SHAPE = 1.0
 """Prior sigma of the share that is not an even mean: the whole."""
 ANTENNA_SIGMA = 0.05

@@ -67,7 +67,6 @@ class WindEstimate:
     sigma_east: float
     height: float
     profile_exponent: float | None = None
-    profile_sigma: float = NAN
     turbulence_rms: float | None = None
     series_t: Array = field(default_factory=lambda: EMPTY)
     series_height: Array = field(default_factory=lambda: EMPTY)

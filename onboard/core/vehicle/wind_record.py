@@ -20,11 +20,11 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         measured = np.mean(np.nan_to_num(flight.measured_wind[its, :2]), axis=0)
     north, east = (fit.theta[places] + measured).tolist()
     sigmas = fit.sigma[places].tolist()
-    exponent, exponent_sigma = None, float("nan")
+    exponent = None
     factor = np.ones(len(flight))
     if "wind_profile" in m.chosen.effects:
         k = m.model.indices("wind_profile")[number]
-        exponent, exponent_sigma = float(fit.theta[k]), float(fit.sigma[k])
+        exponent = float(fit.theta[k])
         profile = m.model.effect("wind_profile")
         law_of = profile.each if isinstance(profile, Own) else profile
         if isinstance(law_of, WindProfile):
@@ -55,7 +55,6 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         sigmas[1],
         float(np.mean(flight.height[its])) - flight.ground,
         exponent,
-        exponent_sigma,
         m.turbulence.rms if m.turbulence.found else None,
         np.array(when),
         np.array(heights),

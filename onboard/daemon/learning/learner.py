@@ -222,7 +222,11 @@ class Learner:
         return self._learned()
 
     def reset(self) -> Learned:
-        """Forget everything that was learned, on disk too; the parameters in force stay known."""
+        """Forget everything that was learned, on disk too; the parameters in force stay known.
+
+        Raises:
+            StateError: all is forgotten but for what is on the disk, which keeps it.
+        """
         self._begin(Calibrator(self._settings), carried(self._calibrator.parameters))
         self._windows = 0
         self._flight = None

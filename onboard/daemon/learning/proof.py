@@ -23,7 +23,7 @@ class ProofFlight:
         self._waiting: frozenset[str] = frozenset()
 
     def expect(self, waiting: Collection[str]) -> None:
-        """These pushes wait for a flight: of what was flown before one of them came it is told anew.
+        """These pushes wait for a flight: what was flown before one of them came is forgotten.
 
         Args:
             waiting: transactions.

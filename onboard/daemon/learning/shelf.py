@@ -59,5 +59,14 @@ class Shelf:
         self.counters["saves"] += 1
 
     def clear(self, whose: Identity) -> None:
-        """Forget what was learned of this board."""
-        self._store.path(whose.system_id, whose.board).unlink(missing_ok=True)
+        """Forget what was learned of this board.
+
+        Raises:
+            StateError: the disk keeps it.
+        """
+        path = self._store.path(whose.system_id, whose.board)
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            why = f"{path}: {error.strerror}: it is there again at the next start"
+            raise StateError(why) from None

@@ -261,11 +261,17 @@ class Service:
         return self.parts.pusher.roll_back(imus, self._clock())
 
     async def reset(self, imus: tuple[int, ...]) -> str:
-        """Forget what was learned, of all accelerometers: they share the window."""
+        """Forget what was learned, of all accelerometers: they share the window.
+
+        Raises:
+            StateError: it is forgotten, but not by the disk.
+        """
         del imus
-        await self.handover.reset()
-        self.parts.proposals.forget()
-        self.parts.diagnoses.forget()
+        try:
+            await self.handover.reset()
+        finally:
+            self.parts.proposals.forget()
+            self.parts.diagnoses.forget()
         self._life.counters["resets"] += 1
         return "what was learned is forgotten; the autopilot's parameters are as they were"
 

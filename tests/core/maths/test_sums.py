@@ -57,26 +57,6 @@ def test_taking_a_piece_out_leaves_the_other(seed, one, two):
     assert_same(rest, summed(h[one:], y[one:]), rtol=1e-9)
 
 
-@given(st.integers(0, 2**32 - 1), st.sets(st.integers(0, M - 1), min_size=1))
-@settings(max_examples=60, deadline=None)
-def test_eliminating_is_solving_for_all_and_reading_some(seed, keep):
-    h, y = rows(seed, 40)
-    sums, kept = summed(h, y), sorted(keep)
-    S, c = sums.eliminate(kept)
-    joint = np.linalg.lstsq(h, y, rcond=None)[0]
-    np.testing.assert_allclose(np.linalg.solve(S, c), joint[kept], rtol=1e-8, atol=1e-9)
-    # Its inverse is the block of the joint covariance: nothing is claimed that was not there.
-    covariance = np.linalg.inv(sums.N)[np.ix_(kept, kept)]
-    np.testing.assert_allclose(np.linalg.inv(S), covariance, rtol=1e-7, atol=1e-10)
-
-
-def test_eliminating_an_unknown_without_a_trace_is_refused():
-    h, y = rows(3, 20)
-    h[:, 4] = 0.0
-    with pytest.raises(np.linalg.LinAlgError):
-        summed(h, y).eliminate([0, 1])
-
-
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=40, deadline=None)
 def test_shifted_sums_are_those_of_the_shifted_rows(seed):
