@@ -18,6 +18,7 @@ class Air:
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
         gust_variance: of the air along each axis, m^2/s^2; one, or (n,).
+        through: (n,) flow through the rotors beside that of the velocity through the air, m/s.
         tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
         mass: (n,) over that at the start of the flight, or one.
@@ -42,6 +43,7 @@ class Air:
             self.wind_n[:, :2] += np.nan_to_num(flight.measured_wind[:, :2])
         self.gust_n = np.zeros(3)
         self.gust_variance: Array | float = 0.0
+        self.through: Array | float = 0.0
         self.tilt = (0.0, 0.0)
         self.rho = flight.rho
         self.mass: Array | float = 1.0

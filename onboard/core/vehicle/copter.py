@@ -21,6 +21,7 @@ from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.own_motion import OwnMotion
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
+from onboard.core.vehicle.effects.rotor_wind import RotorWind
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
@@ -56,6 +57,7 @@ class Variant:
         change: when the mass or the thrust became another; None: never.
         moving: by how much several flights differ in the force that goes with their own motion,
             1/s; zero: not at all.
+        through: by how much in the wind that their thrust shows, beside the drag's, m/s; likewise.
     """
 
     profile_top: float = TOP_M
@@ -63,6 +65,7 @@ class Variant:
     gusts: float = 0.0
     change: Change | None = None
     moving: float = 0.0
+    through: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +165,7 @@ def copter_model(
         *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),
         *([MassChange(change, flight)] if change else []),
+        *([own([RotorWind(variant.through) for _ in parts])] if variant.through else []),
         VerticalDrag(frame),
         ThrustTilt(),
         RotorDrag(frame, by_components=variant.by_components),

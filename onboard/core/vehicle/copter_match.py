@@ -26,6 +26,7 @@ from onboard.core.vehicle.effects.ground_effect import GroundEffect
 from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.own_motion import PLAUSIBLE as MOVING
+from onboard.core.vehicle.effects.rotor_wind import PLAUSIBLE as THROUGH
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
@@ -70,8 +71,7 @@ def match_copter(
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    moving = _moving(flight, frame, force_sigma)
-    variant, found = _with_change(flight, frame, force_sigma, moving)
+    variant, found = _with_change(flight, frame, force_sigma, _apart(flight, frame, force_sigma))
     seen = max(found.turbulence.rms, RECEIVER_M_S)
     answering = replace(variant, gusts=seen)
     fit = fitted(copter_model(flight, frame, force_sigma, answering))
@@ -102,20 +102,27 @@ def match_copter(
     )
 
 
-def _moving(flight: Flight, frame: CopterAirframe, force_sigma: Array) -> float:
-    """By how much flights differ in the force that goes with their own motion, 1/s.
+def _apart(flight: Flight, frame: CopterAirframe, force_sigma: Array) -> Variant:
+    """By how much flights differ in what each has for itself; none where they are too few to tell.
 
-    Zero where they are too few to tell.
+    That is the force that goes with a flight's own motion, and the wind that its thrust shows.
     """
     if flight.parts < FEWEST_FLIGHTS:
-        return 0.0
-    fit = likelier(copter_model(flight, frame, force_sigma, Variant(moving=MOVING)))
-    places = [k for k, u in enumerate(fit.model.unknowns) if u.name.startswith("moving_")]
-    return spread(fit.theta[places], fit.covariance[np.ix_(places, places)], MOVING)
+        return Variant()
+    most = Variant(moving=MOVING, through=THROUGH)
+    fit = likelier(copter_model(flight, frame, force_sigma, most))
+
+    def likeliest(prefix: str, prior: float) -> float:
+        places = [k for k, u in enumerate(fit.model.unknowns) if u.name.startswith(prefix)]
+        if not places:
+            return 0.0
+        return spread(fit.theta[places], fit.covariance[np.ix_(places, places)], prior)
+
+    return Variant(moving=likeliest("moving_", MOVING), through=likeliest("through_", THROUGH))
 
 
 def _with_change(
-    flight: Flight, frame: CopterAirframe, force_sigma: Array, moving: float
+    flight: Flight, frame: CopterAirframe, force_sigma: Array, plain: Variant
 ) -> tuple[Variant, Matched]:
     """The model, with a sudden change of mass or thrust where one is needed, and what it finds.
 
@@ -123,7 +130,7 @@ def _with_change(
     """
 
     def model(change: Change | None) -> ForceModel:
-        return copter_model(flight, frame, force_sigma, Variant(change=change, moving=moving))
+        return copter_model(flight, frame, force_sigma, replace(plain, change=change))
 
     first = likelier(model(None))
     change = change_of(first, model)
@@ -135,8 +142,8 @@ def _with_change(
             other = matched(model(since))
             if _better(other, found):
                 change, found = since, other
-            return Variant(change=change, moving=moving), found
-    return Variant(moving=moving), matched(model(None), first)
+            return replace(plain, change=change), found
+    return plain, matched(model(None), first)
 
 
 def _better(other: Matched, found: Matched) -> bool:

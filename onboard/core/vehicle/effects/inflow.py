@@ -25,6 +25,6 @@ class Inflow(Effect):
         """Take it off, and pull."""
         if air.thrust is None:
             return
-        square = positive_square(-air.u_b[:, 2], air.gust_variance)
+        square = positive_square(-air.u_b[:, 2] - air.through, air.gust_variance)
         air.thrust = air.thrust - values[0] * air.rho / self._density * square / air.mass
         air.force_b[:, 2] -= air.thrust

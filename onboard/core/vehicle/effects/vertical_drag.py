@@ -52,4 +52,6 @@ class VerticalDrag(Effect):
         air.pull = measured
         for _ in range(TURNS):
             air.pull = measured - linear * rotor_root(air) * u - still
+        u = u + air.through
+        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance) / air.mass
         air.force_b[:, 2] -= linear * rotor_root(air) * u + still
