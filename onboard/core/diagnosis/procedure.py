@@ -33,7 +33,7 @@ from onboard.core.diagnosis.jumps import (
 from onboard.core.diagnosis.limits import CLEARLY, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis
-from onboard.core.diagnosis.refusals import believed, unused_flight
+from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, settled
@@ -73,7 +73,11 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     families = families_of(choice)
     final, families = settled(full, choice, families, named_only=clear.clipped)
     asked = not clear.clipped
-    unused = unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked)
+    unused = (
+        *unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked),
+        *contradicted(final.batches, final.refused_velocities(), clear.fault, origin.t0),
+        *repeated(calibrator.stuck(imu), origin.t0),
+    )
     return Judge(
         calibrator,
         imu,

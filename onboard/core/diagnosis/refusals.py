@@ -1,18 +1,27 @@
-"""What the trust window refused in flight, and why: a part of the flight that is not seen."""
+"""What of a flight was not used, and why: a part of it that is not seen.
+
+That is what the trust window refused; where the accelerometer repeated one reading; and where gates
+refused nearly every fix for a while, for whatever the fit has there is of the flight before.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from onboard.core.diagnosis.limits import SAME_FIX_S
 from onboard.core.diagnosis.records import Unused
+from onboard.core.filter.refused import Refused as RefusedVelocities
 from onboard.core.gps.distrust import Distrust, RefusedFixes
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.finding import Finding
 
+LONG_S: Final = 5.0
+"""s: a gate refuses no two dozen good fixes in a row [probability]."""
 OPINIONS: Final = frozenset(
     {
         Distrust.SPOOFED,
@@ -91,6 +100,48 @@ def unused_flight(
         contradicted = said if asked and r.reason in OPINIONS else None
         out.append(Unused(start, end, r.reason.value, contradicted))
     return tuple(out)
+
+
+def contradicted(
+    batches: Sequence[Batch], gates: RefusedVelocities, fault: Finding | None, t0: float
+) -> tuple[Unused, ...]:
+    """Where gates refused most fixes for :data:`LONG_S` and more, s since ``t0``.
+
+    Args:
+        batches: the flight, as it was gone through.
+        gates: what they refused.
+        fault: of the receiver, which is told of by itself.
+        t0: s on the boot clock.
+    """
+    known = fault.intervals if fault is not None else ()
+    asked = np.array([(t, far) for t, far in _asked(batches, gates)]).reshape(-1, 2)
+    t, far = asked[:, 0], asked[:, 1] > 0.0
+    out = []
+    for spell in np.split(t[far], np.flatnonzero(np.diff(t[far]) > LONGEST_FIX_GAP_S) + 1):
+        if not len(spell):
+            continue
+        first, last = float(spell[0]), float(spell[-1])
+        whole = int(np.sum((t >= first) & (t <= last)))
+        start, end = first - t0, last - t0
+        told = any(a < end and b > start for a, b in known)
+        if last - first >= LONG_S and len(spell) > whole / 2 and not told:
+            out.append(Unused(start, end, "refused"))
+    return tuple(out)
+
+
+def repeated(stretches: Sequence[tuple[float, float]], t0: float) -> tuple[Unused, ...]:
+    """Where the accelerometer repeated one reading, s since ``t0``."""
+    return tuple(Unused(start - t0, end - t0, "imu_stuck") for start, end in stretches)
+
+
+def _asked(batches: Sequence[Batch], gates: RefusedVelocities) -> Iterator[tuple[float, bool]]:
+    """Stamps of the fixes that were to be used, and whether a gate refused the velocity."""
+    last = float("-inf")
+    for batch in batches:
+        for t, believed in zip(batch.fixes.t.tolist(), batch.trusted.tolist(), strict=True):
+            if t != last and believed:
+                yield t, bool(gates.by(t))
+            last = t
 
 
 def _reason(t: float, refusals: Sequence[RefusedFixes]) -> Distrust | None:

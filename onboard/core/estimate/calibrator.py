@@ -86,6 +86,10 @@ class Calibrator:
         """Time on the ground, which teaches nothing, s."""
         return self._assembly.standing_s
 
+    def stuck(self, imu: int) -> tuple[tuple[float, float], ...]:
+        """From and to when an accelerometer repeated one reading in flight, s."""
+        return tuple(self._assembly.stuck.get(imu, ()))
+
     @property
     def trust(self) -> TrustWindow:
         """The trust window."""

@@ -32,6 +32,7 @@ from onboard.core.inputs.rolling import Rolling
 from onboard.core.inputs.samples import GpsFix
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.inputs.streams import Streams
+from onboard.core.inputs.stuck import stuck
 from onboard.core.inputs.tracks import ImuTrack
 from onboard.core.maths.arrays import Array
 
@@ -55,6 +56,7 @@ class Assembly:
     Attributes:
         streams: tracks of all streams, to be fed.
         standing_s: time between fixes on the ground, s: nothing of it is handed out.
+        stuck: by accelerometer, from and to when it repeated one reading, s: nor is that.
     """
 
     def __init__(self, settings: AssemblySettings) -> None:
@@ -62,6 +64,7 @@ class Assembly:
         self._settings = settings
         self.streams = Streams()
         self.standing_s = 0.0
+        self.stuck: dict[int, list[tuple[float, float]]] = {}
         self._continues: dict[int, float] = {}  # time of the last fix that was handed out
         self._gyro: dict[int, int] = {}  # whose gyroscope was used there
         self._rolling = Rolling()
@@ -152,7 +155,7 @@ class Assembly:
         parameters: ParametersInForce,
     ) -> list[Batch]:
         """Batches of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
-        stamps, rows = live[imu].arrays()
+        stamps, rows = self._measured(imu, *live[imu].arrays(), fixes)
         if len(stamps) < FEWEST_SAMPLES or len(self.streams.recorded) < 2:
             return []
         if self._settings.slowest_imu_hz * mean_step(stamps) > 1.0:
@@ -180,6 +183,23 @@ class Assembly:
             out.append(Batch(segment, chosen, trusted[first : last + 1], fresh))
             self._continues[imu], self._gyro[imu] = float(fixes.t[last]), gyro
         return out
+
+    def _measured(self, imu: int, stamps: Array, rows: Array, fixes: Fixes) -> tuple[Array, Array]:
+        """The samples without those of an accelerometer that repeats one reading."""
+        dead = stuck(stamps, rows[:, 3:6])
+        if not np.any(dead) or not len(fixes):
+            return stamps[~dead], rows[~dead]
+        known = self.stuck.setdefault(imu, [])
+        flown = stamps[dead & (stamps >= fixes.t[0]) & (stamps <= fixes.t[-1])]
+        for piece in np.split(flown, np.flatnonzero(np.diff(flown) > IMU_GAP_S) + 1):
+            if not len(piece):
+                continue
+            start, end = float(piece[0]), float(piece[-1])
+            if known and start - known[-1][1] <= IMU_GAP_S:
+                known[-1] = known[-1][0], max(end, known[-1][1])
+            else:
+                known.append((start, end))
+        return stamps[~dead], rows[~dead]
 
     def _segment(
         self,

@@ -43,6 +43,10 @@ SLOWEST_IMU_HZ: Final = 7.5
 """Inertial samples a second: a log at 10 Hz of an autopilot that looks at its samples 25 times a
 second has 8.3 of them.  Of five a second, flights of 45 s are off by more than their sigmas say
 [tuned: see docs/benchmarks.md]."""
+STUCK_S: Final = 1.0
+"""s for which no accelerometer that works repeats one reading on all three axes in flight: ten
+samples at the least, of which vibration of one step of a thousandth of g leaves two alike in a
+third of the cases, and all in one of ten thousand [physics]."""
 FEWEST_SAMPLES: Final = 8
 """Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
 FEWEST_FIXES: Final = 3

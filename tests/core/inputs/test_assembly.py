@@ -47,9 +47,8 @@ def flown(end=60.0, holes=(), doubted=(), batch_s=10.0, offset=0.0):
     out = []
     for t, kind in merged:
         if kind == 0:
-            assembly.streams.imu(
-                ImuSample(t, 1, (0.0, 0.0, -9.8), (0.1 * np.sin(t), 0.0, 0.3)), parameters
-            )
+            force, rate = (0.0, 0.0, -9.8 + 0.01 * np.sin(t)), (0.1 * np.sin(t), 0.0, 0.3)
+            assembly.streams.imu(ImuSample(t, 1, force, rate), parameters)
         elif kind == 1:
             assembly.streams.attitude(AttitudeSample(t, 0.01, 0.0, 0.3 * t))
         else:

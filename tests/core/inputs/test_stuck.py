@@ -1,0 +1,77 @@
+"""An accelerometer that repeats one reading has measured nothing meanwhile."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.inputs.limits import STUCK_S
+from onboard.core.inputs.samples import ImuSample
+from onboard.core.inputs.stuck import stuck
+from onboard.mavlink.decode import Decoder
+from sitl.builtin.truth import ImuTruth
+from sitl.recording import FlightSpec, fly_messages
+
+
+def test_readings_that_stay_for_a_second_are_stuck_and_no_others():
+    t = np.arange(0.0, 10.0, 0.02)
+    f = np.column_stack([np.sin(t), np.cos(t), -9.8 + 0.1 * np.sin(3.0 * t)])
+    dead, short = (t >= 3.0) & (t <= 3.0 + STUCK_S), (t >= 6.0) & (t < 6.0 + 0.9 * STUCK_S)
+    for span in (dead, short):
+        f[span] = f[span][0]
+    np.testing.assert_array_equal(stuck(t, f), dead)
+
+
+def test_one_axis_that_stays_is_no_dead_accelerometer():
+    t = np.arange(0.0, 10.0, 0.02)
+    f = np.column_stack([np.zeros_like(t), np.zeros_like(t), -9.8 + 0.1 * np.sin(3.0 * t)])
+    assert not np.any(stuck(t, f))
+
+
+def test_no_samples_are_not_stuck():
+    assert stuck(np.zeros(0), np.zeros((0, 3))).shape == (0,)
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0, 50.0])
+def test_coarse_readings_of_a_quiet_flight_are_not_stuck(rate):
+    """A thousandth of g is the step, and all that shakes the vehicle: an hour of it."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 3600.0, 1.0 / rate)
+    f = 9.80665e-3 * np.round(rng.standard_normal((len(t), 3)))
+    assert not np.any(stuck(t, f))
+
+
+@pytest.fixture(scope="module")
+def flight():
+    truth = ImuTruth(scale=(1.02, 0.98, 1.01), offset=(0.2, -0.15, 0.1))
+    spec = FlightSpec(vehicle="copter", seed=4, duration=150.0, imus=(truth,))
+    decoder = Decoder()
+    return [s for _, message in fly_messages(spec) for s in decoder.decode(message)]
+
+
+def learned(samples):
+    calibrator = Calibrator()
+    for sample in samples:
+        calibrator.feed(sample)
+    calibrator.finish()
+    return calibrator, calibrator.calibration(1)
+
+
+@pytest.mark.slow
+def test_what_is_learned_is_of_the_flight_without_it(flight):
+    died, ended = 80.0, 110.0
+
+    def broken(sample):
+        dead = isinstance(sample, ImuSample) and died <= sample.t <= ended
+        return replace(sample, f_b=(1.0, 1.0, 1.0)) if dead else sample
+
+    _, whole = learned(flight)
+    calibrator, without = learned(map(broken, flight))
+    ((start, end),) = calibrator.stuck(1)
+    assert (start, end) == pytest.approx((died, ended), abs=0.05)
+    found, sigma = np.array(without.scale + without.offset), np.array(without.scale_sigma)
+    assert np.all(np.abs(found - np.array(whole.scale + whole.offset))[:3] < 3.0 * sigma)
+    assert without.trusted_s == pytest.approx(whole.trusted_s - (ended - died), abs=3.0)
