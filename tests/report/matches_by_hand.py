@@ -55,7 +55,7 @@ def by_hand(name: str = "flight.BIN", **changes: Any) -> Match:
         "vehicle": "copter",
         "effects": (WIND, ROTORS),
         "wind": WindEstimate(
-            *(-3.0, 4.0, 0.02, 0.02, 40.0, None, np.nan, None),
+            *(-3.0, 4.0, 0.02, 0.02, 40.0, None, None),
             blocks,
             blocks,
             one * [-3.0, 4.0],
