@@ -163,6 +163,7 @@ class Judge:
             held_out_velocity_after=ladder[-1].held_out_velocity,
             fixes=int(np.any(np.isfinite(series.after), axis=1).sum()),
             believed=self.evidence.believed,
+            leaps=self.engine.refused["tilt"],
         )
 
     def _verdict(
@@ -172,6 +173,12 @@ class Judge:
         # What a hover shows it shows; that it shows nothing does not mean that nothing is there.
         if not moving and not effects:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
+        if mismatch.fit and not mismatch.supported:
+            return Verdict.INSUFFICIENT, (
+                f"the recorded attitude leaps against the gyroscope at {mismatch.leaps} of "
+                f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
+                "the two is false. " + note
+            )
         if not mismatch.supported:
             return Verdict.INSUFFICIENT, (
                 f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "

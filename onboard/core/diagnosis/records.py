@@ -61,7 +61,8 @@ class Rung:
 class Mismatch:
     """The residual of the six numbers and timing thresholds alone, and after all effects.
 
-    Both are of the same ``fixes``, out of ``believed``: those that were to be used.
+    Both are of the same ``fixes``, out of ``believed``: those that were to be used.  ``leaps`` is
+    at how many of them the recorded attitude had leapt against the gyroscope.
     """
 
     detected: bool
@@ -77,14 +78,20 @@ class Mismatch:
     held_out_velocity_after: float = NAN
     fixes: int = 0
     believed: int = 0
+    leaps: int = 0
 
     @property
     def supported(self) -> bool:
-        """Whether most fixes that were to be used could be.
+        """Whether most fixes that were to be used could be, and the attitude at most of them.
 
         Of a flight of which more than half is refused nobody can say which half is false: no
         estimate withstands more (the breakdown point; Donoho and Huber 1983).
         """
+        return self.fit and self.leaps <= 0.5 * self.fixes
+
+    @property
+    def fit(self) -> bool:
+        """Whether most fixes that were to be used could be."""
         return not self.believed or self.fixes >= 0.5 * self.believed
 
 

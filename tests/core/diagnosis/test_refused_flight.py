@@ -157,7 +157,11 @@ def test_a_proof_on_less_than_half_of_the_fixes_supports_nothing():
         believed=742,
     )
     assert not made.supported
-    assert replace(made, fixes=371).supported
+    most = replace(made, fixes=371)
+    assert most.supported
+    # Nor of one whose attitude leaps at more than half of its fixes.
+    assert replace(most, leaps=185).supported
+    assert not replace(most, leaps=186).supported
 
 
 @pytest.mark.slow
