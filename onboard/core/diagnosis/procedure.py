@@ -76,7 +76,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
     unused = (
         *unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked),
         *contradicted(final.batches, final.refused_velocities(), clear.fault, origin.t0),
-        *repeated(calibrator.stuck(imu), origin.t0),
+        *repeated([s for s in calibrator.stuck(imu) if s[1] >= origin.t0], origin.t0),
     )
     return Judge(
         calibrator,

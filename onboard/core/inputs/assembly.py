@@ -20,6 +20,7 @@ from onboard.core.inputs.limits import (
     KEPT_S,
     LEAST_LAG_S,
     LEAST_WAITING_S,
+    MOST_STUCK,
     REACH_MARGIN_S,
     REACH_S,
     SLOWEST_IMU_HZ,
@@ -199,6 +200,7 @@ class Assembly:
                 known[-1] = known[-1][0], max(end, known[-1][1])
             else:
                 known.append((start, end))
+        del known[:-MOST_STUCK]
         return stamps[~dead], rows[~dead]
 
     def _segment(

@@ -47,6 +47,8 @@ STUCK_S: Final = 1.0
 """s for which no accelerometer that works repeats one reading on all three axes in flight: ten
 samples at the least, of which vibration of one step of a thousandth of g leaves two alike in a
 third of the cases, and all in one of ten thousand [physics]."""
+MOST_STUCK: Final = 50
+"""Such times that are remembered, the latest [cost]."""
 FEWEST_SAMPLES: Final = 8
 """Inertial samples of a piece: fewer cannot be interpolated by cubics [cost]."""
 FEWEST_FIXES: Final = 3
