@@ -97,10 +97,10 @@ def _why_not(recorded: Recorded, given: Answer, imu: int) -> str:
     beside = all(bearing_of(e.name) in BESIDE for e in diagnosis.effects)
     if given.missing and not (diagnosis.verdict is Verdict.EXPLAINED and beside):
         return given.missing
-    if (m := diagnosis.mismatch).fit and not m.supported:
-        return f"its attitude leaps against the gyroscope at {m.leaps} of {m.fixes} fixes"
-    if not m.supported:
+    if not (m := diagnosis.mismatch).fit:
         return f"only {m.fixes} of its {m.believed} GPS fixes fit one model"
+    if m.leaping:
+        return f"its attitude leaps against the gyroscope at {m.leaps} of {m.fixes} fixes"
     if doubt_of(engine, solution):
         return "its parts contradict each other"
     if engine.trusted_s < engine.settings.minimum_s:

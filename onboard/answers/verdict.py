@@ -90,14 +90,14 @@ def missing(diagnosis: Diagnosis) -> list[str]:
     """What is missing, with sizes: one sentence for each effect."""
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         m = diagnosis.mismatch
-        if m.fit and not m.supported:
+        if not m.fit:
+            fit = f"Only {m.fixes} of {m.believed} GPS fixes agree with one model of this flight."
+            return [f"{fit} Where fewer than half agree, it cannot be told which are false."]
+        if m.leaping:
             leaps = f"The recorded attitude leaps against the gyroscope at {m.leaps} of {m.fixes}"
             return [
                 f"{leaps} fixes. At more than half it cannot be told which of the two is false."
             ]
-        if not m.supported:
-            fit = f"Only {m.fixes} of {m.believed} GPS fixes agree with one model of this flight."
-            return [f"{fit} Where fewer than half agree, it cannot be told which are false."]
         return ["There is too little motion with trusted GPS to say what is missing."]
     said = [sized(e) + "." for e in diagnosis.effects]
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:

@@ -28,7 +28,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Self, cast
 
-from onboard.core.estimate.determined import determine, improvement
+from onboard.core.estimate.determined import Determined, Improvement, determine, improvement
 from onboard.core.estimate.result import Calibration, Six
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Vector3
@@ -96,6 +96,13 @@ class Worth:
     error_after: float
     probability: float
     directions: int
+
+    @classmethod
+    def of(cls, found: Determined | Improvement, directions: int) -> Self:
+        """What the estimator says of it."""
+        return cls(
+            found.change, found.error_before, found.error_after, found.probability, directions
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,13 +260,7 @@ def propose(
         imu=calibration.imu,
         changes=tuple(changes),
         baseline=Baseline.of(calibration),
-        worth=Worth(
-            found.change,
-            found.error_before,
-            found.error_after,
-            found.probability,
-            found.directions,
-        ),
+        worth=Worth.of(found, found.directions),
         contradiction=found.contradiction,
         contradiction_limit=found.contradiction_limit,
     )
@@ -284,9 +285,7 @@ def as_known_now(earlier: PushPlan, known: PushPlan, calibration: Calibration) -
     return replace(
         earlier,
         baseline=known.baseline,
-        worth=Worth(
-            found.change, found.error_before, found.error_after, found.probability, directions
-        ),
+        worth=Worth.of(found, directions),
         contradiction=known.contradiction,
         contradiction_limit=known.contradiction_limit,
     )

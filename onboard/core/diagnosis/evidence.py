@@ -173,16 +173,16 @@ class Judge:
         # What a hover shows it shows; that it shows nothing does not mean that nothing is there.
         if not moving and not effects:
             return Verdict.INSUFFICIENT, "too little excitation to say. " + note
-        if mismatch.fit and not mismatch.supported:
+        if not mismatch.fit:
+            return Verdict.INSUFFICIENT, (
+                f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "
+                "flight; where more than half do not, nothing tells which are false. " + note
+            )
+        if mismatch.leaping:
             return Verdict.INSUFFICIENT, (
                 f"the recorded attitude leaps against the gyroscope at {mismatch.leaps} of "
                 f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
                 "the two is false. " + note
-            )
-        if not mismatch.supported:
-            return Verdict.INSUFFICIENT, (
-                f"only {mismatch.fixes} of {mismatch.believed} GPS fixes fit one model of this "
-                "flight; where more than half do not, nothing tells which are false. " + note
             )
         left = self.final.solution.variance_inflation > CONTRADICTION
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]

@@ -87,12 +87,17 @@ class Mismatch:
         Of a flight of which more than half is refused nobody can say which half is false: no
         estimate withstands more (the breakdown point; Donoho and Huber 1983).
         """
-        return self.fit and self.leaps <= 0.5 * self.fixes
+        return self.fit and not self.leaping
 
     @property
     def fit(self) -> bool:
         """Whether most fixes that were to be used could be."""
         return not self.believed or self.fixes >= 0.5 * self.believed
+
+    @property
+    def leaping(self) -> bool:
+        """Whether the recorded attitude had leapt at most of them."""
+        return self.leaps > 0.5 * self.fixes
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,9 +44,9 @@ SLOWEST_IMU_HZ: Final = 7.5
 second has 8.3 of them.  Of five a second, flights of 45 s are off by more than their sigmas say
 [tuned: see docs/benchmarks.md]."""
 STUCK_S: Final = 1.0
-"""s for which no accelerometer that works repeats one reading on all three axes in flight: ten
-samples at the least, of which vibration of one step of a thousandth of g leaves two alike in a
-third of the cases, and all in one of ten thousand [physics]."""
+"""s for which no accelerometer that works repeats one reading on all three axes in flight.  Where
+steps are a thousandth of g and vibration is no more, one reading of fifty is like that before it,
+and eight in a row, a second of the slowest stream, are one of ten thousand million [physics]."""
 MOST_STUCK: Final = 50
 """Such times that are remembered, the latest [cost]."""
 FEWEST_SAMPLES: Final = 8
