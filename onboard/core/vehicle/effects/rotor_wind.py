@@ -11,8 +11,8 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import ByStep, Unknown
 
 PLAUSIBLE = 5.0
-"""m/s; what small rotors induce in hover, ``sqrt(disc loading / (2 rho))`` of 60 N/m^2, by which the
-flow that a law of the climb leaves out may be off in another wind [physics]."""
+"""m/s; what small rotors induce in hover, ``sqrt(disc loading / (2 rho))`` of 60 N/m^2: by as much
+the flow that a law of the climb leaves out may be off in another wind [physics]."""
 
 
 class RotorWind(ByStep):
