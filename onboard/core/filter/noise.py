@@ -65,6 +65,15 @@ class NoiseLevels:
         low, high = LIMITS[name]
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
+    @property
+    def at_highest(self) -> tuple[str, ...]:
+        """Levels that are as high as noise of their kind goes; a time may be as long as it likes."""
+        return tuple(
+            name
+            for name in ESTIMATED
+            if name != "heading_time" and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
+        )
+
 
 USUAL = NoiseLevels()
 """Levels that a flight is expected to have."""

@@ -1,0 +1,44 @@
+"""Noise that is larger than noise of its kind is: something that no model has stands behind it.
+
+Noise is estimated with what else is missing, and takes in whatever has no column: a gyroscope that
+fails bends the heading by tens of degrees, and a heading's slow error that may be as large as it
+likes makes a perfect fit of that.  Each level has a highest value, which is physics
+(:data:`onboard.core.filter.limits.LIMITS`); a flight that asks for it asks for more.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from onboard.core.filter.noise import NoiseLevels
+
+GPS, HEADING, TILT, GYROSCOPE, FORCE = (
+    "GPS errs by more than a receiver does",
+    "the autopilot's heading is off by more than 30 degrees, which is no error of a compass that "
+    "works",
+    "the autopilot's roll and pitch are off by more than a state estimate is that works",
+    "the gyroscope errs by more than one that works",
+    "the accelerometer is noisier than vibration makes one that works",
+)
+WORDS: Final = {
+    "velocity": GPS,
+    "velocity_colour": GPS,
+    "vertical": GPS,
+    "height": GPS,
+    "height_walk": GPS,
+    "jitter": GPS,
+    "force_walk": FORCE,
+    "tilt_walk": GYROSCOPE,
+    "bias_walk": GYROSCOPE,
+    "attitude": TILT,
+    "attitude_white": TILT,
+    "heading": HEADING,
+    "heading_walk": HEADING,
+}
+"""What a level at its highest says."""
+
+
+def excess_in_words(noise: NoiseLevels) -> str:
+    """What is no noise any more, one sentence; empty if all is."""
+    said = list(dict.fromkeys(WORDS[name] for name in noise.at_highest))
+    return f"{', and '.join(said)}." if said else ""

@@ -1,0 +1,58 @@
+"""Noise that is larger than noise of its kind is."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from onboard.core.diagnosis.excess import WORDS, excess_in_words
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.noise import ESTIMATED, NoiseLevels
+from onboard.core.inputs.samples import AttitudeSample
+from onboard.mavlink.decode import Decoder
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec, fly_messages
+
+
+def test_every_level_that_is_looked_for_has_words_but_the_time():
+    assert set(WORDS) == set(ESTIMATED) - {"heading_time"}
+
+
+@pytest.mark.parametrize("name", sorted(WORDS))
+def test_a_level_is_in_excess_at_its_highest_and_not_below(name):
+    low, high = LIMITS[name]
+    assert WORDS[name] in excess_in_words(replace(NoiseLevels(), **{name: high}))
+    assert not excess_in_words(replace(NoiseLevels(), **{name: math.sqrt(low * high)}))
+    assert not excess_in_words(replace(NoiseLevels(), **{name: low}))
+
+
+def test_an_error_of_the_heading_may_last_for_the_flight():
+    assert not excess_in_words(replace(NoiseLevels(), heading_time=LIMITS["heading_time"][1]))
+
+
+def test_what_is_alike_is_said_once():
+    both = replace(NoiseLevels(), velocity=2.0, velocity_colour=1.0, heading=0.6)
+    assert excess_in_words(both).count("GPS") == 1
+    assert " and the autopilot's heading" in excess_in_words(both)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "explained"), [(0.05, True), (1.2, False)])
+def test_a_heading_that_wanders_by_a_radian_is_no_explained_flight(size, explained):
+    """Of three degrees it is what compasses do; of seventy a filter can make a perfect fit, too."""
+    spec = FlightSpec(vehicle="copter", seed=5, duration=150.0, imus=random_imus(5))
+    made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
+    for _, message in fly_messages(spec):
+        for sample in decoder.decode(message):
+            if isinstance(sample, AttitudeSample):
+                wander = size * math.sin(0.11 * sample.t) * math.cos(0.047 * sample.t)
+                sample = replace(sample, yaw=sample.yaw + wander)  # noqa: PLW2901
+            made.feed(sample)
+    made.finish()
+    said = diagnose(made, 1)
+    assert (said.verdict in {Verdict.CLEAN, Verdict.EXPLAINED}) is explained
+    assert ("heading is off by more than" in said.note) is not explained
