@@ -12,14 +12,11 @@ from typing import Final
 
 from onboard.core.filter.noise import NoiseLevels
 
-GPS, HEADING, TILT, GYROSCOPE, FORCE = (
-    "GPS errs by more than a receiver does",
-    "the autopilot's heading is off by more than 30 degrees, which is no error of a compass that "
-    "works",
-    "the autopilot's roll and pitch are off by more than a state estimate is that works",
-    "the gyroscope errs by more than one that works",
-    "the accelerometer is noisier than vibration makes one that works",
-)
+GPS: Final = "GPS errs by more than a receiver does"
+HEADING: Final = "the autopilot's heading is off by more than 30 degrees, which is no compass' error"
+TILT: Final = "the autopilot's roll and pitch are off by more than a state estimate is that works"
+GYROSCOPE: Final = "the gyroscope errs by more than one that works"
+FORCE: Final = "the accelerometer is noisier than vibration makes one that works"
 WORDS: Final = {
     "velocity": GPS,
     "velocity_colour": GPS,

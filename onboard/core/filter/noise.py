@@ -67,7 +67,7 @@ class NoiseLevels:
 
     @property
     def at_highest(self) -> tuple[str, ...]:
-        """Levels that are as high as noise of their kind goes; a time may be as long as it likes."""
+        """Levels as high as noise of their kind goes; a time may be as long as it likes."""
         return tuple(
             name
             for name in ESTIMATED
