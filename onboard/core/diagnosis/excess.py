@@ -13,7 +13,7 @@ from typing import Final
 from onboard.core.filter.noise import NoiseLevels
 
 GPS: Final = "GPS errs by more than a receiver does"
-HEADING: Final = "the autopilot's heading is off by more than 30 degrees, which is no compass' error"
+HEADING: Final = "the autopilot's heading is off by more than 30 degrees, as no compass is"
 TILT: Final = "the autopilot's roll and pitch are off by more than a state estimate is that works"
 GYROSCOPE: Final = "the gyroscope errs by more than one that works"
 FORCE: Final = "the accelerometer is noisier than vibration makes one that works"
