@@ -62,6 +62,7 @@ def test_a_flight_as_the_pilot_hears_it():
     [
         ("push_rolled_back", WARNING),
         ("push_interrupted", ERROR),
+        ("imu_stuck", ERROR),
         ("push_worse", WARNING),
         ("physics_missing", WARNING),
         ("worth_knowing", INFO),

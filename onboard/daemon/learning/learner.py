@@ -107,6 +107,7 @@ class Learner:
         self._opening = Opening()
         self._answers: dict[int, Calibration] = {}
         self._calibrated: dict[int, bool] = {}
+        self._stuck: dict[int, float] = {}
         self._stale = self._urgent = False
         self._next_solution = 0.0
         self._counters: Counter[str] = Counter()
@@ -172,6 +173,7 @@ class Learner:
         hand_on(parameters, calibrator)
         self._examiner.begin_anew(calibrator)
         self._calibrated.clear()
+        self._stuck.clear()
         self._answers = {}
         self._proof.drop()
         self._opening.restarted()
@@ -264,6 +266,7 @@ class Learner:
 
     def _learned(self) -> Learned:
         self._solve()
+        self._tell_of_stuck()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
         window, told = self._calibrator.trust, self._opening.told
@@ -302,6 +305,14 @@ class Learner:
             self._calibrated[imu] = all_of_it
             more = "" if all_of_it else " in part; fly on for more"
             self._tell("calibrated", f"IMU {imu} is calibrated{more}")
+
+    def _tell_of_stuck(self) -> None:
+        """Once for each time that an accelerometer repeats one reading in flight."""
+        for imu in self._calibrator.imus:
+            began = max((start for start, _ in self._calibrator.stuck(imu)), default=None)
+            if began is not None and began != self._stuck.get(imu):
+                self._stuck[imu] = began
+                self._tell("imu_stuck", f"IMU {imu} repeats one reading in flight", warning=True)
 
     # How
 

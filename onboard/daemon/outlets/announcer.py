@@ -50,6 +50,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "calibrated": Line(NOTICE),
         "invalid": Line(WARNING),
         "imu_state": Line(NOTICE),
+        "imu_stuck": Line(ERROR, "", "stuck {imu}", limits.FLAPPING_S),
         "advise_only": Line(WARNING, "not ArduPilot, advise-only"),
         "state_refused": Line(WARNING, "saved calibration unusable, starts anew"),
         "push_begins": Line(INFO, "{imu} writing calibration", "push {imu}"),
