@@ -15,12 +15,13 @@ from typing import Final, TypeGuard, TypeVar
 import numpy as np
 
 from onboard.answers.answer import Answer
-from onboard.answers.recorded import Recorded, unanswered
+from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import Ground
+from onboard.core.inputs.boot_time import began_anew
 from onboard.core.inputs.samples import (
     FIX_3D,
     AirData,
@@ -28,11 +29,13 @@ from onboard.core.inputs.samples import (
     GpsFix,
     ImuSample,
     Outputs,
+    ParameterValue,
     Sample,
     VehicleState,
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans
 from onboard.core.vehicle.trajectory import Sensors
@@ -70,6 +73,7 @@ class Flown:
         self.ground = 0.0
         self.flying: list[Batch] = []
         self.kind = ""
+        self._newest, self._shift = -math.inf, 0.0
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -87,7 +91,17 @@ class Flown:
         return self.recorded.standing_s
 
     def feed(self, sample: Sample) -> object:
-        """Keep a sample, but not of other accelerometers."""
+        """Keep a sample, but not of other accelerometers.
+
+        Where the autopilot's clock begins anew, all that follows is later: streams of two boots are
+        never held against each other.
+        """
+        if sample.t is not None and math.isfinite(sample.t):
+            if began_anew(sample.t + self._shift, self._newest):
+                self._shift = self._newest + PAUSE_S - sample.t
+            if self._shift:
+                sample = later(sample, sample.t, self._shift)
+            self._newest = max(self._newest, sample.t or 0.0)
         if not isinstance(sample, ImuSample) or sample.imu == self.imu:
             self._kept.append(sample)
         if isinstance(sample, VehicleState) and sample.kind:
@@ -111,6 +125,7 @@ class Flown:
                     v,
                     height,
                     said=_said_to_stand(self._kept),
+                    carried=carried_by_rotors(self.signals(), t, v),
                     rolls=self.kind != "copter",
                     wings=self.kind == "plane",
                 )
@@ -153,7 +168,7 @@ class Flown:
                 [s for s in blown if s.wind_sigma is not None],
                 lambda s: (s.wind_n or 0.0, s.wind_e or 0.0, s.wind_sigma or 0.0),
             ),
-            parameters=dict(self.parameters),
+            parameters={s.name: s.value for s in kept if isinstance(s, ParameterValue)},
             kind=self.kind,
             normalised=normalised,
         )

@@ -12,6 +12,7 @@ import numpy as np
 
 from onboard.answers.flown import FlownRecording, flown
 from onboard.answers.match_settings import Setting, settings_of
+from onboard.answers.same_flight import refuse_one_flight_twice, refuse_other_boards
 from onboard.answers.sensor_level import TIMING_NAMES, sensor_differences
 from onboard.core.diagnosis.records import NotTestable, Verdict
 from onboard.core.inputs.segments import Batch
@@ -107,11 +108,13 @@ def match(
         progress: told the share of the reading that is done.
 
     Raises:
-        RecordingError: a file that cannot be used.
+        RecordingError: a file that cannot be used, or another flight that is of another vehicle.
+        UsageError: another flight that is the same flight.
         ValueError: a frame that makes no sense.
     """
     recording = flown(real, progress=progress)
     further = tuple(flown(path, progress=progress) for path in others)
+    _refuse_strangers(recording, further)
     vehicle = vehicle_level(recording, frame or {}, further)
     other, simulated = None, None
     if simulation is not None:
@@ -139,6 +142,15 @@ def match(
         vehicle.frame,
         further,
     )
+
+
+def _refuse_strangers(first: FlownRecording, others: Sequence[FlownRecording]) -> None:
+    """See that further flights are flights of their own, of the same vehicle."""
+    for other in others:
+        first.source.vehicle.refuse(other.source.vehicle)
+    every = (first, *others)
+    refuse_other_boards([r for flown_ in every for r in flown_.source.recordings])
+    refuse_one_flight_twice([track for flown_ in every for track in flown_.source.vehicle.tracks])
 
 
 def vehicle_level(

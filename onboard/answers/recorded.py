@@ -25,7 +25,7 @@ from onboard.core.estimate.mean_force import in_the_mean
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.blocks import Block
-from onboard.core.inputs.samples import Sample
+from onboard.core.inputs.samples import GpsFix, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.compiling import prefer_compiled
 
@@ -80,7 +80,7 @@ class Recorded:
             if self._begins:
                 self._shift, self._begins = self._newest + PAUSE_S - t, False
             if self._shift:
-                sample = replace(sample, t=t + self._shift)
+                sample = later(sample, t, self._shift)
             self._newest = max(self._newest, t + self._shift)
         return self._reader.feed(sample)
 
@@ -148,6 +148,14 @@ class Recorded:
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine, found.left_open)
         return given
+
+
+def later(sample: Sample, t: float, by: float) -> Sample:
+    """A sample of ``t``, s, with all that it has of the boot clock later by ``by``, s."""
+    t += by
+    if isinstance(sample, GpsFix) and sample.t_message is not None:
+        return replace(sample, t=t, t_message=sample.t_message + by)
+    return replace(sample, t=t)
 
 
 def unanswered(calibration: Calibration, why: str = NO_FLIGHT) -> Answer:

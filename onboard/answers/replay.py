@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import msgspec
-import numpy as np
 
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
@@ -17,15 +15,13 @@ from onboard.answers.calibration_document import advice_document
 from onboard.answers.compared import accelerometers_document, remarks
 from onboard.answers.flight_document import FlightsDocument, flight_document
 from onboard.answers.recorded import unanswered
+from onboard.answers.recorded_vehicle import Vehicle
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
+from onboard.answers.same_flight import refuse_one_flight_twice, refuse_other_boards
 from onboard.core.estimate.comparison import Comparison
-from onboard.core.estimate.result import Calibration, Coverage
-from onboard.core.inputs.assembly import mean_step
-from onboard.core.inputs.blocks import Block, Piece
-from onboard.core.inputs.limits import SLOWEST_IMU_HZ
-from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue, Sample
-from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.maths.arrays import Array, Vector3
+from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.blocks import Block
+from onboard.core.inputs.samples import Sample
 from onboard.errors import RecordingError, UsageError
 from onboard.recordings.opening import open_recording
 from onboard.recordings.recording import Recording, damage_by_file
@@ -34,9 +30,6 @@ Progress = Callable[[float], None]
 """Told the share of the work that is done, 0 ... 1, now and then."""
 
 PROGRESS_EVERY = 1024
-TIMES_LOOKED_AT = 1000
-"""Of a stream, that tell how fast it is: the mean step is known to a thousandth [cost]."""
-DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
 
 
 class Reader(Protocol):
@@ -232,6 +225,7 @@ def read(
     recordings = tuple(p if isinstance(p, Recording) else open_recording(p) for p in paths)
     _refuse_repetition(recordings)
     _refuse_mixture(recordings)
+    refuse_other_boards(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
     vehicle = Vehicle()
     gatherer = reader if isinstance(reader, Gatherer) else None
@@ -239,6 +233,7 @@ def read(
     for recording in recordings:
         if recording is not recordings[0]:
             reader.restart()
+        vehicle.begin(recording)
         told = fed
         for piece in recording.samples() if gatherer is None else recording.pieces():
             vehicle.check(piece, recording)
@@ -253,6 +248,7 @@ def read(
             if progress is not None and fed >= told + PROGRESS_EVERY:
                 told = fed
                 progress(min(1.0, fed / total))
+        refuse_one_flight_twice(vehicle.tracks)
     reader.finish()
     vehicle.standing_s = reader.standing_s
     if progress is not None:
@@ -284,102 +280,3 @@ def _refuse_mixture(recordings: Sequence[Recording]) -> None:
                 f"{other.path}: of another vehicle than {first.path} "
                 f"(autopilot {other.autopilot}, there {first.autopilot})"
             )
-
-
-class Vehicle:
-    """Counts the samples and sees to it that the accelerometers stay the same ones."""
-
-    def __init__(self) -> None:
-        self._samples: Counter[int] = Counter()
-        self._first_times: defaultdict[int, list[float]] = defaultdict(list)
-        self._fixes = self._placed = 0
-        self.standing_s = 0.0
-        """Time on the ground, s."""
-        self._parameters: dict[str, float] = {}
-        self._device: dict[int, tuple[np.float32, Recording]] = {}
-
-    def check(self, sample: Piece, recording: Recording) -> None:
-        """Take a sample, or many.
-
-        Raises:
-            RecordingError: it is of another vehicle.
-        """
-        if isinstance(sample, Block):
-            for columns in sample.imus:
-                self._count(columns.imu, columns.t)
-            for other in sample.others:
-                self.check(other, recording)
-        elif isinstance(sample, ImuSample):
-            self._count(sample.imu, (sample.t,))
-        elif isinstance(sample, GpsFix):
-            self._fixes += 1
-            self._placed += sample.fix_type >= FIX_3D
-        elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
-            self._parameters[sample.name] = sample.value
-            if sample.name in DEVICE_IDS and sample.value:
-                self._check_device(sample, recording)
-
-    def _count(self, imu: int, times: Sequence[float] | Array) -> None:
-        self._samples[imu] += len(times)
-        if len(self._first_times[imu]) < TIMES_LOOKED_AT:
-            self._first_times[imu] += map(float, times[:TIMES_LOOKED_AT])
-
-    def _check_device(self, sample: ParameterValue, recording: Recording) -> None:
-        imu = DEVICE_IDS[sample.name]
-        # Logs and telemetry carry identifiers as single-precision numbers.
-        device = np.float32(sample.value)
-        known, where = self._device.setdefault(imu, (device, recording))
-        if known != device and where is not recording:
-            raise RecordingError(
-                f"{recording.path}: of another vehicle than {where.path} "
-                f"({sample.name} is {device:.0f}, there {known:.0f})"
-            )
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Samples by stream."""
-        counts = {f"imu {imu}": n for imu, n in self._samples.items()}
-        return counts | {"gps": self._fixes} if self._fixes else counts
-
-    @property
-    def imus(self) -> tuple[int, ...]:
-        """Accelerometers that sent samples."""
-        return tuple(sorted(self._samples))
-
-    def silence(self, imu: int) -> str:
-        """Why an accelerometer has no answer."""
-        samples = f"accelerometer {imu}: {self._samples[imu]} samples"
-        if self._slow(imu):
-            return f"{samples}, fewer than {SLOWEST_IMU_HZ:g} a second; 25 are good"
-        if not self._placed:
-            return f"{samples}, and {'no fix of the GPS receiver' if self._fixes else 'no GPS'}"
-        if self.standing_s > 0.0:
-            return (
-                f"{samples}, none of them in the air with trusted GPS; "
-                f"the {self.standing_s:.0f} s on the ground are not used"
-            )
-        return f"{samples}, never together with attitude and trusted GPS"
-
-    def _slow(self, imu: int) -> bool:
-        return SLOWEST_IMU_HZ * mean_step(np.array(self._first_times[imu])) > 1.0
-
-    def unanswered(self, imu: int) -> Calibration:
-        """What to say of an accelerometer of which the estimator could make nothing."""
-        names = parameter_names(imu)
-        in_force = SixParameters(self._three(names.scale, 1.0), self._three(names.offset, 0.0))
-        return Calibration.unanswered(
-            imu,
-            in_force,
-            self.silence(imu),
-            parameters_known=all(name in self._parameters for name in names.six),
-            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do(imu)),
-        )
-
-    def _to_do(self, imu: int) -> str:
-        if self.standing_s > 0.0 and not self._slow(imu):
-            return "fly: fast, with hard braking and turns both ways"
-        return "record it at 25 Hz or more, with attitude and GPS"
-
-    def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
-        x, y, z = (self._parameters.get(name, default) for name in names)
-        return x, y, z

@@ -22,6 +22,8 @@ read by name, so it does not tell the two apart.
 
 MAV_PARAM_TYPE_REAL32 = 9
 AUTOPILOT_COMPONENT = 1
+_INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}
+"""MAV_PARAM_TYPE of the whole numbers that fit into the field, and how their bytes read."""
 
 
 class ParameterErrorCode(Enum):
@@ -157,3 +159,20 @@ def parameter_message(
             return mav.param_set_encode(
                 system, component, name.encode(), value, MAV_PARAM_TYPE_REAL32
             )
+
+
+def number_meant(value: float, kind: int) -> float:
+    """The number that PARAM_SET or PARAM_VALUE carries by its float; NaN or infinite if it is none.
+
+    Senders differ in how they put a whole number into the float field: as its value (ArduPilot), or
+    as its bytes (PX4, some stations).  Bytes of a small whole number read as a float below 1e-38,
+    which nobody means (0 is 0 both ways); those of a negative one read as NaN.
+
+    Args:
+        value: as the field reads.
+        kind: MAV_PARAM_TYPE that was told.
+    """
+    layout = _INTEGERS.get(kind)
+    if layout is None or (math.isfinite(value) and (value == 0.0 or abs(value) >= 1.0)):
+        return value
+    return float(struct.unpack_from(layout, struct.pack("<f", value))[0])

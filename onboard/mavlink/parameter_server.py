@@ -19,7 +19,6 @@ once for each name, and a write is left: stations repeat what was not answered.
 from __future__ import annotations
 
 import math
-import struct
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,15 +29,13 @@ from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import (
     MAV_PARAM_TYPE_REAL32,
     ParameterErrorCode,
+    number_meant,
     to_float32,
 )
 
 NAME_LENGTH = 16
 
 Set = Callable[[float], None]
-
-_INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}
-"""MAV_PARAM_TYPE of the whole numbers that fit into the field, and how their bytes read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +196,7 @@ class ParameterServer:
         writable = self._writable.get(name)
         if writable is None:
             return self._deny(message, ParameterErrorCode.READ_ONLY, "is read-only")
-        value = _meant(message)
+        value = number_meant(float(message.param_value), message.param_type)
         if objection := writable.objection(value):
             return self._deny(message, ParameterErrorCode.VALUE_OUT_OF_RANGE, objection)
         try:
@@ -292,17 +289,3 @@ class _Pace:
     def _accrue(self, elapsed: float, now: float) -> None:
         self._at = now
         self._credit = min(self._burst, self._credit + max(0.0, elapsed) * self._rate)
-
-
-def _meant(message: Message) -> float:
-    """The number that a PARAM_SET carries.
-
-    Stations differ in how they put a whole number into the float field: as its value, or as its
-    bytes.  Bytes of a small whole number read as a float below 1e-38, which nobody means
-    (0 is 0 both ways); those of a negative one read as NaN.
-    """
-    value = float(message.param_value)
-    layout = _INTEGERS.get(message.param_type)
-    if layout is None or (math.isfinite(value) and (value == 0.0 or abs(value) >= 1.0)):
-        return value
-    return float(struct.unpack_from(layout, struct.pack("<f", value))[0])

@@ -28,6 +28,7 @@ from onboard.core.inputs.samples import (
 )
 from onboard.mavlink.bootclock import BootClock
 from onboard.mavlink.dialect import Message, mavlink
+from onboard.mavlink.parameter_messages import number_meant
 from onboard.mavlink.vehicle import kind_of_vehicle
 
 Samples: TypeAlias = tuple[Sample, ...]
@@ -243,6 +244,7 @@ class Readings:
         return NOTHING  # told to the clock, like all that is stamped
 
     def _param_value(self, m: Message) -> Samples:
-        if not math.isfinite(m.param_value):
+        value = number_meant(float(m.param_value), m.param_type)
+        if not math.isfinite(value):
             return self._refuse("PARAM_VALUE: not finite")
-        return (ParameterValue(m.param_id, m.param_value, self._clock.latest),)
+        return (ParameterValue(m.param_id, value, self._clock.latest),)

@@ -22,6 +22,7 @@ from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message, mavlink, message_ids
 from onboard.mavlink.framing import next_valid
+from onboard.mavlink.parameter_messages import NO_INDEX
 from onboard.recordings.bulk import no_collection
 from onboard.recordings.packet_blocks import PacketBlocks
 from onboard.recordings.packet_columns import (
@@ -217,9 +218,14 @@ def _decoder(source: Source, vehicle: _Vehicle) -> Decoder:
 
 
 def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[ParameterValue]:
-    """Parameters that are reported late, and always with the same value."""
+    """Parameters that are reported late, in lists alone, and always with the same value.
+
+    What is reported beside a list was asked for by name, or somebody has just set it; then nobody
+    knows what was in force before.
+    """
     values: dict[str, set[float]] = {}
     late: dict[str, bool] = {}
+    unlisted: set[str] = set()
     decoder = Decoder(*source)
     unpack = Unpacker()
     octets = np.frombuffer(data, np.uint8)
@@ -229,8 +235,10 @@ def _told_late(data: Bytes, source: Source, vehicle: _Vehicle) -> Iterator[Param
             if isinstance(sample, ParameterValue):
                 values.setdefault(sample.name, set()).add(sample.value)
                 late.setdefault(sample.name, is_late)
+                if message is not None and message.param_index == NO_INDEX:
+                    unlisted.add(sample.name)
     for name, seen in values.items():
-        if late[name] and len(seen) == 1:
+        if late[name] and len(seen) == 1 and name not in unlisted:
             yield ParameterValue(name, seen.pop())
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from pathlib import Path
 
 import pytest
@@ -49,8 +50,8 @@ def test_each_reading_starts_anew(tmp_path):
     assert list(recording.samples()) == list(recording.samples())
 
 
-def parameter(log, name, value):
-    log.add(mavlink.MAVLink_param_value_message(name, value, 9, 1, 0))
+def parameter(log, name, value, index=0, kind=9):
+    log.add(mavlink.MAVLink_param_value_message(name, value, kind, 1, index))
 
 
 def test_a_list_read_late_counts_from_the_beginning_unless_it_was_changed(tmp_path):
@@ -71,6 +72,29 @@ def test_a_list_read_late_counts_from_the_beginning_unless_it_was_changed(tmp_pa
         ("INS_ACCOFFS_Y", pytest.approx(0.2)),
         ("INS_ACCSCAL_X", pytest.approx(1.02)),
     ]
+
+
+def test_what_was_set_late_was_not_in_force_before(tmp_path):
+    """An autopilot echoes a PARAM_SET with no index; a list afterwards says the same value."""
+    log = telemetry(seconds=70)
+    parameter(log, b"INS_ACCOFFS_X", 0.25, index=65535)
+    parameter(log, b"INS_ACCOFFS_X", 0.25, index=17)
+    parameter(log, b"INS_ACCOFFS_Y", 0.5, index=18)
+    samples = list(open_recording(saved(tmp_path, log)).samples())
+    first = samples.index(next(s for s in samples if isinstance(s, ImuSample)))
+    told = {s.name: s.value for s in samples[:first] if isinstance(s, ParameterValue)}
+    assert told == {"INS_ACCOFFS_Y": 0.5}
+
+
+@pytest.mark.parametrize("meant", [1000, -3, 1310988, 0])
+def test_a_whole_number_may_come_as_its_bytes_or_as_its_value(tmp_path, meant):
+    """PX4 sends bytes, ArduPilot values."""
+    log = telemetry()
+    (octets,) = struct.unpack("<f", struct.pack("<i", meant))
+    parameter(log, b"PWM_MIN", octets, kind=6)
+    parameter(log, b"MOT_PWM_MIN", float(meant), kind=6)
+    told = {s.name: s.value for s in of_type(saved(tmp_path, log), ParameterValue)}
+    assert told["PWM_MIN"] == told["MOT_PWM_MIN"] == meant
 
 
 def test_a_damaged_packet_costs_itself_only(tmp_path):

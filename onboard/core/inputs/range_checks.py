@@ -24,6 +24,9 @@ MOST_SPEED = 1000.0
 """m/s; receivers stop at 515 by regulation."""
 MOST_HEIGHT = 1e5
 """m"""
+LATEST_S = 1.0
+"""s; between the arrival of a fix and its record: an autopilot that is five fixes behind flies by
+none of them [physics]."""
 MOST_PARAMETER = 1e30
 PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
 """Part of a name that begins with INS or AHRS, and what its magnitude stays below by far."""
@@ -31,9 +34,17 @@ ACCELEROMETERS = range(1, 6)
 
 
 def measured(sample: Sample) -> Sample:
-    """The sample without what it says is no number: a receiver may have no vertical velocity."""
-    if isinstance(sample, GpsFix) and sample.v_d is not None and math.isnan(sample.v_d):
-        return replace(sample, v_d=None)
+    """The sample without what it says is no number, or cannot be.
+
+    A receiver may have no vertical velocity; and a damaged record may have a moment of arrival that
+    is nowhere near the fix.
+    """
+    if not isinstance(sample, GpsFix):
+        return sample
+    if sample.v_d is not None and math.isnan(sample.v_d):
+        sample = replace(sample, v_d=None)
+    if sample.t_message is not None and not abs(sample.t_message - sample.t) < LATEST_S:
+        sample = replace(sample, t_message=None)
     return sample
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array
+from onboard.core.inputs.limits import STILL_M_S
+from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.air_density import AirDensity
@@ -39,6 +40,11 @@ FULL_RANGE = (0.85, 1.05)
 """The highest voltage, at rest or flown, over the frame's full one, between which the battery is
 the frame's; else it is another battery, and that voltage is taken for full [physics]."""
 
+
+CARRIED = 0.7
+"""Of the command in moving flight [physics]."""
+FEWEST_MOVING = 10
+"""Fixes, to take a median of [probability]."""
 
 DENSITY_RANGE_M = 500.0
 """Range of heights, m, over which the standard atmosphere loses 5 %: below, a density that is off
@@ -114,6 +120,29 @@ class Outputs:
         even = np.mean(np.sqrt(np.maximum(power, 0.0)), axis=1) / np.sqrt(mean)
         columns = np.mean(c, axis=1), np.mean(c * c, axis=1), np.maximum(even, 0.1)
         return Stream(signals.outputs.t[known], np.stack(columns, axis=1))
+
+
+def carried_by_rotors(signals: Signals, t: Array, v_n: Array) -> Mask | None:
+    """(n,) where the motors are commanded as in flight; None where nobody knows.
+
+    Thrust goes with the command, or with its square: at :data:`CARRIED` of what moving flight takes
+    the rotors hold no more than half, or seven tenths of the weight, and the vehicle would fall.
+
+    Args:
+        signals: of the vehicle.
+        t: (n,) s.
+        v_n: (n, 3) velocity, m/s; NaN where it is not measured.
+    """
+    frame = CopterAirframe.of({})
+    if signals.kind != "copter":
+        return None
+    commands = Outputs.of(signals, frame).commands(signals, frame.propExpo)
+    moving = np.linalg.norm(np.nan_to_num(v_n), axis=1) > STILL_M_S
+    if not commands.covers(t) or np.count_nonzero(moving) < FEWEST_MOVING:
+        return None
+    given = commands.at(t)[:, 0]
+    out: Mask = given > CARRIED * float(np.median(given[moving]))
+    return out
 
 
 def voltage_of(flight: Flight) -> Array | None:

@@ -1,0 +1,67 @@
+"""A recording as a flight: where it was on the ground, and where the clock began anew."""
+
+import numpy as np
+import pytest
+
+from onboard.answers.flown import Flown
+from onboard.core.inputs.samples import GpsFix, ImuSample, Outputs, ParameterValue, VehicleState
+
+MOTORS = [ParameterValue(f"SERVO{n}_FUNCTION", 32.0 + n) for n in (1, 2, 3, 4)]
+
+
+def hop(*, cruise=1500.0, motors=True, begin=0.0, end=60.0, height=1.2):
+    """A copter in a room: stands for 10 s, hovers for 5, flies to and fro, hovers, stands."""
+    out = [VehicleState(begin, kind="copter"), *MOTORS]
+    rng = np.random.default_rng(3)
+    for t in np.arange(begin, end, 0.1).tolist():
+        aloft = 10.0 <= t < 50.0
+        v = 0.7 * np.sin(t) if 15.0 <= t < 45.0 else 0.0
+        up = height * float(np.interp(t, [9.0, 10.0, 50.0, 51.0], [0.0, 1.0, 1.0, 0.0]))
+        out.append(ImuSample(t, 1, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
+        if motors:
+            pulse = cruise + 20.0 * rng.standard_normal() if aloft else 1100.0
+            out.append(Outputs(t, (pulse,) * 4))
+        out.append(GpsFix(t, 1, 3, 0.5, 0.5, 100.0 + up, v, 0.0, 0.0))
+    return out
+
+
+def found(samples):
+    made = Flown()
+    for sample in samples:
+        made.feed(sample)
+    made.finish()
+    return made
+
+
+def standing(made, t):
+    return any(a <= t <= b for a, b in made.grounded)
+
+
+@pytest.mark.parametrize("cruise", [1350.0, 1500.0, 1800.0])
+def test_a_low_hover_is_no_ground_where_the_rotors_carry_it(cruise):
+    made = found(hop(cruise=cruise))
+    assert standing(made, 3.0)
+    assert standing(made, 57.0)
+    assert not any(standing(made, t) for t in np.arange(13.1, 46.9, 0.5))
+
+
+def test_without_outputs_the_height_decides():
+    """As low as the ground, and still: nobody knows that it hovers."""
+    assert standing(found(hop(motors=False)), 12.0)
+
+
+def test_a_recording_that_begins_and_ends_in_a_hover_has_no_ground():
+    made = found(hop(begin=11.0, end=49.0, height=12.0))
+    assert made.grounded == []
+
+
+def test_streams_of_two_boots_are_apart():
+    first, second = hop(cruise=1400.0, begin=20.0), hop(cruise=1600.0, begin=5.0)
+    made = found([*first, *second])
+    outputs = made.signals().outputs
+    assert len(outputs) == 400 + 550
+    late = outputs.t > 70.0 - 0.05
+    assert np.mean(outputs.x[~late, 0][:250]) == pytest.approx(1400.0, abs=5.0)
+    assert np.all(np.diff(outputs.t) < 11.0)
+    assert outputs.t[late][0] == pytest.approx(60.0 - 0.1 + 10.0, abs=0.2)
+    assert np.count_nonzero(late) == 550
