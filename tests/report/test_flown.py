@@ -60,7 +60,7 @@ def test_streams_of_two_boots_are_apart():
     made = found([*first, *second])
     outputs = made.signals().outputs
     assert len(outputs) == 400 + 550
-    late = outputs.t > 70.0 - 0.05
+    late = outputs.t > 65.0
     assert np.mean(outputs.x[~late, 0][:250]) == pytest.approx(1400.0, abs=5.0)
     assert np.all(np.diff(outputs.t) < 11.0)
     assert outputs.t[late][0] == pytest.approx(60.0 - 0.1 + 10.0, abs=0.2)
