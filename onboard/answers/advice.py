@@ -16,6 +16,7 @@ from onboard.answers.conditions import conditions
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
+from onboard.core.inputs.parameters import receiver_names
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.physics.catalogue import bearing_of
 from onboard.core.physics.effect import Bearing
@@ -24,8 +25,8 @@ from onboard.errors import PushError
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, Objection, PolicySettings, Refusal, objections
 
-FORMER_NAMES = {"GPS1_DELAY_MS": "GPS_DELAY_MS"} | {
-    f"GPS1_POS_{axis}": f"GPS_POS1_{axis}" for axis in "XYZ"
+FORMER_NAMES = {
+    now: former for receiver in (1, 2) for now, former in receiver_names(receiver).values()
 }
 """Of parameters before ArduPilot 4.6."""
 

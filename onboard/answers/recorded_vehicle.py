@@ -83,13 +83,18 @@ class Vehicle:
 
     def _same_device(self, imu: int, device: np.float32, recording: Recording) -> None:
         known, where = self._device.get(imu, (device, recording))
-        if known != device:
-            name = parameter_names(imu).device_id
-            told = f"{name} is {device:.0f}, there {known:.0f}"
-            of = f"another vehicle than {where.path} ({told})"
-            if where is recording:
-                of = f"more than one vehicle ({name} is {known:.0f}, and later {device:.0f})"
-            raise RecordingError(f"{recording.path}: of {of}")
+        if known == device:
+            return
+        name = parameter_names(imu).device_id
+        if where is recording:
+            raise RecordingError(
+                f"{recording.path}: of more than one vehicle "
+                f"({name} is {known:.0f}, and later {device:.0f})"
+            )
+        raise RecordingError(
+            f"{recording.path}: of another vehicle than {where.path} "
+            f"({name} is {device:.0f}, there {known:.0f})"
+        )
 
     def refuse(self, other: Vehicle) -> None:
         """See that others were not recordings of another vehicle.

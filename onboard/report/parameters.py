@@ -29,6 +29,7 @@ ULOG = "ulog"
 """Recordings that say what PX4 did to its accelerometer; its telemetry does not."""
 INTEGERS = {
     "GPS1_DELAY_MS": 4,
+    "GPS2_DELAY_MS": 4,
     "GPS_DELAY_MS": 4,
     "INS_ACCEL_FILTER": 4,
     "INS_TCAL": 2,

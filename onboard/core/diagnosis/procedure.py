@@ -98,6 +98,7 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
         antenna=(x, y, z),
         trim=calibrator.parameters.trim,
         imu=imu,
+        receiver=calibrator.parameters.receiver,
     )
 
 

@@ -337,6 +337,7 @@ class Calibrator:
         events = self._judged(fix)
         if self._trust.receiver not in (None, fix.receiver):
             return events
+        self.parameters.receiver = fix.receiver
         if before not in (None, fix.receiver):
             # What was saved holds the latency and the antenna of a receiver that is given up.
             self._counts["another_receiver"] += 1

@@ -27,7 +27,7 @@ from typing import Final
 
 import numpy as np
 
-from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.parameters import ParametersInForce, receiver_names
 from onboard.core.inputs.segments import Batch
 
 U_BLOX: Final = (0.12, 0.22)
@@ -88,12 +88,13 @@ def fix_clock(parameters: ParametersInForce, batches: Sequence[Batch]) -> FixClo
     configured, values = parameters.gps_delay_configured, parameters.values
     late = [c.fixes.late[c.trusted] for c in batches if len(c.fixes.late)]
     every = np.concatenate(late) if late else np.zeros(0)
-    kind = parameters.get("GPS1_TYPE", "GPS_TYPE", default=-1.0)
-    assumed = DRIVERS.get(int(kind), OTHERS) if kind >= 0.0 else ()
-    new = "GPS1_DELAY_MS" in values or "GPS_DELAY_MS" not in values
+    names = receiver_names(parameters.receiver)
+    kind = parameters.get(*names["TYPE"], default=-1.0)
+    assumed = DRIVERS.get(int(kind), OTHERS) if kind > 0.0 else ()
+    now, former = names["DELAY_MS"]
     return FixClock(
         float(every.mean()) if len(every) else 0.0,
         configured,
-        "GPS1_DELAY_MS" if new else "GPS_DELAY_MS",
+        former if former in values and now not in values else now,
         (configured,) if configured > 0.0 else assumed,
     )

@@ -13,6 +13,18 @@ from onboard.core.maths.board_orientation import board_rotation, is_axis_aligned
 DEFAULT_FILTER_HZ = 20.0
 
 
+def receiver_names(receiver: int) -> dict[str, tuple[str, str]]:
+    """Names of a receiver's parameters since ArduPilot 4.6, and before.
+
+    Keys are ``TYPE``, ``DELAY_MS``, ``X``, ``Y`` and ``Z``.  Of what is blended from several there
+    are none: it has those of the first.
+    """
+    k = receiver if receiver in (1, 2) else 1
+    former = "" if k == 1 else f"{k}"
+    place = {a: (f"GPS{k}_POS_{a}", f"GPS_POS{k}_{a}") for a in "XYZ"}
+    return place | {n: (f"GPS{k}_{n}", f"GPS_{n}{former}") for n in ("TYPE", "DELAY_MS")}
+
+
 def filter_delay(cutoff_hz: float) -> float:
     """Delay (s) of ArduPilot's two-pole Butterworth low-pass well below its cut-off.
 
@@ -27,6 +39,8 @@ class ParametersInForce:
     """What was last reported for each parameter, and what follows from it."""
 
     values: dict[str, float] = field(default_factory=dict)
+    receiver: int = 1
+    """The one that is watched."""
     _sixes: dict[int, SixParameters] = field(default_factory=dict)
     """By accelerometer, until another report: every inertial sample asks."""
 
@@ -110,9 +124,8 @@ class ParametersInForce:
     @property
     def antenna(self) -> Array:
         """(3,) configured position of the GPS antenna, body axes, m."""
-        return np.array(
-            [self.get(f"GPS1_POS_{a}", f"GPS_POS1_{a}", default=0.0) for a in "XYZ"], dtype=float
-        )
+        names = receiver_names(self.receiver)
+        return np.array([self.get(*names[a], default=0.0) for a in "XYZ"], dtype=float)
 
     def lever_arm(self, imu: int) -> Array:
         """(3,) configured lever arm: from the accelerometer to the antenna, body axes, m."""
@@ -134,4 +147,4 @@ class ParametersInForce:
     @property
     def gps_delay_configured(self) -> float:
         """Configured latency of the receiver, s (0: not configured)."""
-        return 1e-3 * self.get("GPS1_DELAY_MS", "GPS_DELAY_MS", default=0.0)
+        return 1e-3 * self.get(*receiver_names(self.receiver)["DELAY_MS"], default=0.0)

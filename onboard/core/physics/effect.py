@@ -70,6 +70,7 @@ class Origin:
         antenna: from the IMU, body axes, m.
         trim: AHRS_TRIM, rad.
         imu: which accelerometer, from 1.
+        receiver: of GPS, from 1.
     """
 
     t0: float
@@ -77,6 +78,7 @@ class Origin:
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0)
     trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
     imu: int = 1
+    receiver: int = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from onboard.core.inputs.parameters import receiver_names
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.pushing import limits
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
@@ -41,10 +42,13 @@ MEANING = (
 )
 """Change what the messages mean or what may be written; not every firmware has all."""
 KNOWLEDGE = (
-    "GPS1_DELAY_MS",
-    "GPS_DELAY_MS",
-    *(f"GPS1_POS_{axis}" for axis in "XYZ"),
-    *(f"GPS_POS1_{axis}" for axis in "XYZ"),
+    *(
+        name
+        for receiver in (1, 2)
+        for what, names in receiver_names(receiver).items()
+        if what != "TYPE"
+        for name in names
+    ),
     *(f"INS_POS{imu}_{axis}" for imu in IMUS for axis in "XYZ"),
     "FLIGHT_OPTIONS",
     "PTCH_TRIM_DEG",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from onboard.core.inputs.parameters import receiver_names
 from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import AXES, Bearing, Cure, Effect
@@ -28,7 +29,7 @@ class GpsLeverArm(Effect):
     bearing = Bearing.BESIDE
     instead_of = "antenna_place"
     source = "rigid body: v_antenna = v + R (w x r)"
-    cure = "measure the antenna's place and set GPS1_POS_*"
+    cure = "measure the antenna's place and set GPSn_POS_* of its receiver"
     apart = "pitch, roll and yaw quickly while GPS is good"
     keys = tuple(AXES)
     plausible = (5.0, 5.0, 5.0)
@@ -44,8 +45,9 @@ class GpsLeverArm(Effect):
 
     def cured(self, values: Mapping[str, float]) -> Cure:
         """Where the antenna is: as told, and what was found on top of it."""
+        names = receiver_names(self.origin.receiver)
         place = {
-            f"GPS1_POS_{a.upper()}": told + values[a]
+            names[a.upper()][0]: told + values[a]
             for a, told in zip(AXES, self.origin.antenna, strict=True)
         }
         return Cure(self.cure, place)
