@@ -158,11 +158,13 @@ def summed(
     """Sums by block about ``theta`` (m,), and what their scatter says of the variances."""
     residual = model.measured() - model.predicted(theta)
     jacobian = model.jacobian(theta)
-    block = np.floor((model.flight.t - model.flight.t[0]) / BLOCK_S)
-    of_row = block[windows_of(model.flight).first]
+    windows = windows_of(model.flight)
+    of_row = np.floor((model.flight.t[windows.first] - model.flight.t[0]) / BLOCK_S)
+    # A step is of the block that its row is counted in, wherever the next one begins.
+    block = np.repeat(of_row, windows.counts)
     level = _level(model, theta)
     rows = whitened_rows(model, residual, jacobian, noise, sensitivity, level)
-    part = model.flight.part[windows_of(model.flight).first]
+    part = model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
         mine = of_row == number

@@ -12,6 +12,8 @@ from onboard.core.maths.arrays import Array
 EMPTY = np.zeros(0)
 MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
 """SERVOn_FUNCTION of motors 1 to 12."""
+HELICOPTERS = (6.0, 11.0, 13.0)
+"""FRAME_CLASS of what has a swash plate, whose servos have the numbers of motors."""
 THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
 
 
@@ -75,8 +77,11 @@ class Signals:
 
     @property
     def motors(self) -> tuple[int, ...]:
-        """Channels of the motors; all that move where the recording has no parameters."""
-        if not len(self.outputs):
+        """Channels of the motors; all that move where the recording has no parameters.
+
+        None of a helicopter: its thrust is a matter of the blades' pitch.
+        """
+        if not len(self.outputs) or self.parameters.get("FRAME_CLASS") in HELICOPTERS:
             return ()
         if self.normalised:
             moving = np.std(np.nan_to_num(self.outputs.x), axis=0) > 0.0

@@ -31,7 +31,7 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
             factor = law_of.factor(m.model.start(flight), exponent)
     numbers, since = np.unique(fit.block), flight.since_start
     series, spread, when, heights, ekf, law = [], [], [], [], [], []
-    for block, block_number in zip(fit.blocks, numbers, strict=False):
+    for block, block_number in zip(fit.blocks, numbers, strict=True):
         mine = fit.block == block_number
         if not its[mine].all():
             continue

@@ -15,6 +15,7 @@ from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.gusts import positive_square, signed_square
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.recursion import accumulated, behind, lagged
+from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
 from onboard.core.vehicle.spans import grounded_spans, inside
 from tests.core.vehicle.flights import copter_flight
@@ -250,3 +251,13 @@ def test_a_lag_acts_in_proportion_to_its_length_through_none():
     np.testing.assert_allclose(lead, -late, atol=1e-9)
     assert np.abs(late).max() > 1e-3
     np.testing.assert_allclose(behind(x, 0.3, piece, 0.1), lagged(x, 0.3, piece, 0.1), atol=1e-9)
+
+
+def test_servos_of_a_swash_plate_are_no_motors():
+    """ArduPilot gives them the numbers of motors 1 to 3."""
+    functions = {f"SERVO{n}_FUNCTION": 32.0 + n for n in (1, 2, 3)}
+    outputs = Stream(np.arange(3.0), np.full((3, 4), 1500.0))
+    assert Signals(outputs=outputs, parameters=functions).motors == (0, 1, 2)
+    for frame in (6.0, 11.0, 13.0):
+        heli = functions | {"FRAME_CLASS": frame}
+        assert Signals(outputs=outputs, parameters=heli).motors == ()
