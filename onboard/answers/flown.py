@@ -20,7 +20,7 @@ from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
-from onboard.core.inputs.airborne import Ground
+from onboard.core.inputs.airborne import STILL_RATE_RAD_S, Ground
 from onboard.core.inputs.boot_time import began_anew
 from onboard.core.inputs.samples import (
     FIX_3D,
@@ -37,7 +37,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.signals import Signals, Stream
-from onboard.core.vehicle.spans import grounded_spans
+from onboard.core.vehicle.spans import grounded_spans, scatter_near
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
@@ -125,7 +125,7 @@ class Flown:
                     v,
                     height,
                     said=_said_to_stand(self._kept),
-                    carried=carried_by_rotors(self.signals(), t, v),
+                    carried=self._carried(t, v),
                     rolls=self.kind != "copter",
                     wings=self.kind == "plane",
                 )
@@ -134,6 +134,18 @@ class Flown:
         for sample in _with_landings(_slower(self._kept, step), self.grounded):
             self.recorded.feed(sample)
         return self.recorded.finish()
+
+    def _carried(self, t: Array, v_n: Array) -> Mask | None:
+        """(n,) where rotors carry the vehicle at fixes; None where nobody knows.
+
+        What stands in spite of them (its battery is empty, it lies on its back) does not turn.
+        """
+        lifted = carried_by_rotors(self.signals(), t, v_n)
+        turned = [(s.t, *s.w_b) for s in self._kept if isinstance(s, ImuSample) and s.w_b]
+        if lifted is None or len(turned) < 2:
+            return None
+        rows = np.array(turned)
+        return lifted & (scatter_near(t, rows[:, 0], rows[:, 1:]) > STILL_RATE_RAD_S)
 
     def answer(self, imu: int) -> Answer:
         """What the sensor level says."""

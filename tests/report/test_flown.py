@@ -9,15 +9,19 @@ from onboard.core.inputs.samples import GpsFix, ImuSample, Outputs, ParameterVal
 MOTORS = [ParameterValue(f"SERVO{n}_FUNCTION", 32.0 + n) for n in (1, 2, 3, 4)]
 
 
-def hop(*, cruise=1500.0, motors=True, begin=0.0, end=60.0, height=1.2):
-    """A copter in a room: stands for 10 s, hovers for 5, flies to and fro, hovers, stands."""
+def hop(*, cruise=1500.0, motors=True, begin=0.0, end=60.0, height=1.2, turns=0.05):
+    """A copter in a room: stands for 10 s, hovers for 5, flies to and fro, hovers, stands.
+
+    Held by its controller it turns by ``turns``, rad/s RMS, about each axis.
+    """
     out = [VehicleState(begin, kind="copter"), *MOTORS]
     rng = np.random.default_rng(3)
     for t in np.arange(begin, end, 0.1).tolist():
         aloft = 10.0 <= t < 50.0
         v = 0.7 * np.sin(t) if 15.0 <= t < 45.0 else 0.0
         up = height * float(np.interp(t, [9.0, 10.0, 50.0, 51.0], [0.0, 1.0, 1.0, 0.0]))
-        out.append(ImuSample(t, 1, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
+        w_b = tuple(turns * aloft * rng.standard_normal(3))
+        out.append(ImuSample(t, 1, (0.0, 0.0, -9.81), w_b))
         if motors:
             pulse = cruise + 20.0 * rng.standard_normal() if aloft else 1100.0
             out.append(Outputs(t, (pulse,) * 4))
@@ -48,6 +52,11 @@ def test_a_low_hover_is_no_ground_where_the_rotors_carry_it(cruise):
 def test_without_outputs_the_height_decides():
     """As low as the ground, and still: nobody knows that it hovers."""
     assert standing(found(hop(motors=False)), 12.0)
+
+
+def test_what_does_not_turn_stands_whatever_its_motors_do():
+    """Its battery is empty, or it lies on its back."""
+    assert standing(found(hop(turns=0.0)), 12.0)
 
 
 def test_a_recording_that_begins_and_ends_in_a_hover_has_no_ground():

@@ -81,6 +81,30 @@ def _climb(t: Array, height: Array) -> Array:
     return out
 
 
+def scatter_near(t: Array, times: Array, x: Array) -> Array:
+    """(n,) root of the variance of a vector within half a second of ``t`` (n,).
+
+    Args:
+        t: (n,) s.
+        times: (m,) s, of the vector.
+        x: (m, d) it; where there is none the variance is zero.
+    """
+    order = np.argsort(times, kind="stable")
+    times, x = times[order], x[order] - np.mean(x, axis=0)
+    begin = np.searchsorted(times, t - 0.5 * STILL_S)
+    end = np.searchsorted(times, t + 0.5 * STILL_S)
+    count = np.maximum(end - begin, 1)[:, None]
+
+    def mean(of: Array) -> Array:
+        summed = np.concatenate([np.zeros((1, of.shape[1])), np.cumsum(of, axis=0)])
+        out: Array = (summed[end] - summed[begin]) / count
+        return out
+
+    variance = np.sum(mean(x * x) - mean(x) ** 2, axis=1)
+    out: Array = np.sqrt(np.maximum(variance, 0.0))
+    return out
+
+
 def inside(t: Array, spans: list[tuple[float, float]]) -> Mask:
     """(n,) whether times lie in one of the spans."""
     out = np.zeros(len(t), dtype=bool)
