@@ -42,7 +42,7 @@ class Cleared:
 
 def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin: Origin) -> Cleared:
     """Leave out what was clipped and which fixes are false, for no sums may hold them."""
-    rail = saturation_effect(flight, origin.t0, origin.imu)
+    rail = saturation_effect(flight, origin.t0)
     batches = flight
     if rail is not None:
         batches = unclipped(batches, rail.intervals, origin.t0)

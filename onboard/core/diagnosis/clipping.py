@@ -15,30 +15,27 @@ from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
 
 
-def saturation_effect(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:
+def saturation_effect(batches: Sequence[Batch], t0: float) -> Finding | None:
     """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
 
     Args:
         batches: the flight.
         t0: first sample, s.
-        imu: which accelerometer, from 1.
     """
     if not batches:
         return None
-    return _stuck(batches, t0) or _counted(batches, t0, imu)
+    return _stuck(batches, t0) or _counted(batches, t0)
 
 
-def _counted(batches: Sequence[Batch], t0: float, imu: int) -> Finding | None:
+def _counted(batches: Sequence[Batch], t0: float) -> Finding | None:
     """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
     names = [c.segment.slow["clipping"] for c in batches if "clipping" in c.segment.slow]
     if not names:
         return None
     t = np.concatenate([x[0] for x in names])
-    counts = np.concatenate([np.atleast_2d(x[1].T).T for x in names])
-    if imu > counts.shape[1]:
-        return None
+    counts = np.concatenate([x[1] for x in names])
     t, first = np.unique(t, return_index=True)
-    rise = np.diff(counts[first, imu - 1])
+    rise = np.diff(counts[first])
     hit = np.flatnonzero(rise >= FEWEST_CLIPPED)
     if len(hit) < 2:
         return None

@@ -28,7 +28,7 @@ SLOW_SIGNALS = {
     "temperature": "of the accelerometer, degC",
     "throttle": "0 to 1",
     "vibration": "(j, 3) level by axis, m/s^2",
-    "clipping": "samples at the rail since boot, by accelerometer",
+    "clipping": "samples at the rail since boot",
     "airspeed": "m/s",
 }
 """Names of the slow signals that a recording may have, and what they are."""

@@ -142,8 +142,9 @@ class Streams:
         if isinstance(sample, Vibration):
             name = "vibration" if sample.imu is None else f"vibration_{sample.imu}"
             self._add(name, sample.t, sample.level)
-            if sample.clipping:
-                self._add("clipping", sample.t, tuple(float(n) for n in sample.clipping))
+            # One counter of the accelerometer that the record names, or one of each.
+            for imu, count in enumerate(sample.clipping, sample.imu or 1):
+                self._add(f"clipping_{imu}", sample.t, (float(count),))
         elif isinstance(sample, Throttle):
             self._add("throttle", sample.t, (sample.throttle,))
         elif sample.airspeed is not None:
@@ -168,13 +169,11 @@ class Streams:
         return out
 
     def slow_arrays(self, imu: int) -> dict[str, tuple[Array, Array]]:
-        """Times (j,) and values (j,) or (j, d) of slow signals, vibration of this accelerometer."""
+        """Times (j,) and values (j,) or (j, d) of slow signals, those of this accelerometer."""
         every = {name: s.arrays() for name, s in self.slow.items() if len(s) > 1}
         flat = {n: (a, x[:, 0] if x.shape[1] == 1 else x) for n, (a, x) in every.items()}
-        own = f"vibration_{imu}"
-        if own in flat:
-            flat["vibration"] = flat[own]
-        return flat
+        own = {name: f"{name}_{imu}" for name in ("vibration", "clipping")}
+        return flat | {name: flat[its] for name, its in own.items() if its in flat}
 
     def forget_imu(self, imu: int) -> None:
         """Forget what waits of one accelerometer, but not what was refused of it."""

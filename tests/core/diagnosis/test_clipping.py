@@ -5,6 +5,8 @@ import pytest
 
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.limits import FEWEST_CLIPPED
+from onboard.core.inputs.samples import Vibration
+from onboard.core.inputs.streams import Streams
 from tests.core.diagnosis.flights import G, batches, flown, resting
 
 T0 = 100.0
@@ -28,7 +30,7 @@ def test_a_rail_is_found_with_its_axis_its_limit_and_its_times(axis, sign, limit
     spans = [(12.0, 12.6), (31.0, 31.8)]
     raw = burst(flown(rng, 60.0), axis, sign * 80.0, *spans)
     clipped = np.clip(raw, -limit, limit)
-    found = saturation_effect(batches(clipped), T0, 1)
+    found = saturation_effect(batches(clipped), T0)
     assert found.unknowns["limit"].value == pytest.approx(limit)
     assert len(found.intervals) == 2
     for (a, b), (begin, end) in zip(found.intervals, spans, strict=True):
@@ -41,7 +43,7 @@ def test_the_axis_is_the_bodys_where_the_board_is_turned():
     """Sensor x is body y: a board turned by 90 degrees."""
     R_bs = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     raw = burst(flown(np.random.default_rng(3), 40.0), 0, 80.0, (20.0, 20.8))
-    found = saturation_effect(batches(np.clip(raw, -LIMIT, LIMIT), R_bs=R_bs), T0, 1)
+    found = saturation_effect(batches(np.clip(raw, -LIMIT, LIMIT), R_bs=R_bs), T0)
     assert {w.axis for w in found.where} == {"body_y"}
 
 
@@ -51,7 +53,7 @@ def test_two_knocks_of_a_sample_or_two_are_no_rail():
     raw = np.clip(burst(flown(rng, 40.0), 2, 60.0, *knocks), -LIMIT, LIMIT)
     # 16 samples at the rail, but never four on end: nothing of the trajectory is lost.
     assert np.sum(np.abs(raw[:, 2]) >= LIMIT) >= 16
-    assert saturation_effect(batches(raw), T0, 1) is None
+    assert saturation_effect(batches(raw), T0) is None
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -62,7 +64,7 @@ def test_no_flight_without_a_rail_has_one(seed, step):
     raw = flown(rng, 60.0)
     if step:
         raw = np.round(raw / step) * step
-    assert saturation_effect(batches(raw), T0, 1) is None
+    assert saturation_effect(batches(raw), T0) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3, 0.01, 0.1])
@@ -73,22 +75,22 @@ def test_standing_is_no_rail_however_still_and_however_coarse(noise, step, seed)
     rng = np.random.default_rng(seed)
     raw = resting(rng, 60.0, noise=noise) * rng.uniform(0.98, 1.02, 3)
     raw = np.round((raw + rng.uniform(-0.2, 0.2, 3)) / step) * step
-    assert saturation_effect(batches(raw), T0, 1) is None
+    assert saturation_effect(batches(raw), T0) is None
 
 
 def test_no_flight_is_no_finding():
-    assert saturation_effect([], T0, 1) is None
+    assert saturation_effect([], T0) is None
 
 
 # -- clipping that the autopilot counts -------------------------------------------------------
 
 
-def counted(rises, *, imus=1, imu=1, seconds=60, base=7):
+def counted(rises, *, seconds=60, base=7):
     """Slow signal: counts at 1 Hz that rise by so much in the second that ends at each time."""
     t = T0 + np.arange(float(seconds + 1))
-    counts = np.full((len(t), imus), float(base))
+    counts = np.full(len(t), float(base))
     for at, rise in rises.items():
-        counts[at:, imu - 1] += rise
+        counts[at:] += rise
     return {"clipping": (t, counts)}
 
 
@@ -105,7 +107,7 @@ def softened(rng, spans, peak):
 def test_counted_clipping_spans_the_reports_between_which_it_rose():
     raw = softened(np.random.default_rng(5), [(20.1, 21.9), (40.1, 40.9)], 30.0)
     slow = counted({21: 30, 22: 12, 41: 8})
-    found = saturation_effect(batches(raw, slow=slow), T0, 1)
+    found = saturation_effect(batches(raw, slow=slow), T0)
     assert found.intervals == ((20.0, 22.0), (40.0, 41.0))
     limit = found.unknowns["limit"]
     assert abs(limit.value - 30.0) < 2.0 * limit.sigma
@@ -113,20 +115,31 @@ def test_counted_clipping_spans_the_reports_between_which_it_rose():
     assert {w.axis for w in found.where} == {"body_y"}
 
 
-def test_a_count_of_another_accelerometer_is_not_this_ones():
+@pytest.mark.parametrize("named", [True, False])
+def test_a_count_of_another_accelerometer_is_not_this_ones(named):
+    """Logs have a record of each, all of one time; telemetry has one message with all of them."""
+    streams = Streams()
+    t, counts = counted({21: 30, 22: 12})["clipping"]
+    for at, count in zip(t.tolist(), counts.astype(int).tolist(), strict=True):
+        if named:
+            streams.signal(Vibration(at, (1.0, 1.0, 1.0), (count,), 2))
+            streams.signal(Vibration(at, (1.0, 1.0, 1.0), (7,), 3))
+        else:
+            streams.signal(Vibration(at, (1.0, 1.0, 1.0), (7, count, 7)))
     raw = softened(np.random.default_rng(6), [(20.1, 21.9)], 30.0)
-    slow = counted({21: 30, 22: 12}, imus=2, imu=2)
-    flight = batches(raw, slow=slow)
-    assert saturation_effect(flight, T0, 1) is None
-    assert saturation_effect(flight, T0, 2).intervals == ((20.0, 22.0),)
-    assert saturation_effect(flight, T0, 3) is None
+    told = {}
+    for imu in (1, 2, 3, 4):
+        slow = {k: v for k, v in streams.slow_arrays(imu).items() if k == "clipping"}
+        told[imu] = saturation_effect(batches(raw, slow=slow), T0)
+    assert told[2].intervals == ((20.0, 22.0),)
+    assert told[1] is told[3] is told[4] is None
 
 
 def test_counts_from_before_the_flight_single_knocks_and_reboots_are_none():
     raw = flown(np.random.default_rng(7), 60.0)
 
     def found(rises):
-        return saturation_effect(batches(raw, slow=counted(rises)), T0, 1)
+        return saturation_effect(batches(raw, slow=counted(rises)), T0)
 
     assert found({}) is None
     assert found({30: 400}) is None  # one knock, however hard
@@ -142,4 +155,4 @@ def test_reports_that_two_batches_share_are_counted_once():
     flight = batches(raw, slow=slow, length_s=2.0)
     seen = np.concatenate([b.segment.slow["clipping"][0] for b in flight])
     assert len(np.unique(seen)) < len(seen)
-    assert saturation_effect(flight, T0, 1).intervals == (pytest.approx((9.1, 11.1)),)
+    assert saturation_effect(flight, T0).intervals == (pytest.approx((9.1, 11.1)),)

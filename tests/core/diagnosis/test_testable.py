@@ -13,7 +13,7 @@ SIGNALS = {
     "throttle": lambda t: 0.4 + 0.2 * np.sin(t),
     "vibration": lambda t: np.stack([1.0 + 0.5 * np.sin(t + i) for i in range(3)], axis=-1),
     "airspeed": lambda t: 15.0 + 3.0 * np.sin(t / 5.0),
-    "clipping": lambda t: np.zeros((len(t), 1)),
+    "clipping": lambda t: np.zeros(len(t)),
 }
 EVERYTHING = catalogue(Origin(100.0))
 
