@@ -255,9 +255,14 @@ def _fixes(taken: Sequence[GpsFix], t: Array) -> Fixes:
 
 def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:
     """Whether the vehicle stands, as far as one of its gyroscopes and GPS can tell."""
-    stamps, rows = live[min(live)].arrays()
-    during = (stamps >= fixes.t[0]) & (stamps <= fixes.t[-1])
-    return still(fixes.v_n, rows[during, :3])
+    told = []
+    for imu in sorted(live):
+        stamps, rows = live[imu].arrays()
+        during = (stamps >= fixes.t[0]) & (stamps <= fixes.t[-1])
+        told.append(rows[during, :3])
+        if not np.any(stuck(stamps[during], told[-1])):
+            return still(fixes.v_n, told[-1])
+    return still(fixes.v_n, told[0])
 
 
 def mean_step(t: Array) -> float:
@@ -292,12 +297,18 @@ def _needed(t: Array, epochs: Array) -> slice:
 def _with_rates(
     imu: int, live: dict[int, ImuTrack], at: Array, rows: Array, parameters: ParametersInForce
 ) -> tuple[int, Array]:
-    """Whose gyroscope it is, and rows with its rates instead of the accelerometer's own."""
-    first = min(live)
-    if imu == first or parameters.one_chip(imu):
-        return imu, rows
-    w = rates_at(live[first], at, IMU_GAP_S)
-    return (imu, rows) if w is None else (first, np.hstack([w, rows[:, 3:]]))
+    """Whose gyroscope it is, and rows with its rates instead of the accelerometer's own.
+
+    One that repeats a reading has measured nothing: the next that does carries its flight.
+    """
+    alone = parameters.one_chip(imu)
+    for gyro in sorted(live, key=lambda other: (alone and other != imu, other)):
+        if gyro == imu and not np.any(stuck(at, rows[:, :3])):
+            break
+        w = None if gyro == imu else rates_at(live[gyro], at, IMU_GAP_S)
+        if w is not None:
+            return gyro, np.hstack([w, rows[:, 3:]])
+    return imu, rows
 
 
 def _attitude(angles: Array, parameters: ParametersInForce, *, over_mavlink: bool) -> Attitudes:

@@ -1,4 +1,4 @@
-"""An accelerometer that repeats one reading: it measures nothing."""
+"""A sensor that repeats one reading: it measures nothing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def stuck(t: Array, f: Array) -> Mask:
 
     Args:
         t: (n,) s.
-        f: (n, 3) force as reported, or any one-to-one function of it.
+        f: (n, 3) force or rates as reported, or any one-to-one function of them.
     """
     if not len(t):
         return np.zeros(0, dtype=bool)

@@ -134,3 +134,31 @@ def test_rates_are_those_at_the_other_sensors_times():
 )
 def test_rates_that_do_not_cover_the_flight_are_not_used(times):
     assert rates_at(track(times), np.arange(1.0, 3.0, 0.02), 0.25) is None
+
+
+@pytest.mark.slow
+def test_a_gyroscope_that_repeats_one_reading_carries_nobody(flight):
+    """The first IMU dies in flight with its last readings: the second is calibrated as it was."""
+    times = [s.t for s in flight if isinstance(s, ImuSample)]
+    died, last = 0.5 * (times[0] + times[-1]), {}
+
+    def dead(sample):
+        if not isinstance(sample, ImuSample) or sample.t < died:
+            return sample
+        kept = last.setdefault("reading", sample)
+        return replace(sample, f_b=kept.f_b, w_b=kept.w_b)
+
+    def both(change):
+        made = Calibrator()
+        for sample in flight:
+            made.feed(change(sample))
+            if isinstance(sample, ImuSample):
+                made.feed(replace(sample, imu=2))
+        made.finish()
+        return made.calibration(2)
+
+    whole, without = both(lambda sample: sample), both(dead)
+    sigma = np.array(without.scale_sigma)
+    assert np.all(np.abs(np.subtract(without.scale, whole.scale)) < 2.0 * sigma)
+    assert np.all(sigma < 1.6 * np.array(whole.scale_sigma))
+    assert without.trusted_s == pytest.approx(whole.trusted_s, abs=6.0)
