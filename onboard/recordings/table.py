@@ -8,7 +8,7 @@ different rates fit into one table.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
@@ -75,9 +75,9 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     """
     path, chosen = Path(path), load_map(columns)
     wanted = list(dict.fromkeys(c for q in chosen.quantities.values() for c in q.columns))
-    cells = _read(path, wanted)
+    cells, lines = _read(path, wanted)
     with np.errstate(all="ignore"):  # a cell may hold any number
-        tracks = _tracks(path, cells, chosen)
+        tracks = _tracks(path, cells, lines, chosen)
         samples = _samples(tracks, chosen)
     counts = {name: len(track.t) for name, track in tracks.items()}
     return Recording(
@@ -93,8 +93,8 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     )
 
 
-def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
-    """The wanted columns, NaN where a cell holds no number."""
+def _read(path: Path, wanted: list[str]) -> tuple[dict[str, Array], Array]:
+    """The wanted columns, NaN where a cell holds no number; and the line of each row."""
     if path.exists() and not path.is_file():
         raise RecordingError(f"{path}: is not a regular file")
     try:
@@ -107,9 +107,10 @@ def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
                 there = ", ".join(names[:20])
                 raise RecordingError(f"{path}: has no column {missing[0]!r} (there: {there})")
             places = [names.index(name) for name in wanted]
-            rows = [
-                [_cell(row[k]) if k < len(row) else np.nan for k in places]
-                for row in csv.reader(file, delimiter=delimiter)
+            reader = csv.reader(file, delimiter=delimiter)
+            rows = [  # the head is line one, of which this reader does not know
+                [reader.line_num + 1, *(_cell(row[k]) if k < len(row) else np.nan for k in places)]
+                for row in reader
                 if row
             ]
     except FileNotFoundError:
@@ -121,7 +122,7 @@ def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
     if len(rows) < FEWEST_ROWS:
         raise RecordingError(f"{path}: {len(rows)} rows are too few for a flight")
     every = np.array(rows, dtype=np.float64)
-    return {name: every[:, k] for k, name in enumerate(wanted)}
+    return {name: every[:, k] for k, name in enumerate(wanted, 1)}, every[:, 0]
 
 
 def _cell(text: str) -> float:
@@ -135,21 +136,29 @@ def _cell(text: str) -> float:
         return float("nan")
 
 
-def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, Track]:
+def _tracks(
+    path: Path, cells: dict[str, Array], lines: Array, chosen: TableMap
+) -> dict[str, Track]:
     """Each quantity in SI at the rows that have all of it, in order of time."""
     clock = chosen.quantities["time"]
     t = clock.factor * cells[clock.columns[0]]
+    values = {
+        name: quantity.factor * np.column_stack([cells[c] for c in quantity.columns])
+        for name, quantity in chosen.quantities.items()
+        if name != "time"
+    }
+    rows = {
+        name: np.flatnonzero(np.isfinite(x).all(axis=1) & np.isfinite(t))
+        for name, x in values.items()
+    }
+    _forward(path, t, rows.values(), lines, clock.columns[0])
     out: dict[str, Track] = {}
-    for name, quantity in chosen.quantities.items():
-        if name == "time":
-            continue
-        x = quantity.factor * np.column_stack([cells[c] for c in quantity.columns])
-        seen = np.isfinite(x).all(axis=1) & np.isfinite(t)
-        its, first = np.unique(t[seen], return_index=True)
+    for name, x in values.items():
+        its, first = np.unique(t[rows[name]], return_index=True)
         if name in ("attitude", "force", "velocity", "position") and len(its) < FEWEST_ROWS:
-            where = ", ".join(quantity.columns)
+            where = ", ".join(chosen.quantities[name].columns)
             raise RecordingError(f"{path}: {len(its)} rows with a number in {where} are no flight")
-        out[name] = Track(its, x[seen][first])
+        out[name] = Track(its, x[rows[name]][first])
     # The clock starts at zero: nanoseconds since 1970 would leave no digits for a difference.
     zero = min(float(track.t[0]) for track in out.values() if len(track.t))
     out = {name: Track(track.t - zero, track.x) for name, track in out.items()}
@@ -159,6 +168,22 @@ def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, 
     if max(float(track.t[-1]) for track in out.values() if len(track.t)) > LONGEST_S:
         raise RecordingError(f"{path}: a flight of more than a year by {where}")
     return out
+
+
+def _forward(
+    path: Path, t: Array, rows: Iterable[NDArray[np.intp]], lines: Array, clock: str
+) -> None:
+    """See to it that the time of no quantity goes back; each may stand in rows of its own.
+
+    Sorted, the runs of a clock that began anew would be one flight of two vehicles.
+    """
+    back = [k[late] for k in rows if len(late := np.flatnonzero(np.diff(t[k]) < 0.0) + 1)]
+    if back:
+        line = lines[min(int(k[0]) for k in back)]
+        raise RecordingError(
+            f"{path}: line {line:.0f}: {clock} goes back: sort the rows by time, or cut the table "
+            "where its clock begins anew"
+        )
 
 
 def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterator[Sample]]:

@@ -232,3 +232,37 @@ def test_the_map_of_the_manual_is_one(columns):
     assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"} - {"throttle", "rudder"}
     assert chosen.quaternion
     assert chosen.airborne
+
+
+def twice(table, later):
+    """The rows of a table, and again from ``later`` s on; the line of the first of these."""
+    head, *rows = table.read_text().splitlines()
+    parted = [row.split(",", 1) for row in rows]
+    shifted = [f"{float(t) + 1e3 * later},{rest}" for t, rest in parted]
+    table.write_text("\n".join([head, *rows, *shifted]) + "\n")
+    return len(rows) + 2
+
+
+def test_a_clock_that_begins_anew_is_refused_with_its_line(table, columns):
+    """Between the times of the first run and at the same ones: neither is one flight."""
+    whole = table.read_text()
+    for later in (0.0, 0.0005):
+        table.write_text(whole)
+        line = twice(table, later)
+        with pytest.raises(RecordingError, match=f"flight.csv: line {line}: t_ms goes back"):
+            open_table(table, columns())
+
+
+def test_a_clock_that_goes_on_is_one_flight(table, columns):
+    twice(table, 0.02 * N)
+    assert open_table(table, columns()).duration_s == pytest.approx(0.02 * (2 * N - 1))
+
+
+def test_quantities_may_stand_one_below_the_other(table, columns):
+    """As tables are that were joined: each has an order of its own, and blank lines are none."""
+    text = columns()
+    before = list(open_table(table, text).samples())
+    head, *rows = table.read_text().splitlines()
+    which = {row: tuple(cell != "" for cell in row.split(",")[1:]) for row in rows}
+    table.write_text("\n".join([head, *sorted(rows, key=lambda row: which[row])]) + "\n\n")
+    assert list(open_table(table, text).samples()) == before
