@@ -83,7 +83,8 @@ class TableMap:
         derived: whether it is the slope of the velocity, so that there is no accelerometer.
         low_pass: cut-off (Hz) of the second-order filters that force and rates went through; 0 is
             none.
-        motor_range: what the motors are at idle and at full; None: as the unit says.
+        motor_range: what the motors are at idle and at full, in SI as they are; None: as the unit
+            says.
         wind_sigma: of a wind that was measured, m/s.
         vehicle: ``copter``, ``plane`` or empty.
         airborne: whether all of the table is flight: then no ground is looked for.
@@ -252,4 +253,6 @@ def _range(motors: Mapping[str, Any]) -> tuple[float, float] | None:
     low, high = (_number({"range": v}, "range", 0.0, "motors.") for v in given)
     if not low < high:
         raise ValueError("motors.range must rise")
-    return low, high
+    # In the unit of the columns, which are SI by the time that they are asked.
+    factor = UNITS["motors"][_word(motors, "unit", tuple(UNITS["motors"]), "motors.")]
+    return factor * low, factor * high

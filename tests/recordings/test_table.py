@@ -21,7 +21,7 @@ from onboard.core.inputs.samples import (
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.errors import ConfigurationError, RecordingError
 from onboard.recordings.table import open_table
-from onboard.recordings.table_map import WIDTHS, load_map
+from onboard.recordings.table_map import UNITS, WIDTHS, load_map
 from tests.recordings.table_writer import MAP, MOTORS, cells, moving, write_table
 
 ANGLES = (0.1, -0.2, 0.7)
@@ -184,6 +184,15 @@ unit = "%"
     assert {p.name: p.value for p in told}["SERVO2_FUNCTION"] == 21
     # 1150 and 1550 % in the table: pulses of 1 ms and a half more for all of them.
     assert samples(table, columns(text), Outputs)[0].values == (12_500.0, 9_250.0)
+
+
+@pytest.mark.parametrize("unit", UNITS["motors"])
+def test_idle_and_full_of_the_motors_are_in_the_unit_of_the_columns(table, columns, unit):
+    """The fraction of the way from idle to full knows no unit."""
+    text = MAP + MOTORS.replace("range", f'unit = "{unit}"\nrange')
+    out = samples(table, columns(text), Outputs)[0]
+    assert out.normalised
+    assert out.values == pytest.approx((0.0, 0.5, 1.0, 1.0))
 
 
 def test_a_rudder_without_throttle_is_refused(table, columns):
