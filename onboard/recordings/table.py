@@ -78,7 +78,7 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     cells, lines = _read(path, wanted)
     with np.errstate(all="ignore"):  # a cell may hold any number
         tracks = _tracks(path, cells, lines, chosen)
-        samples = _samples(tracks, chosen)
+        samples = _samples(path, tracks, chosen)
     counts = {name: len(track.t) for name, track in tracks.items()}
     return Recording(
         path,
@@ -186,7 +186,9 @@ def _forward(
         )
 
 
-def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterator[Sample]]:
+def _samples(
+    path: Path, tracks: dict[str, Track], chosen: TableMap
+) -> Callable[[], Iterator[Sample]]:
     """What reads the tracks as samples in order of time."""
     R_nb = _rotations(tracks["attitude"], chosen)
     t = tracks["attitude"].t
@@ -202,7 +204,7 @@ def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterato
             for a, e in zip(t, np.column_stack(euler_from_rotation(R_nb)), strict=True)
         ],
         _imu(tracks, Track(t, R_nb), chosen),
-        _fixes(tracks, chosen),
+        _fixes(path, tracks, chosen),
         _outputs(tracks, chosen),
         *_of_a_plane(tracks),
         _battery(tracks),
@@ -269,7 +271,7 @@ def _rates(tracks: dict[str, Track], attitude: Track, chosen: TableMap, t: Array
     return np.column_stack([np.interp(t, known, x[:, k]) for k in range(3)])
 
 
-def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
+def _fixes(path: Path, tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
     """Velocity and place as a receiver would report them."""
     position = tracks.get("position")
     p = None if position is None else position.x @ chosen.world.T
@@ -277,6 +279,9 @@ def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
         t, v = tracks["velocity"].t, tracks["velocity"].x @ chosen.world.T
     elif position is not None and p is not None:
         t, v = _slope(position.t, p)
+        if not len(t):
+            where = ", ".join(chosen.quantities["position"].columns)
+            raise RecordingError(f"{path}: {where} last too short for a velocity ({SLOPE_S:g} s)")
     else:
         return []
     keep = _thinned(t, chosen.fix_rate)
@@ -304,7 +309,8 @@ def _slope(t: Array, p: Array) -> tuple[Array, Array]:
     there = late < len(t)
     early, late = early[there], late[there]
     span = t[late] - t[early]
-    whole = span < 3.0 * SLOPE_S  # a gap is no velocity
+    # A gap is no velocity: three times as long as a span at the rate of the table, or longer.
+    whole = span < 3.0 * max(SLOPE_S, float(np.median(np.diff(t))))
     early, late, span = early[whole], late[whole], span[whole]
     return 0.5 * (t[late] + t[early]), (p[late] - p[early]) / span[:, None]
 

@@ -124,6 +124,43 @@ def test_a_position_alone_becomes_a_velocity(table, columns):
         assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-5)
 
 
+@pytest.mark.parametrize("step", [0.02, 0.5, 2.0])
+def test_a_position_of_any_rate_becomes_a_velocity_and_a_gap_does_not(tmp_path, columns, step):
+    """Empty cells between, as of a receiver; and twenty steps that nobody measured."""
+    fixes, gap = slow(tmp_path, columns, step, n=60)
+    assert len(fixes) > 30 if step >= 0.1 else fixes
+    for fix in fixes:
+        assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-5)
+        assert not gap[0] < fix.t < gap[1]
+
+
+def slow(tmp_path, columns, step, n):
+    """Fixes of a table with a position every ``step`` s, and when it has none, s."""
+    times, gap = 0.02 * np.arange(n * round(50 * step)), (20 * step, 40 * step)
+    rows = []
+    for k, t in enumerate(times):
+        still = cells(AttitudeSample(t, *ANGLES)) | cells(ImuSample(t, 1, FORCE, RATES))
+        there = k % round(50 * step) == 0 and not gap[0] < t < gap[1]
+        place = moving(t, VELOCITY, tuple(t * v for v in VELOCITY))[1] if there else {}
+        rows.append((t, still | {name: place[name] for name in ("e", "n", "u") if place}))
+    write_table(rows, tmp_path / "slow.csv")
+    text = MAP.replace('[velocity]\ncolumns = ["ve", "vn", "vu"]\n', "")
+    return samples(tmp_path / "slow.csv", columns(text), GpsFix), gap
+
+
+def test_a_position_that_lasts_no_span_of_a_velocity_is_named(tmp_path, columns):
+    """Twenty rows of a kilohertz: enough of them, but no flight."""
+    rows = []
+    for k in range(400):
+        t = 0.001 * k
+        still = cells(AttitudeSample(t, *ANGLES)) | cells(ImuSample(t, 1, FORCE, RATES))
+        rows.append((t, still | (moving(t, VELOCITY, VELOCITY)[1] if k < 50 else {})))
+    write_table(rows, tmp_path / "short.csv")
+    text = MAP.replace('[velocity]\ncolumns = ["ve", "vn", "vu"]\n', "")
+    with pytest.raises(RecordingError, match=r"short\.csv: e, n, u last too short"):
+        open_table(tmp_path / "short.csv", columns(text))
+
+
 def test_acceleration_is_given_what_an_accelerometer_feels(table, columns):
     text = MAP.replace('unit = "g"', 'unit = "g"\nkind = "acceleration"')
     f = samples(table, columns(text), ImuSample)[5].f_b
