@@ -8,7 +8,7 @@ different rates fit into one table.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
@@ -36,6 +36,7 @@ from onboard.core.maths.frames import (
     rotation_from_quaternion,
     vector_from_rotation,
 )
+from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording, elapsed_s
@@ -192,6 +193,7 @@ def _samples(
     """What reads the tracks as samples in order of time."""
     R_nb = _rotations(tracks["attitude"], chosen)
     t = tracks["attitude"].t
+    fixes = _fixes(path, tracks, chosen)
     streams: list[list[Sample]] = [
         [VehicleState(0.0, armed=True, kind=chosen.vehicle)],
         # Without these, an ordinary autopilot's filters would be taken for granted.
@@ -204,16 +206,12 @@ def _samples(
             for a, e in zip(t, np.column_stack(euler_from_rotation(R_nb)), strict=True)
         ],
         _imu(tracks, Track(t, R_nb), chosen),
-        _fixes(path, tracks, chosen),
+        [*fixes],
         _outputs(tracks, chosen),
         *_of_a_plane(tracks),
         _battery(tracks),
+        _airspeeds(tracks, fixes, chosen),
     ]
-    if "airspeed" in tracks:
-        its = tracks["airspeed"]
-        streams.append(
-            [AirData(float(a), float(v)) for a, v in zip(its.t, its.x[:, 0], strict=True)]
-        )
     if "wind" in tracks:
         its = tracks["wind"]
         level = np.column_stack([its.x, np.zeros(len(its.x))]) @ chosen.world.T
@@ -271,7 +269,7 @@ def _rates(tracks: dict[str, Track], attitude: Track, chosen: TableMap, t: Array
     return np.column_stack([np.interp(t, known, x[:, k]) for k in range(3)])
 
 
-def _fixes(path: Path, tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
+def _fixes(path: Path, tracks: dict[str, Track], chosen: TableMap) -> list[GpsFix]:
     """Velocity and place as a receiver would report them."""
     position = tracks.get("position")
     p = None if position is None else position.x @ chosen.world.T
@@ -313,6 +311,18 @@ def _slope(t: Array, p: Array) -> tuple[Array, Array]:
     whole = span < 3.0 * max(SLOPE_S, float(np.median(np.diff(t))))
     early, late, span = early[whole], late[whole], span[whole]
     return 0.5 * (t[late] + t[early]), (p[late] - p[early]) / span[:, None]
+
+
+def _airspeeds(tracks: dict[str, Track], fixes: Sequence[GpsFix], chosen: TableMap) -> list[Sample]:
+    """Equivalent airspeeds, which is what an autopilot's sensor tells."""
+    its = tracks.get("airspeed")
+    if its is None:
+        return []
+    v = its.x[:, 0]
+    if chosen.true_airspeed:  # the same pressure at sea level, by the height that is flown
+        height = np.interp(its.t, [f.t for f in fixes], [f.altitude for f in fixes])
+        v = v * np.sqrt(density(height) / SEA_LEVEL_DENSITY)
+    return [AirData(float(a), float(b)) for a, b in zip(its.t, v, strict=True)]
 
 
 def _thinned(t: Array, rate: float) -> NDArray[np.intp]:

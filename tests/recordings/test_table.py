@@ -98,6 +98,43 @@ def test_a_wind_that_was_measured_is_turned_to_north_and_east(table, columns):
         assert air.wind_sigma == pytest.approx(0.25)
 
 
+AIRSPEED = """
+[airspeed]
+column = "m1"
+unit = "cm/s"
+
+[origin]
+altitude = 2000
+"""
+ROOT_OF_DENSITY_2000_M = 0.9065
+"""Of 1.0066 over 1.2250 kg/m^3, as tables of the standard atmosphere have them."""
+DENSITY_HEIGHT_M = 9950.0
+"""Over which density falls by e, there: 275.15 K / (0.0065 K/m * 4.256)."""
+
+
+@pytest.mark.parametrize("kind", ["", "equivalent"])
+def test_an_airspeed_is_what_a_pitot_tube_says(table, columns, kind):
+    text = AIRSPEED.replace("unit", f'kind = "{kind}"\nunit') if kind else AIRSPEED
+    assert {air.airspeed for air in samples(table, columns(MAP + text), AirData)} == {11.5}
+
+
+@pytest.mark.parametrize("absent", ["velocity", "position", ""])
+def test_a_true_airspeed_becomes_what_a_pitot_tube_says_at_its_height(table, columns, absent):
+    """Whatever the height is told by; and less with height."""
+    text = re.sub(rf"\[{absent}\]\n.*\n\n?", "", MAP) if absent else MAP
+    text += AIRSPEED.replace("unit", 'kind = "true"\nunit')
+    told = [air.airspeed for air in samples(table, columns(text), AirData)]
+    assert len(told) == N
+    assert told[0] == pytest.approx(11.5 * ROOT_OF_DENSITY_2000_M, rel=1e-4)
+    climbed = -VELOCITY[2] * 0.02 * N
+    assert told[-1] / told[0] == pytest.approx(1.0 - 0.5 * climbed / DENSITY_HEIGHT_M, abs=1e-5)
+
+
+def test_an_airspeed_of_another_kind_is_named(table, columns):
+    with pytest.raises(ConfigurationError, match=r"airspeed\.kind is 'indicated'"):
+        open_table(table, columns(MAP + AIRSPEED.replace("unit", 'kind = "indicated"\nunit')))
+
+
 @pytest.mark.parametrize(
     ("wind", "said"),
     [
@@ -278,6 +315,7 @@ def test_the_map_of_the_manual_is_one(columns):
     assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"} - {"throttle", "rudder"}
     assert chosen.quaternion
     assert chosen.airborne
+    assert chosen.true_airspeed
 
 
 def twice(table, later):
