@@ -121,7 +121,9 @@ def _chosen(index: UlogIndex) -> dict[tuple[str, int], Topic]:
         topics.pop(("vehicle_acceleration", 0), None)
     # Auxiliary outputs move servos; and what goes to the pins is another form of the motors'.
     extra = ("actuator_outputs",) if ("actuator_motors", 0) in topics else ()
-    single = ("actuator_outputs", "actuator_motors", "airspeed_validated", "wind", "wind_estimate")
+    # A sample has no number that would tell two batteries, or two sensors, apart.
+    single = {"actuator_outputs", "actuator_motors", "wind", "wind_estimate", "battery_status"}
+    single |= {"airspeed", "airspeed_validated"}
     topics = {
         key: c
         for key, c in topics.items()

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from onboard.core.inputs.samples import AirData
+from onboard.core.inputs.samples import AirData, Battery
 from onboard.recordings.opening import open_recording
 from tests.recordings.telemetry_writer import px4_log
 
@@ -65,3 +65,21 @@ def test_an_airspeed_is_what_the_sensor_says(tmp_path, topic, fields, said):
 
 def test_a_true_airspeed_alone_is_none(tmp_path):
     assert airspeeds(log(tmp_path / "x.ulg", {("airspeed", 0): speeds(true=TRUE)})) == []
+
+
+def test_one_of_two_batteries_is_read(tmp_path):
+    """The first, as of other logs: a pack of 5 V beside it is no sag of ten volts."""
+    its = [{"voltage_v": volts, "current_a": 3.0} for volts in (15.5, 5.0)]
+    path = log(tmp_path / "x.ulg", {("battery_status", k): one for k, one in enumerate(its)})
+    read = [s.voltage for s in open_recording(path).samples() if isinstance(s, Battery)]
+    assert read == [15.5] * 20
+
+
+@pytest.mark.parametrize("chosen", [True, False])
+def test_one_of_two_airspeed_sensors_is_read(tmp_path, chosen):
+    """That which PX4 has chosen, where it says so."""
+    its = {("airspeed", k): speeds(indicated=INDICATED + k, true=TRUE) for k in range(2)}
+    if chosen:
+        its["airspeed_validated", 0] = speeds(calibrated=CALIBRATED)
+    path = log(tmp_path / "x.ulg", its)
+    assert airspeeds(path) == [CALIBRATED if chosen else INDICATED] * 20
