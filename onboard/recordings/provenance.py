@@ -7,8 +7,8 @@
 * *Accelerometers.*  INS_ACC*_ID (PX4: CAL_ACC*_ID) are bus, address and kind of chip: boards of
   one model all have the same.  They tell vehicles apart and prove nothing alike.
 * A .tlog with several vehicles says nothing of either.
-* *When.*  GPS week and time of the first and last fix, or the autopilot's Unix time.  The clock of
-  a ground station or a file is not asked.
+* *When.*  GPS week and time of the fixes, or the autopilot's Unix time, by most of them
+  (:mod:`onboard.recordings.dates`).  The clock of a ground station or a file is not asked.
 """
 
 from __future__ import annotations
@@ -19,16 +19,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from onboard.core.inputs.samples import FIX_3D
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.recordings.arrays import Arrays, read_arrays
-from onboard.recordings.dataflash_formats import Records
+from onboard.recordings.dates import times
 from onboard.recordings.fields import numbers, of_autopilot, texts
 from onboard.recordings.ulog_information import ulog_information
-
-Floats = NDArray[np.float64]
 
 SERIAL = re.compile(r"^(\S.*?) ([0-9A-F]{8}) ([0-9A-F]{8}) ([0-9A-F]{8})$")
 RECEIVERS = (
@@ -36,12 +32,6 @@ RECEIVERS = (
     re.compile(r"^GPS 1: detected (?:as )?([\w.+ -]+?)(?: at \d+ baud)?$"),
 )
 """Texts that name the receiver, the one that says most first."""
-GPS_EPOCH_UNIX_S = 315_964_800.0
-LEAP_S = 18.0
-"""GPS time less UTC since 2017."""
-WEEK_S = 604_800.0
-EARLIEST_UNIX_S = 1_262_304_000.0
-"""2010: no autopilot of which there is a log flew before; a clock that says so is not set."""
 WANTED = (
     "MSG", "PARM", "GPS", "AUTOPILOT_VERSION", "STATUSTEXT", "SYSTEM_TIME", "HEARTBEAT",
     "PARAM_VALUE", "vehicle_gps_position", "sensor_gps",
@@ -92,14 +82,14 @@ def provenance(path: str | Path) -> Provenance:
     """
     arrays = read_arrays(path, WANTED)
     if len(_systems(arrays)) > 1:  # whose a message is that names a board, nobody asks here
-        began, ended = _times(arrays)
+        began, ended = times(arrays)
         return Provenance(began_unix_s=began, ended_unix_s=ended)
     information = ulog_information(Path(path)) if arrays.kind == "ulog" else None
     told = _parameters(arrays) if information is None else information.parameters.items()
     parameters = {name: value for name, value in told if np.isfinite(value)}
     board, model = _board(arrays, information.texts if information else {})
     names = PX4_ACCELEROMETERS if information else ACCELEROMETERS
-    began, ended = _times(arrays)
+    began, ended = times(arrays)
     place = next((p for p in PLACES if all(n in parameters for n in p)), None)
     delay = _first(parameters, DELAYS)
     return Provenance(
@@ -181,30 +171,3 @@ def _whole(value: float | None) -> int | None:
 
 def _first(parameters: Mapping[str, float], names: Sequence[str]) -> float | None:
     return next((parameters[n] for n in names if n in parameters), None)
-
-
-def _times(arrays: Arrays) -> tuple[float | None, float | None]:
-    """Unix time of the first and the last fix, s."""
-    unix = np.zeros(0)
-    if (gps := arrays.tables.get("GPS")) is not None:
-        unix = _of_gps(gps)
-    elif (system := of_autopilot(arrays, "SYSTEM_TIME")) is not None:
-        unix = system["time_unix_usec"] / 1e6
-    else:
-        for name in ("vehicle_gps_position", "sensor_gps"):
-            fixes = arrays.tables.get(name)
-            if fixes is not None and (times := numbers(fixes, "time_utc_usec")) is not None:
-                unix = times[0] / 1e6
-                break
-    unix = unix[np.isfinite(unix) & (unix > EARLIEST_UNIX_S)]
-    return (float(unix.min()), float(unix.max())) if len(unix) else (None, None)
-
-
-def _of_gps(fixes: Records) -> Floats:
-    """Unix times of ArduPilot's GPS records that have a fix."""
-    for names in (("GWk", "GMS"), ("Week", "TimeMS")):
-        if (values := numbers(fixes, *names, "Status")) is not None:
-            week, ms, _ = values[:, (values[2] >= FIX_3D) & (values[0] > 0.0)]
-            unix: Floats = GPS_EPOCH_UNIX_S + week * WEEK_S + ms / 1e3 - LEAP_S
-            return unix
-    return np.zeros(0)
