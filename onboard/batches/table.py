@@ -6,6 +6,7 @@ file too, as metadata of the fields.  What is not known is null.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -99,7 +100,12 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
     """
     arrow, parquet = imported()
     of_vehicle = {id(f.flown): (h, f) for h in histories for f in h.vehicle.flights}
-    rows = (row for one in flown for row in rows_of(one, *of_vehicle.get(id(one), (None, None))))
+    # Names and what is said of them may hold bytes that are no UTF-8, of which a file is.
+    rows = (
+        encodable(row)
+        for one in flown
+        for row in rows_of(one, *of_vehicle.get(id(one), (None, None)))
+    )
     types = {
         TEXT: arrow.string(),
         NUMBER: arrow.float64(),
@@ -121,6 +127,11 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
         beside.replace(file)
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror or error})") from None
+    except arrow.ArrowException as error:
+        raise UsageError(f"{file}: cannot be written ({error})") from None
+    finally:
+        with contextlib.suppress(OSError):  # it is there where something went wrong
+            beside.unlink()
 
 
 def imported() -> tuple[Any, Any]:
@@ -145,7 +156,7 @@ def rows_of(
     """The rows of one recording: one for each accelerometer, or one with the error."""
     record = one.record
     if record is None:
-        yield {"file": encodable(str(one.path)), "error": one.error}
+        yield {"file": str(one.path), "error": one.error}
         return
     shared = _of_recording(one, record, history, flight)
     for imu in record.imus:
@@ -157,7 +168,7 @@ def _of_recording(
 ) -> dict[str, Value]:
     p, r = record.provenance, record.document.recording
     return {
-        "file": encodable(str(one.path)),
+        "file": str(one.path),
         "sha256": record.sha256,
         "vehicle": None if history is None else history.vehicle.name,
         "identified_by": None if history is None else history.vehicle.identified_by,
