@@ -21,6 +21,7 @@ from onboard.answers.knowledge import seen
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.errors import UsageError
 from onboard.printable import encodable
+from onboard.report.files import beside
 
 TEXT, NUMBER, INTEGER, FLAG, TEXTS = "text", "number", "integer", "flag", "texts"
 ROWS_AT_ONCE = 10_000
@@ -119,19 +120,19 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
             for c in COLUMNS
         ]
     )
-    beside = file.with_name(f".{file.name}.part")
+    part = beside(file)
     try:
-        with parquet.ParquetWriter(str(beside), schema, compression="zstd") as writer:
-            while part := list(itertools.islice(rows, ROWS_AT_ONCE)):
-                writer.write_table(arrow.Table.from_pylist(part, schema=schema))
-        beside.replace(file)
+        with parquet.ParquetWriter(str(part), schema, compression="zstd") as writer:
+            while some := list(itertools.islice(rows, ROWS_AT_ONCE)):
+                writer.write_table(arrow.Table.from_pylist(some, schema=schema))
+        part.replace(file)
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror or error})") from None
     except arrow.ArrowException as error:
         raise UsageError(f"{file}: cannot be written ({error})") from None
     finally:
         with contextlib.suppress(OSError):  # it is there where something went wrong
-            beside.unlink()
+            part.unlink()
 
 
 def imported() -> tuple[Any, Any]:

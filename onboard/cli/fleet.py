@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import click
@@ -18,7 +19,7 @@ from onboard.batches.running import Orders, fly
 from onboard.batches.store import Store
 from onboard.cli.fleet_results import Results, pages_of
 from onboard.cli.fleet_table import HEAD, lines, vehicle_lines
-from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting, refuse_unwritable
 from onboard.cli.progress import many
 from onboard.cli.terminal import Terminal
 from onboard.errors import UsageError
@@ -117,7 +118,7 @@ def fleet(
     """
     files = found(places)
     refuse_overwriting((path for path, _ in files), json_file, parquet_file)
-    _possible(parquet_file, report_folder, store_folder, scheduler)
+    _possible(parquet_file, json_file, report_folder, store_folder, scheduler)
     orders = Orders(
         processes=jobs or cores(),
         imu=imu,
@@ -147,9 +148,15 @@ def fleet(
 
 
 def _possible(
-    parquet_file: Path | None, report_folder: Path | None, store_folder: Path | None, scheduler: str
+    parquet_file: Path | None,
+    json_file: str | None,
+    report_folder: Path | None,
+    store_folder: Path | None,
+    scheduler: str,
 ) -> None:
     """See to it before hours of work that their results can be written."""
+    refuse_unwritable(json_file)
+    refuse_unwritable(parquet_file, anew=True)
     if report_folder is not None:
         _make(report_folder)
     if store_folder is not None:
@@ -167,5 +174,7 @@ def _possible(
 def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError as error:
         raise UsageError(f"{folder}: cannot be made ({error.strerror})") from None
