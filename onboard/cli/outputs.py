@@ -19,11 +19,13 @@ def refuse_overwriting(inputs: Iterable[Path | str | None], *outputs: Path | str
 
     Args:
         inputs: recordings and other files that are read.
-        outputs: where results are to be written; None or ``-``: to no file.
+        outputs: where results are to be written; None: to no file, ``-``: to standard output.
 
     Raises:
         UsageError: one of them is a file that is read, or the place of another result.
     """
+    if outputs.count(STANDARD_OUTPUT) > 1:  # one after the other they are neither
+        raise UsageError("-: two results cannot both go to standard output")
     read = [Path(file) for file in inputs if file is not None]
     given: set[Path] = set()
     for file in outputs:

@@ -62,6 +62,12 @@ def test_two_results_have_two_places(log, capsys):
     assert not Path(place).exists()
 
 
+@pytest.mark.parametrize("verb", ["replay", "explain", "match"])
+def test_two_results_do_not_both_go_to_standard_output(log, capsys, verb):
+    assert run([verb, str(log), "--json", "-", "--param", "-"]) == 2
+    assert "standard output" in refused(capsys)
+
+
 @pytest.fixture
 def untouched(monkeypatch):
     """No recording is replayed: what is refused is refused before."""
