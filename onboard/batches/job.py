@@ -6,7 +6,9 @@ import gzip
 import hashlib
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
+from html import escape
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,7 +18,7 @@ import onboard
 from onboard import __version__
 from onboard.answers.fleet.record import Record, record_of
 from onboard.answers.recorded import Recorded
-from onboard.answers.replay import replay
+from onboard.answers.replay import Replay, replay
 from onboard.batches.store import Store
 from onboard.errors import OnboardError
 from onboard.recordings.provenance import provenance
@@ -96,18 +98,33 @@ def _done(job: Job, path: Path, progress: Callable[[float], None] | None) -> Out
     if store is not None:
         record, page = store.record(key, notes), store.page(key, notes) if job.paged else b""
         if record is not None and page is not None:
-            return Outcome(record=record.named(path), page=page, notes=tuple(notes), stored=True)
+            shown = _named(page, sha256, path)
+            return Outcome(record=record.named(path), page=shown, notes=tuple(notes), stored=True)
     recorded = Recorded(() if job.imu is None else (job.imu,), watched=job.paged)
     result = replay([path], recorded, imu=job.imu, progress=progress)
     record, page = record_of(path, result, recorded, provenance(path), sha256), b""
     if job.paged and recorded.chronicle is not None:
         from onboard.report.replay import replay_html  # noqa: PLC0415 - templates only when wanted
 
-        html = replay_html(result, recorded.chronicle)
+        html = replay_html(_nameless(result, sha256), recorded.chronicle)
         page = gzip.compress(html.encode("utf-8", "replace"), mtime=0)
     if store is not None:
         store.keep(key, record, page if job.paged else None, notes)
-    return Outcome(record=record, page=page, notes=tuple(notes))
+    return Outcome(record=record, page=_named(page, sha256, path), notes=tuple(notes))
+
+
+def _nameless(result: Replay, sha256: str) -> Replay:
+    """The same of a file that is called by its content, as what is kept of it is."""
+    recordings = tuple(replace(r, path=Path(sha256)) for r in result.recordings)
+    return replace(result, recordings=recordings)
+
+
+def _named(page: bytes, sha256: str, path: Path) -> bytes:
+    """The page of such a file, packed, with the name that the file has now; empty: no page."""
+    if not page:
+        return page
+    name = escape(path.name).encode("utf-8", "replace")
+    return gzip.compress(gzip.decompress(page).replace(sha256.encode(), name), mtime=0)
 
 
 def content(path: Path) -> str:

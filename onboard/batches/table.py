@@ -6,6 +6,7 @@ file too, as metadata of the fields.  What is not known is null.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,7 @@ from onboard.answers.knowledge import seen
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.errors import UsageError
 from onboard.printable import encodable
+from onboard.report.files import beside
 
 TEXT, NUMBER, INTEGER, FLAG, TEXTS = "text", "number", "integer", "flag", "texts"
 ROWS_AT_ONCE = 10_000
@@ -99,7 +101,12 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
     """
     arrow, parquet = imported()
     of_vehicle = {id(f.flown): (h, f) for h in histories for f in h.vehicle.flights}
-    rows = (row for one in flown for row in rows_of(one, *of_vehicle.get(id(one), (None, None))))
+    # Names and what is said of them may hold bytes that are no UTF-8, of which a file is.
+    rows = (
+        encodable(row)
+        for one in flown
+        for row in rows_of(one, *of_vehicle.get(id(one), (None, None)))
+    )
     types = {
         TEXT: arrow.string(),
         NUMBER: arrow.float64(),
@@ -113,14 +120,19 @@ def write_parquet(flown: Sequence[Flown], histories: Sequence[History], file: Pa
             for c in COLUMNS
         ]
     )
-    beside = file.with_name(f".{file.name}.part")
+    part = beside(file)
     try:
-        with parquet.ParquetWriter(str(beside), schema, compression="zstd") as writer:
-            while part := list(itertools.islice(rows, ROWS_AT_ONCE)):
-                writer.write_table(arrow.Table.from_pylist(part, schema=schema))
-        beside.replace(file)
+        with parquet.ParquetWriter(str(part), schema, compression="zstd") as writer:
+            while some := list(itertools.islice(rows, ROWS_AT_ONCE)):
+                writer.write_table(arrow.Table.from_pylist(some, schema=schema))
+        part.replace(file)
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror or error})") from None
+    except arrow.ArrowException as error:
+        raise UsageError(f"{file}: cannot be written ({error})") from None
+    finally:
+        with contextlib.suppress(OSError):  # it is there where something went wrong
+            part.unlink()
 
 
 def imported() -> tuple[Any, Any]:
@@ -145,7 +157,7 @@ def rows_of(
     """The rows of one recording: one for each accelerometer, or one with the error."""
     record = one.record
     if record is None:
-        yield {"file": encodable(str(one.path)), "error": one.error}
+        yield {"file": str(one.path), "error": one.error}
         return
     shared = _of_recording(one, record, history, flight)
     for imu in record.imus:
@@ -157,7 +169,7 @@ def _of_recording(
 ) -> dict[str, Value]:
     p, r = record.provenance, record.document.recording
     return {
-        "file": encodable(str(one.path)),
+        "file": str(one.path),
         "sha256": record.sha256,
         "vehicle": None if history is None else history.vehicle.name,
         "identified_by": None if history is None else history.vehicle.identified_by,

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import gzip
-from collections.abc import Sequence
+import tempfile
 from pathlib import Path
 
 import click
 from rich.text import Text
 
-from onboard.answers.fleet.document import fleet_document
-from onboard.answers.fleet.history import History, history_of
+from onboard.answers.fleet.history import history_of
 from onboard.answers.fleet.places import found
 from onboard.answers.fleet.record import Flown
-from onboard.answers.fleet.shared_numbers import Comparison, common_of
+from onboard.answers.fleet.shared_numbers import common_of
 from onboard.answers.fleet.vehicles import vehicles_of
 from onboard.batches.cluster import MOST_PER_BATCH, PER_BATCH
 from onboard.batches.crew import cores
 from onboard.batches.running import Orders, fly
 from onboard.batches.store import Store
+from onboard.cli.fleet_results import Results, pages_of
 from onboard.cli.fleet_table import HEAD, lines, vehicle_lines
-from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
+from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting, refuse_unwritable
 from onboard.cli.progress import many
-from onboard.cli.replay import write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.errors import UsageError
 
-INDEX = "index.html"
-LONGEST_NAME = 200
-"""Bytes of a page's name before ``.html``: file systems take 255."""
 EXAMPLES = """\
 \b
 onboard fleet logs/
@@ -37,10 +32,6 @@ onboard fleet kite-1/ kite-2/ --by-folder --json fleet.json
 onboard fleet logs/ --parquet fleet.parquet --scheduler tcp://10.0.0.1:8786
 onboard fleet logs/ --json - | jq '.recordings[] | select(.error) | .file'
 """
-
-
-class UnreadError(UsageError):
-    """Some recordings could not be read; the others are done."""
 
 
 @click.command(epilog=EXAMPLES)
@@ -127,7 +118,7 @@ def fleet(
     """
     files = found(places)
     refuse_overwriting((path for path, _ in files), json_file, parquet_file)
-    _possible(parquet_file, report_folder, store_folder, scheduler)
+    _possible(parquet_file, json_file, report_folder, store_folder, scheduler)
     orders = Orders(
         processes=jobs or cores(),
         imu=imu,
@@ -139,18 +130,13 @@ def fleet(
     )
     console = Terminal(highlight=False, soft_wrap=True)
     table = json_file != STANDARD_OUTPUT
-    places_of, pages = pages_of([name for _, name in files]), dict[str, str]()
-
-    def paged(name: str, packed: bytes) -> None:
-        if report_folder is not None:
-            pages[name] = places_of[name]
-            write_text(gzip.decompress(packed).decode(), str(report_folder / pages[name]))
-
+    places_of = pages_of([name for _, name in files])
+    results = Results(report_folder, parquet_file, json_file, places_of)
     if table:
         console.print(Text(HEAD, style="bold"))
     done: list[Flown] = []
     with many(len(files)) as told:
-        for one in fly(files, orders, told=told, paged=paged):
+        for one in fly(files, orders, told=told, paged=results.page):
             done.append(one)
             for line in lines(one) if table else ():
                 console.print(line)
@@ -158,61 +144,19 @@ def fleet(
     compared = common_of([h.vehicle for h in histories])
     for line in vehicle_lines(histories, compared) if table else ():
         console.print(line)
-    if report_folder is not None:
-        _write_index(done, histories, compared, pages, report_folder)
-    _write_numbers(done, histories, compared, parquet_file, json_file)
-    if failed := sum(bool(one.error) for one in done):
-        raise UnreadError(f"{failed} of {len(done)} recordings could not be read")
-
-
-def _write_index(
-    done: Sequence[Flown],
-    histories: Sequence[History],
-    compared: Comparison,
-    pages: dict[str, str],
-    folder: Path,
-) -> None:
-    """The page that leads to the others."""
-    from onboard.report.fleet import fleet_html
-
-    write_text(fleet_html(done, histories, compared, pages), str(folder / INDEX))
-
-
-def _write_numbers(
-    done: Sequence[Flown],
-    histories: Sequence[History],
-    compared: Comparison,
-    parquet_file: Path | None,
-    json_file: str | None,
-) -> None:
-    """The table and the document, those that are asked for."""
-    if parquet_file is not None:
-        from onboard.batches.table import write_parquet
-
-        write_parquet(done, histories, parquet_file)
-    if json_file is not None:
-        write_json(fleet_document(done, histories, compared).to_json(), json_file)
-
-
-def pages_of(names: Sequence[str]) -> dict[str, str]:
-    """The file of each recording's report, beside the index, by the name of the recording."""
-    out: dict[str, str] = {}
-    taken = {INDEX}
-    for name in names:
-        plain = "-".join(part for part in Path(name).parts if part != Path(name).anchor)
-        plain = plain.encode("utf-8", "replace")[-LONGEST_NAME:].decode("utf-8", "ignore")
-        page, n = f"{plain}.html", 2
-        while page in taken:
-            page, n = f"{plain}-{n}.html", n + 1
-        taken.add(page)
-        out[name] = page
-    return out
+    results.write(done, histories, compared)
 
 
 def _possible(
-    parquet_file: Path | None, report_folder: Path | None, store_folder: Path | None, scheduler: str
+    parquet_file: Path | None,
+    json_file: str | None,
+    report_folder: Path | None,
+    store_folder: Path | None,
+    scheduler: str,
 ) -> None:
     """See to it before hours of work that their results can be written."""
+    refuse_unwritable(json_file)
+    refuse_unwritable(parquet_file, anew=True)
     if report_folder is not None:
         _make(report_folder)
     if store_folder is not None:
@@ -230,5 +174,7 @@ def _possible(
 def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError as error:
         raise UsageError(f"{folder}: cannot be made ({error.strerror})") from None

@@ -7,23 +7,23 @@
 * *Accelerometers.*  INS_ACC*_ID (PX4: CAL_ACC*_ID) are bus, address and kind of chip: boards of
   one model all have the same.  They tell vehicles apart and prove nothing alike.
 * A .tlog with several vehicles says nothing of either.
-* *When.*  GPS week and time of the first and last fix, or the autopilot's Unix time.  The clock of
-  a ground station or a file is not asked.
+* *When.*  GPS week and time of the fixes, or the autopilot's Unix time, by most of them
+  (:mod:`onboard.recordings.dates`).  The clock of a ground station or a file is not asked.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from onboard.core.inputs.samples import FIX_3D
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.recordings.arrays import Arrays, read_arrays
-from onboard.recordings.dataflash_formats import Records
+from onboard.recordings.dates import times
+from onboard.recordings.fields import numbers, of_autopilot, texts
 from onboard.recordings.ulog_information import ulog_information
 
 SERIAL = re.compile(r"^(\S.*?) ([0-9A-F]{8}) ([0-9A-F]{8}) ([0-9A-F]{8})$")
@@ -32,18 +32,12 @@ RECEIVERS = (
     re.compile(r"^GPS 1: detected (?:as )?([\w.+ -]+?)(?: at \d+ baud)?$"),
 )
 """Texts that name the receiver, the one that says most first."""
-GPS_EPOCH_UNIX_S = 315_964_800.0
-LEAP_S = 18.0
-"""GPS time less UTC since 2017."""
-WEEK_S = 604_800.0
-EARLIEST_UNIX_S = 1_262_304_000.0
-"""2010: no autopilot of which there is a log flew before; a clock that says so is not set."""
-AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
 WANTED = (
     "MSG", "PARM", "GPS", "AUTOPILOT_VERSION", "STATUSTEXT", "SYSTEM_TIME", "HEARTBEAT",
     "PARAM_VALUE", "vehicle_gps_position", "sensor_gps",
 )  # fmt: skip
+MOST_IDS = 2**32
+"""The widest integer that an autopilot has a parameter of [definition]."""
 SYSTEM = ("SYSID_THISMAV", "MAV_SYSID", "MAV_SYS_ID")
 ACCELEROMETERS = {imu: parameter_names(imu).device_id for imu in (1, 2, 3, 4, 5)}
 PX4_ACCELEROMETERS = {imu: f"CAL_ACC{imu - 1}_ID" for imu in (1, 2, 3, 4)}
@@ -88,23 +82,23 @@ def provenance(path: str | Path) -> Provenance:
     """
     arrays = read_arrays(path, WANTED)
     if len(_systems(arrays)) > 1:  # whose a message is that names a board, nobody asks here
-        began, ended = _times(arrays)
+        began, ended = times(arrays)
         return Provenance(began_unix_s=began, ended_unix_s=ended)
     information = ulog_information(Path(path)) if arrays.kind == "ulog" else None
-    parameters = _parameters(arrays) if information is None else information.parameters
+    told = _parameters(arrays) if information is None else information.parameters.items()
+    parameters = {name: value for name, value in told if np.isfinite(value)}
     board, model = _board(arrays, information.texts if information else {})
     names = PX4_ACCELEROMETERS if information else ACCELEROMETERS
-    began, ended = _times(arrays)
+    began, ended = times(arrays)
     place = next((p for p in PLACES if all(n in parameters for n in p)), None)
     delay = _first(parameters, DELAYS)
-    frame = parameters.get("FRAME_CLASS")
     return Provenance(
         board=board,
         model=model,
         system=_system(arrays, parameters),
-        accelerometers={i: int(parameters[n]) for i, n in names.items() if parameters.get(n)},
+        accelerometers={i: x for i, n in names.items() if (x := _whole(parameters.get(n)))},
         receiver=_receiver(_texts(arrays)),
-        frame=None if frame is None else int(frame),
+        frame=_whole(parameters.get("FRAME_CLASS")),
         told_delay_s=None if delay is None else delay / 1e3,
         antenna_m=None if place is None else _three([parameters[n] for n in place]),
         began_unix_s=began,
@@ -117,26 +111,20 @@ def _three(values: Sequence[float]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _parameters(arrays: Arrays) -> dict[str, float]:
-    """Numbers by name, the last value of each."""
+def _parameters(arrays: Arrays) -> Iterable[tuple[str, float]]:
+    """Names and values, in order."""
     table, name, value = arrays.tables.get("PARM"), "Name", "Value"
     if table is None:
-        table, name, value = _of_autopilot(arrays, "PARAM_VALUE"), "param_id", "param_value"
-    if table is None or not {name, value} <= set(table.dtype.names or ()):
-        return {}
-    finite = table[np.isfinite(table[value])]
-    texts = (bytes(x).decode("ascii", "replace") for x in finite[name])
-    return dict(zip(texts, finite[value].astype(float).tolist(), strict=True))
+        table, name, value = of_autopilot(arrays, "PARAM_VALUE"), "param_id", "param_value"
+    values = None if table is None else numbers(table, value)
+    # Where either is of another type than it should be, there is nothing to go with the other.
+    return () if values is None else zip(texts(table, name), values[0].tolist(), strict=False)
 
 
 def _texts(arrays: Arrays) -> list[str]:
     """What the autopilot said in words."""
-    out: list[str] = []
-    said = (arrays.tables.get("MSG"), "Message"), (_of_autopilot(arrays, "STATUSTEXT"), "text")
-    for records, column in said:
-        if records is not None and column in (records.dtype.names or ()):
-            out += [bytes(x).decode("ascii", "replace") for x in records[column]]
-    return out
+    told = texts(of_autopilot(arrays, "STATUSTEXT"), "text")
+    return [*texts(arrays.tables.get("MSG"), "Message"), *told]
 
 
 def _board(arrays: Arrays, information: Mapping[str, str]) -> tuple[str, str]:
@@ -149,7 +137,7 @@ def _board(arrays: Arrays, information: Mapping[str, str]) -> tuple[str, str]:
             words = [bytes.fromhex(word)[::-1].hex() for word in found.groups()[1:]]
             if any(word.strip("0f") for word in words):
                 return "".join(words), found[1]
-    versions = _of_autopilot(arrays, "AUTOPILOT_VERSION")
+    versions = of_autopilot(arrays, "AUTOPILOT_VERSION")
     for record in versions if versions is not None else ():
         long, short = record["uid2"].tobytes().rstrip(b"\0"), int(record["uid"])
         if long or short:
@@ -166,55 +154,20 @@ def _receiver(texts: Sequence[str]) -> str:
 
 
 def _system(arrays: Arrays, parameters: Mapping[str, float]) -> int | None:
-    told = _first(parameters, SYSTEM)
-    if told is not None:
-        return int(told)
-    return next(iter(_systems(arrays)), None)
+    told = _whole(_first(parameters, SYSTEM))
+    return next(iter(_systems(arrays)), None) if told is None else told
 
 
 def _systems(arrays: Arrays) -> tuple[int, ...]:
     """System ids of the autopilots that a .tlog has heartbeats of."""
-    beats = _of_autopilot(arrays, "HEARTBEAT")
+    beats = of_autopilot(arrays, "HEARTBEAT")
     return () if beats is None else tuple(int(x) for x in np.unique(beats["sender_system"]))
 
 
-def _of_autopilot(arrays: Arrays, name: str) -> Records | None:
-    """Messages of a .tlog that the autopilot has sent."""
-    table = arrays.tables.get(name)
-    return None if table is None else table[table["sender_component"] == AUTOPILOT]
+def _whole(value: float | None) -> int | None:
+    """A number of a kind; None where it is not known, or is damage."""
+    return None if value is None or abs(value) >= MOST_IDS else int(value)
 
 
 def _first(parameters: Mapping[str, float], names: Sequence[str]) -> float | None:
     return next((parameters[n] for n in names if n in parameters), None)
-
-
-def _times(arrays: Arrays) -> tuple[float | None, float | None]:
-    """Unix time of the first and the last fix, s."""
-    unix = np.zeros(0)
-    if (gps := arrays.tables.get("GPS")) is not None:
-        unix = _of_gps(gps)
-    elif (system := _of_autopilot(arrays, "SYSTEM_TIME")) is not None:
-        unix = system["time_unix_usec"] / 1e6
-    else:
-        for name in ("vehicle_gps_position", "sensor_gps"):
-            fixes = arrays.tables.get(name)
-            if fixes is not None and "time_utc_usec" in (fixes.dtype.names or ()):
-                unix = fixes["time_utc_usec"] / 1e6
-                break
-    unix = unix[np.isfinite(unix) & (unix > EARLIEST_UNIX_S)]
-    return (float(unix.min()), float(unix.max())) if len(unix) else (None, None)
-
-
-def _of_gps(fixes: Records) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Unix times of ArduPilot's GPS records that have a fix."""
-    columns = fixes.dtype.names or ()
-    pairs = (("GWk", "GMS"), ("Week", "TimeMS"))
-    names = next((p for p in pairs if set(p) <= set(columns)), None)
-    if names is None or "Status" not in columns:
-        return np.zeros(0)
-    week, ms = (fixes[n].astype(np.float64) for n in names)
-    unix = GPS_EPOCH_UNIX_S + week * WEEK_S + ms / 1e3 - LEAP_S
-    out: np.ndarray[tuple[int], np.dtype[np.float64]] = unix[
-        (fixes["Status"] >= FIX_3D) & (week > 0)
-    ]
-    return out

@@ -8,7 +8,7 @@ different rates fit into one table.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
@@ -36,6 +36,7 @@ from onboard.core.maths.frames import (
     rotation_from_quaternion,
     vector_from_rotation,
 )
+from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording, elapsed_s
@@ -75,10 +76,10 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     """
     path, chosen = Path(path), load_map(columns)
     wanted = list(dict.fromkeys(c for q in chosen.quantities.values() for c in q.columns))
-    cells = _read(path, wanted)
+    cells, lines = _read(path, wanted)
     with np.errstate(all="ignore"):  # a cell may hold any number
-        tracks = _tracks(path, cells, chosen)
-        samples = _samples(tracks, chosen)
+        tracks = _tracks(path, cells, lines, chosen)
+        samples = _samples(path, tracks, chosen)
     counts = {name: len(track.t) for name, track in tracks.items()}
     return Recording(
         path,
@@ -93,8 +94,8 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     )
 
 
-def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
-    """The wanted columns, NaN where a cell holds no number."""
+def _read(path: Path, wanted: list[str]) -> tuple[dict[str, Array], Array]:
+    """The wanted columns, NaN where a cell holds no number; and the line of each row."""
     if path.exists() and not path.is_file():
         raise RecordingError(f"{path}: is not a regular file")
     try:
@@ -107,9 +108,10 @@ def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
                 there = ", ".join(names[:20])
                 raise RecordingError(f"{path}: has no column {missing[0]!r} (there: {there})")
             places = [names.index(name) for name in wanted]
-            rows = [
-                [_cell(row[k]) if k < len(row) else np.nan for k in places]
-                for row in csv.reader(file, delimiter=delimiter)
+            reader = csv.reader(file, delimiter=delimiter)
+            rows = [  # the head is line one, of which this reader does not know
+                [reader.line_num + 1, *(_cell(row[k]) if k < len(row) else np.nan for k in places)]
+                for row in reader
                 if row
             ]
     except FileNotFoundError:
@@ -121,7 +123,7 @@ def _read(path: Path, wanted: list[str]) -> dict[str, Array]:
     if len(rows) < FEWEST_ROWS:
         raise RecordingError(f"{path}: {len(rows)} rows are too few for a flight")
     every = np.array(rows, dtype=np.float64)
-    return {name: every[:, k] for k, name in enumerate(wanted)}
+    return {name: every[:, k] for k, name in enumerate(wanted, 1)}, every[:, 0]
 
 
 def _cell(text: str) -> float:
@@ -135,21 +137,29 @@ def _cell(text: str) -> float:
         return float("nan")
 
 
-def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, Track]:
+def _tracks(
+    path: Path, cells: dict[str, Array], lines: Array, chosen: TableMap
+) -> dict[str, Track]:
     """Each quantity in SI at the rows that have all of it, in order of time."""
     clock = chosen.quantities["time"]
     t = clock.factor * cells[clock.columns[0]]
+    values = {
+        name: quantity.factor * np.column_stack([cells[c] for c in quantity.columns])
+        for name, quantity in chosen.quantities.items()
+        if name != "time"
+    }
+    rows = {
+        name: np.flatnonzero(np.isfinite(x).all(axis=1) & np.isfinite(t))
+        for name, x in values.items()
+    }
+    _forward(path, t, rows.values(), lines, clock.columns[0])
     out: dict[str, Track] = {}
-    for name, quantity in chosen.quantities.items():
-        if name == "time":
-            continue
-        x = quantity.factor * np.column_stack([cells[c] for c in quantity.columns])
-        seen = np.isfinite(x).all(axis=1) & np.isfinite(t)
-        its, first = np.unique(t[seen], return_index=True)
+    for name, x in values.items():
+        its, first = np.unique(t[rows[name]], return_index=True)
         if name in ("attitude", "force", "velocity", "position") and len(its) < FEWEST_ROWS:
-            where = ", ".join(quantity.columns)
+            where = ", ".join(chosen.quantities[name].columns)
             raise RecordingError(f"{path}: {len(its)} rows with a number in {where} are no flight")
-        out[name] = Track(its, x[seen][first])
+        out[name] = Track(its, x[rows[name]][first])
     # The clock starts at zero: nanoseconds since 1970 would leave no digits for a difference.
     zero = min(float(track.t[0]) for track in out.values() if len(track.t))
     out = {name: Track(track.t - zero, track.x) for name, track in out.items()}
@@ -161,10 +171,29 @@ def _tracks(path: Path, cells: dict[str, Array], chosen: TableMap) -> dict[str, 
     return out
 
 
-def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterator[Sample]]:
+def _forward(
+    path: Path, t: Array, rows: Iterable[NDArray[np.intp]], lines: Array, clock: str
+) -> None:
+    """See to it that the time of no quantity goes back; each may stand in rows of its own.
+
+    Sorted, the runs of a clock that began anew would be one flight of two vehicles.
+    """
+    back = [k[late] for k in rows if len(late := np.flatnonzero(np.diff(t[k]) < 0.0) + 1)]
+    if back:
+        line = lines[min(int(k[0]) for k in back)]
+        raise RecordingError(
+            f"{path}: line {line:.0f}: {clock} goes back: sort the rows by time, or cut the table "
+            "where its clock begins anew"
+        )
+
+
+def _samples(
+    path: Path, tracks: dict[str, Track], chosen: TableMap
+) -> Callable[[], Iterator[Sample]]:
     """What reads the tracks as samples in order of time."""
     R_nb = _rotations(tracks["attitude"], chosen)
     t = tracks["attitude"].t
+    fixes = _fixes(path, tracks, chosen)
     streams: list[list[Sample]] = [
         [VehicleState(0.0, armed=True, kind=chosen.vehicle)],
         # Without these, an ordinary autopilot's filters would be taken for granted.
@@ -177,16 +206,12 @@ def _samples(tracks: dict[str, Track], chosen: TableMap) -> Callable[[], Iterato
             for a, e in zip(t, np.column_stack(euler_from_rotation(R_nb)), strict=True)
         ],
         _imu(tracks, Track(t, R_nb), chosen),
-        _fixes(tracks, chosen),
+        [*fixes],
         _outputs(tracks, chosen),
         *_of_a_plane(tracks),
         _battery(tracks),
+        _airspeeds(tracks, fixes, chosen),
     ]
-    if "airspeed" in tracks:
-        its = tracks["airspeed"]
-        streams.append(
-            [AirData(float(a), float(v)) for a, v in zip(its.t, its.x[:, 0], strict=True)]
-        )
     if "wind" in tracks:
         its = tracks["wind"]
         level = np.column_stack([its.x, np.zeros(len(its.x))]) @ chosen.world.T
@@ -244,7 +269,7 @@ def _rates(tracks: dict[str, Track], attitude: Track, chosen: TableMap, t: Array
     return np.column_stack([np.interp(t, known, x[:, k]) for k in range(3)])
 
 
-def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
+def _fixes(path: Path, tracks: dict[str, Track], chosen: TableMap) -> list[GpsFix]:
     """Velocity and place as a receiver would report them."""
     position = tracks.get("position")
     p = None if position is None else position.x @ chosen.world.T
@@ -252,6 +277,9 @@ def _fixes(tracks: dict[str, Track], chosen: TableMap) -> list[Sample]:
         t, v = tracks["velocity"].t, tracks["velocity"].x @ chosen.world.T
     elif position is not None and p is not None:
         t, v = _slope(position.t, p)
+        if not len(t):
+            where = ", ".join(chosen.quantities["position"].columns)
+            raise RecordingError(f"{path}: {where} last too short for a velocity ({SLOPE_S:g} s)")
     else:
         return []
     keep = _thinned(t, chosen.fix_rate)
@@ -279,9 +307,22 @@ def _slope(t: Array, p: Array) -> tuple[Array, Array]:
     there = late < len(t)
     early, late = early[there], late[there]
     span = t[late] - t[early]
-    whole = span < 3.0 * SLOPE_S  # a gap is no velocity
+    # A gap is no velocity: three times as long as a span at the rate of the table, or longer.
+    whole = span < 3.0 * max(SLOPE_S, float(np.median(np.diff(t))))
     early, late, span = early[whole], late[whole], span[whole]
     return 0.5 * (t[late] + t[early]), (p[late] - p[early]) / span[:, None]
+
+
+def _airspeeds(tracks: dict[str, Track], fixes: Sequence[GpsFix], chosen: TableMap) -> list[Sample]:
+    """Equivalent airspeeds, which is what an autopilot's sensor tells."""
+    its = tracks.get("airspeed")
+    if its is None:
+        return []
+    v = its.x[:, 0]
+    if chosen.true_airspeed:  # the same pressure at sea level, by the height that is flown
+        height = np.interp(its.t, [f.t for f in fixes], [f.altitude for f in fixes])
+        v = v * np.sqrt(density(height) / SEA_LEVEL_DENSITY)
+    return [AirData(float(a), float(b)) for a, b in zip(its.t, v, strict=True)]
 
 
 def _thinned(t: Array, rate: float) -> NDArray[np.intp]:

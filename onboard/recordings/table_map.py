@@ -44,6 +44,7 @@ WORLDS = {
 BODIES = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0])}
 """To forward, right, down."""
 KINDS = ("specific_force", "acceleration")
+AIRSPEEDS = ("equivalent", "true")
 VEHICLES = ("copter", "plane", "")
 QUANTITIES = (*WIDTHS, "attitude", "motors")
 OF_TABLE = {"vehicle", "world", "body", "airborne", "fix_rate", "origin"}
@@ -53,6 +54,7 @@ OWN_KEYS = {
     "force": OF_QUANTITY | {"kind", "frame", "low_pass", "derived"},
     "rates": OF_QUANTITY | {"low_pass"},
     "motors": OF_QUANTITY | {"range"},
+    "airspeed": OF_QUANTITY | {"kind"},
     "wind": OF_QUANTITY | {"sigma"},
 }
 WIND_SIGMA_M_S = 0.1
@@ -83,7 +85,9 @@ class TableMap:
         derived: whether it is the slope of the velocity, so that there is no accelerometer.
         low_pass: cut-off (Hz) of the second-order filters that force and rates went through; 0 is
             none.
-        motor_range: what the motors are at idle and at full; None: as the unit says.
+        motor_range: what the motors are at idle and at full, in SI as they are; None: as the unit
+            says.
+        true_airspeed: whether the airspeed is the true one, not what a pitot tube says.
         wind_sigma: of a wind that was measured, m/s.
         vehicle: ``copter``, ``plane`` or empty.
         airborne: whether all of the table is flight: then no ground is looked for.
@@ -101,6 +105,7 @@ class TableMap:
     derived: bool = False
     low_pass: tuple[float, float] = (0.0, 0.0)
     motor_range: tuple[float, float] | None = None
+    true_airspeed: bool = False
     wind_sigma: float = WIND_SIGMA_M_S
     vehicle: str = ""
     airborne: bool = False
@@ -141,6 +146,7 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
     if "rudder" in quantities and "throttle" not in quantities:
         raise ValueError("[rudder] is of no use without [throttle]")
     attitude, force = _table(found, "attitude"), _table(found, "force")
+    airspeed = _table(found, "airspeed") if "airspeed" in found else {}
     origin = _table(found, "origin") if "origin" in found else {}
     _only(origin, {"latitude", "longitude", "altitude"}, "origin.")
     return TableMap(
@@ -157,6 +163,7 @@ def table_map(found: Mapping[str, Any]) -> TableMap:
             _number(_table(found, "rates"), "low_pass", 0.0, "rates.") if "rates" in found else 0.0,
         ),
         motor_range=_range(_table(found, "motors")) if "motors" in found else None,
+        true_airspeed=_word(airspeed, "kind", AIRSPEEDS, "airspeed.") == "true",
         wind_sigma=_wind_sigma(_table(found, "wind")) if "wind" in found else WIND_SIGMA_M_S,
         vehicle=_word(found, "vehicle", VEHICLES, ""),
         airborne=_flag(found, "airborne", ""),
@@ -252,4 +259,6 @@ def _range(motors: Mapping[str, Any]) -> tuple[float, float] | None:
     low, high = (_number({"range": v}, "range", 0.0, "motors.") for v in given)
     if not low < high:
         raise ValueError("motors.range must rise")
-    return low, high
+    # In the unit of the columns, which are SI by the time that they are asked.
+    factor = UNITS["motors"][_word(motors, "unit", tuple(UNITS["motors"]), "motors.")]
+    return factor * low, factor * high

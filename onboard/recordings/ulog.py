@@ -38,6 +38,9 @@ BLOCK = 4096
 ARMED = 2
 KINDS = {1: "copter", 2: "plane", 3: "rover"}
 """vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""
+AIRSPEEDS = tuple(f"{kind}_airspeed_m_s" for kind in ("calibrated", "equivalent", "indicated"))
+"""What a pitot tube says, which is of density at sea level: with the sensor's scale taken off, the
+same by its older name, and as it is.  PX4 reckons the true airspeed from these."""
 MOST_OUTPUTS = 16
 JAMMED = 2
 """jamming_state and spoofing_state: 1 is fine, 2 and 3 are trouble."""
@@ -118,7 +121,9 @@ def _chosen(index: UlogIndex) -> dict[tuple[str, int], Topic]:
         topics.pop(("vehicle_acceleration", 0), None)
     # Auxiliary outputs move servos; and what goes to the pins is another form of the motors'.
     extra = ("actuator_outputs",) if ("actuator_motors", 0) in topics else ()
-    single = ("actuator_outputs", "actuator_motors", "airspeed_validated", "wind", "wind_estimate")
+    # A sample has no number that would tell two batteries, or two sensors, apart.
+    single = {"actuator_outputs", "actuator_motors", "wind", "wind_estimate", "battery_status"}
+    single |= {"airspeed", "airspeed_validated"}
     topics = {
         key: c
         for key, c in topics.items()
@@ -276,8 +281,9 @@ def vehicle_land_detected(t: Floats, columns: Columns, _instance: int) -> Sequen
 
 
 def airspeed(t: Floats, columns: Columns, _instance: int) -> Sequence[Sample]:
-    """True airspeed."""
-    values = _floats(columns, "true_airspeed_m_s")
+    """The equivalent airspeed; the true one, which is beside it, has the density taken off."""
+    name = next((name for name in AIRSPEEDS if name in columns), AIRSPEEDS[0])
+    values = _floats(columns, name)
     return [AirData(at, airspeed=v) for at, v in zip(t.tolist(), values, strict=True)]
 
 

@@ -7,6 +7,11 @@ from pathlib import Path
 from onboard.errors import UsageError
 
 
+def beside(file: Path) -> Path:
+    """Where a file is written before it takes its place, whole."""
+    return file.with_name(f".{file.name}.part")
+
+
 def save(content: str | bytes, file: str | Path) -> Path:
     """Write a document to a file, text in UTF-8; returns its path.
 

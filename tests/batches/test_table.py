@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from onboard.answers.fleet.history import history_of
 from onboard.answers.fleet.record import Flown
 from onboard.answers.fleet.vehicles import vehicles_of
+from onboard.batches import table
 from onboard.batches.table import COLUMNS, imported, rows_of, write_parquet
 from onboard.errors import UsageError
 from tests.fleet.records_by_hand import TRUE, flown
@@ -53,6 +55,34 @@ def test_the_file_has_a_row_for_each_accelerometer_and_each_failure(tmp_path):
     field = table.schema.field("offset_z")
     assert field.metadata[b"unit"] == b"m/s^2"
     assert not list(tmp_path.glob(".*"))
+
+
+def test_what_is_no_utf8_is_written_all_the_same(tmp_path):
+    """Names of files are bytes, and the reason why one cannot be read begins with its name."""
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    name = os.fsdecode(b"/logs/fl\xffug.BIN")
+    one = Flown(Path(name), name, None, f"{name}: not a recording")
+    good = flown(name, seed=1)
+    write_parquet([one, good], [history_of(v) for v in vehicles_of([good])], tmp_path / "x.parquet")
+    rows = parquet.read_table(tmp_path / "x.parquet").to_pylist()
+    assert rows[0]["file"] == "/logs/fl?ug.BIN"
+    assert rows[0]["error"] == "/logs/fl?ug.BIN: not a recording"
+    assert len(rows) > 1
+
+
+@pytest.mark.parametrize("wrong", [b"bytes", object()])
+def test_nothing_half_written_is_left(tmp_path, monkeypatch, wrong):
+    """Whatever goes wrong, and what was there before stays."""
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    place = tmp_path / "fleet.parquet"
+    place.write_bytes(b"before")
+    logs, histories = fleet()
+    broken = [{"imu": wrong}]
+    monkeypatch.setattr(table, "rows_of", lambda *_: iter(broken))
+    with pytest.raises(UsageError, match=r"fleet\.parquet: cannot be written"):
+        write_parquet(logs, histories, place)
+    assert [file.name for file in tmp_path.iterdir()] == [place.name]
+    assert place.read_bytes() == b"before"
 
 
 def test_without_pyarrow_one_line_says_what_to_install(monkeypatch):

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from onboard.answers.fleet.places import found
-from onboard.cli.fleet import pages_of
+from onboard.cli.fleet_results import pages_of
 from onboard.cli.main import run
+from onboard.errors import UsageError
 from tests.recordings.dataflash_writer import modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
 
@@ -119,6 +120,30 @@ def test_neither_processes_nor_the_store_change_a_digit(fleet, tmp_path, capsys)
     recordings = json.loads(capsys.readouterr().out)["recordings"]
     assert all(str(moved) in r["file"] for r in recordings)
     assert all(r["replay"]["recording"]["files"] == [r["file"]] for r in recordings if r["replay"])
+
+
+def test_a_result_that_is_lost_does_not_cost_the_others(fleet, tmp_path, capsys, monkeypatch):
+    """The disk that is full, the table that cannot be made: after hours, the rest is there."""
+    spoil(fleet)
+
+    def full(*_):
+        raise UsageError("fleet.parquet: cannot be written (No space left on device)")
+
+    monkeypatch.setattr("onboard.batches.table.write_parquet", full)
+    monkeypatch.setattr("onboard.batches.table.imported", lambda: None)
+    pages, file = tmp_path / "pages", tmp_path / "fleet.json"
+    (pages / "one-a.BIN.html").mkdir(parents=True)
+    results = ["--parquet", str(tmp_path / "x"), "--json", str(file), "--report", str(pages)]
+    assert run(["fleet", str(fleet), *results, *ONE]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "a.BIN.html: cannot be written" in err
+    assert "No space left" in err
+    assert "1 of 4 recordings could not be read" in err
+    assert json.loads(file.read_bytes())["read"] == 3
+    index = (pages / "index.html").read_text(encoding="utf-8")
+    assert "b.tlog.html" in index
+    assert "a.BIN.html" not in index
 
 
 def test_a_file_may_be_named_and_comes_once(fleet, capsys):

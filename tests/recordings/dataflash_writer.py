@@ -7,7 +7,7 @@ import struct
 STRUCT = {
     "b": "b", "B": "B", "h": "h", "H": "H", "i": "i", "I": "I", "f": "f", "d": "d", "n": "4s",
     "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "E": "I", "L": "i", "M": "B", "q": "q",
-    "Q": "Q",
+    "Q": "Q", "a": "64s",
 }  # fmt: skip
 SCALE = dict.fromkeys("cCeE", 100) | {"L": 10_000_000}
 

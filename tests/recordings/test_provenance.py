@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import pytest
@@ -9,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from onboard.recordings.provenance import provenance
 from onboard.recordings.ulog_information import ulog_information
-from tests.recordings.dataflash_writer import modern_log
+from tests.recordings.dataflash_writer import DataflashWriter, modern_log
 from tests.recordings.telemetry_writer import px4_log, telemetry
 
 SERIAL = "26003e000b51333031373035"
@@ -100,3 +101,59 @@ def test_a_ulog_has_it_in_its_head_and_damage_ends_the_head(tmp_path):
     for cut in range(16, 16 + len(head)):
         whole.write_bytes((data[:16] + head)[:cut])
         assert ulog_information(whole).texts == {}
+
+
+ODD = {
+    "PARM": ("QNf", "TimeUS,Name,Value", (1, "FRAME_CLASS", 1.0)),
+    "MSG": ("QZ", "TimeUS,Message", (1, TEXT)),
+    "GPS": ("QBIH", "TimeUS,Status,GMS,GWk", (1, 3, 1000, 2300)),
+}
+"""What is asked for: letters, columns and values."""
+OTHER = {"n": b"abcd", "a": bytes(64), "f": math.inf, "Z": b"text", "B": 3}
+
+
+def odd(path, name, letters, values):
+    """A log whose messages of one name are of another layout, and the others as they should be."""
+    log = DataflashWriter()
+    log.format(10, "IMU", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    for kind, (its, (form, columns, usual)) in enumerate(ODD.items(), 20):
+        log.format(kind, its, letters if its == name else form, columns)
+        log.add(its, *(values if its == name else usual))
+    for k in range(50):
+        log.add("IMU", 20_000 * k, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8)
+    path.write_bytes(bytes(log))
+    return path
+
+
+def test_what_stands_in_the_log_as_it_should_is_known(tmp_path):
+    known = provenance(odd(tmp_path / "x.BIN", "", "", ()))
+    assert (known.board, known.frame) == (SERIAL, 1)
+    assert known.began_unix_s == pytest.approx(315964800 + 2300 * 604800 + 1.0 - 18.0)
+
+
+@pytest.mark.parametrize("other", OTHER)
+@pytest.mark.parametrize("name", ODD)
+def test_a_field_of_another_type_is_not_known(tmp_path, name, other):
+    """Logs define their own layouts: whatever stands under a name, the others are known."""
+    form, _, usual = ODD[name]
+    for k, letter in enumerate(form):
+        letters, values = form[:k] + other + form[k + 1 :], list(usual)
+        values[k] = OTHER[other]
+        known = provenance(odd(tmp_path / "x.BIN", name, letters, values))
+        if (letter in "ZN") != (other in "Zn"):  # a number for a text, or the other way round
+            said = {"PARM": known.frame, "MSG": known.board or None, "GPS": known.began_unix_s}
+            assert said.pop(name) is None or k == 0
+            assert None not in said.values()
+
+
+def test_no_number_of_a_kind_is_made_of_damage(tmp_path):
+    writer = DataflashWriter()
+    writer.format(10, "IMU", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    writer.format(14, "PARM", "Nf", "Name,Value")
+    for value in (3e38, math.inf, math.nan):
+        for name in ("FRAME_CLASS", "SYSID_THISMAV", "INS_ACC_ID"):
+            writer.add("PARM", name, value)
+        writer.add("IMU", 1, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8)
+        (tmp_path / "x.BIN").write_bytes(bytes(writer))
+        known = provenance(tmp_path / "x.BIN")
+        assert (known.frame, known.system, known.accelerometers) == (None, None, {})

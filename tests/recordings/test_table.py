@@ -21,7 +21,7 @@ from onboard.core.inputs.samples import (
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.errors import ConfigurationError, RecordingError
 from onboard.recordings.table import open_table
-from onboard.recordings.table_map import WIDTHS, load_map
+from onboard.recordings.table_map import UNITS, WIDTHS, load_map
 from tests.recordings.table_writer import MAP, MOTORS, cells, moving, write_table
 
 ANGLES = (0.1, -0.2, 0.7)
@@ -98,6 +98,43 @@ def test_a_wind_that_was_measured_is_turned_to_north_and_east(table, columns):
         assert air.wind_sigma == pytest.approx(0.25)
 
 
+AIRSPEED = """
+[airspeed]
+column = "m1"
+unit = "cm/s"
+
+[origin]
+altitude = 2000
+"""
+ROOT_OF_DENSITY_2000_M = 0.9065
+"""Of 1.0066 over 1.2250 kg/m^3, as tables of the standard atmosphere have them."""
+DENSITY_HEIGHT_M = 9950.0
+"""Over which density falls by e, there: 275.15 K / (0.0065 K/m * 4.256)."""
+
+
+@pytest.mark.parametrize("kind", ["", "equivalent"])
+def test_an_airspeed_is_what_a_pitot_tube_says(table, columns, kind):
+    text = AIRSPEED.replace("unit", f'kind = "{kind}"\nunit') if kind else AIRSPEED
+    assert {air.airspeed for air in samples(table, columns(MAP + text), AirData)} == {11.5}
+
+
+@pytest.mark.parametrize("absent", ["velocity", "position", ""])
+def test_a_true_airspeed_becomes_what_a_pitot_tube_says_at_its_height(table, columns, absent):
+    """Whatever the height is told by; and less with height."""
+    text = re.sub(rf"\[{absent}\]\n.*\n\n?", "", MAP) if absent else MAP
+    text += AIRSPEED.replace("unit", 'kind = "true"\nunit')
+    told = [air.airspeed for air in samples(table, columns(text), AirData)]
+    assert len(told) == N
+    assert told[0] == pytest.approx(11.5 * ROOT_OF_DENSITY_2000_M, rel=1e-4)
+    climbed = -VELOCITY[2] * 0.02 * N
+    assert told[-1] / told[0] == pytest.approx(1.0 - 0.5 * climbed / DENSITY_HEIGHT_M, abs=1e-5)
+
+
+def test_an_airspeed_of_another_kind_is_named(table, columns):
+    with pytest.raises(ConfigurationError, match=r"airspeed\.kind is 'indicated'"):
+        open_table(table, columns(MAP + AIRSPEED.replace("unit", 'kind = "indicated"\nunit')))
+
+
 @pytest.mark.parametrize(
     ("wind", "said"),
     [
@@ -122,6 +159,43 @@ def test_a_position_alone_becomes_a_velocity(table, columns):
     fixes = samples(table, columns(text), GpsFix)
     for fix in fixes:
         assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-5)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.5, 2.0])
+def test_a_position_of_any_rate_becomes_a_velocity_and_a_gap_does_not(tmp_path, columns, step):
+    """Empty cells between, as of a receiver; and twenty steps that nobody measured."""
+    fixes, gap = slow(tmp_path, columns, step, n=60)
+    assert len(fixes) > 30 if step >= 0.1 else fixes
+    for fix in fixes:
+        assert (fix.v_n, fix.v_e, fix.v_d) == pytest.approx(VELOCITY, rel=1e-5)
+        assert not gap[0] < fix.t < gap[1]
+
+
+def slow(tmp_path, columns, step, n):
+    """Fixes of a table with a position every ``step`` s, and when it has none, s."""
+    times, gap = 0.02 * np.arange(n * round(50 * step)), (20 * step, 40 * step)
+    rows = []
+    for k, t in enumerate(times):
+        still = cells(AttitudeSample(t, *ANGLES)) | cells(ImuSample(t, 1, FORCE, RATES))
+        there = k % round(50 * step) == 0 and not gap[0] < t < gap[1]
+        place = moving(t, VELOCITY, tuple(t * v for v in VELOCITY))[1] if there else {}
+        rows.append((t, still | {name: place[name] for name in ("e", "n", "u") if place}))
+    write_table(rows, tmp_path / "slow.csv")
+    text = MAP.replace('[velocity]\ncolumns = ["ve", "vn", "vu"]\n', "")
+    return samples(tmp_path / "slow.csv", columns(text), GpsFix), gap
+
+
+def test_a_position_that_lasts_no_span_of_a_velocity_is_named(tmp_path, columns):
+    """Twenty rows of a kilohertz: enough of them, but no flight."""
+    rows = []
+    for k in range(400):
+        t = 0.001 * k
+        still = cells(AttitudeSample(t, *ANGLES)) | cells(ImuSample(t, 1, FORCE, RATES))
+        rows.append((t, still | (moving(t, VELOCITY, VELOCITY)[1] if k < 50 else {})))
+    write_table(rows, tmp_path / "short.csv")
+    text = MAP.replace('[velocity]\ncolumns = ["ve", "vn", "vu"]\n', "")
+    with pytest.raises(RecordingError, match=r"short\.csv: e, n, u last too short"):
+        open_table(tmp_path / "short.csv", columns(text))
 
 
 def test_acceleration_is_given_what_an_accelerometer_feels(table, columns):
@@ -186,6 +260,15 @@ unit = "%"
     assert samples(table, columns(text), Outputs)[0].values == (12_500.0, 9_250.0)
 
 
+@pytest.mark.parametrize("unit", UNITS["motors"])
+def test_idle_and_full_of_the_motors_are_in_the_unit_of_the_columns(table, columns, unit):
+    """The fraction of the way from idle to full knows no unit."""
+    text = MAP + MOTORS.replace("range", f'unit = "{unit}"\nrange')
+    out = samples(table, columns(text), Outputs)[0]
+    assert out.normalised
+    assert out.values == pytest.approx((0.0, 0.5, 1.0, 1.0))
+
+
 def test_a_rudder_without_throttle_is_refused(table, columns):
     with pytest.raises(ConfigurationError, match="of no use without"):
         load_map(columns(MAP + '[rudder]\ncolumn = "m2"\n'))
@@ -232,3 +315,38 @@ def test_the_map_of_the_manual_is_one(columns):
     assert set(chosen.quantities) == {*WIDTHS, "attitude", "motors"} - {"throttle", "rudder"}
     assert chosen.quaternion
     assert chosen.airborne
+    assert chosen.true_airspeed
+
+
+def twice(table, later):
+    """The rows of a table, and again from ``later`` s on; the line of the first of these."""
+    head, *rows = table.read_text().splitlines()
+    parted = [row.split(",", 1) for row in rows]
+    shifted = [f"{float(t) + 1e3 * later},{rest}" for t, rest in parted]
+    table.write_text("\n".join([head, *rows, *shifted]) + "\n")
+    return len(rows) + 2
+
+
+def test_a_clock_that_begins_anew_is_refused_with_its_line(table, columns):
+    """Between the times of the first run and at the same ones: neither is one flight."""
+    whole = table.read_text()
+    for later in (0.0, 0.0005):
+        table.write_text(whole)
+        line = twice(table, later)
+        with pytest.raises(RecordingError, match=f"flight.csv: line {line}: t_ms goes back"):
+            open_table(table, columns())
+
+
+def test_a_clock_that_goes_on_is_one_flight(table, columns):
+    twice(table, 0.02 * N)
+    assert open_table(table, columns()).duration_s == pytest.approx(0.02 * (2 * N - 1))
+
+
+def test_quantities_may_stand_one_below_the_other(table, columns):
+    """As tables are that were joined: each has an order of its own, and blank lines are none."""
+    text = columns()
+    before = list(open_table(table, text).samples())
+    head, *rows = table.read_text().splitlines()
+    which = {row: tuple(cell != "" for cell in row.split(",")[1:]) for row in rows}
+    table.write_text("\n".join([head, *sorted(rows, key=lambda row: which[row])]) + "\n\n")
+    assert list(open_table(table, text).samples()) == before

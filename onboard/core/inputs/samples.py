@@ -140,6 +140,7 @@ class Throttle:
 class AirData:
     """Airspeed (m/s) and wind (NED, m/s), each None where it is not known.
 
+    ``airspeed`` is the equivalent one, what a pitot tube says in air of the density at sea level.
     ``wind_sigma`` is that of a wind that was measured, m/s; None: it is the autopilot's estimate.
     """
 
