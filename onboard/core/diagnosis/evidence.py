@@ -40,7 +40,6 @@ from onboard.core.diagnosis.selection import Fit
 from onboard.core.diagnosis.undecided import in_words, left_open, undecided
 from onboard.core.estimate.calibration_status import too_far
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.limits import CONTRADICTION
 from onboard.core.estimate.result import Calibration
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
@@ -185,7 +184,7 @@ class Judge:
                 f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
                 "the two is false. " + note
             )
-        left = self.final.solution.variance_inflation > CONTRADICTION
+        left = self.final.solution.contradicts
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (

@@ -50,7 +50,9 @@ def _large(choice: Choice, full: Examination, calibrator: Calibrator, imu: int) 
     fitter = choice.fitter
     fit = fitter.fit(choice.free, held_out=False)
     covariance = fitter.covariance(fit)
-    solution = Solution(fit.theta, covariance, fitter.sums.N, 1.0, 1.0, 1.0)
+    solution = Solution(
+        fit.theta, covariance, fitter.sums.N, 1.0, contradicts=False, nis=1.0, rows=1.0
+    )
     return nuisance_effects(
         NuisanceFit(
             timing=timing_of(full, solution),

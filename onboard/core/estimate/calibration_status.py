@@ -15,7 +15,7 @@ import numpy as np
 from onboard.core.estimate.calibration_model import beyond_range
 from onboard.core.estimate.determined import Determined, determine, force_moments
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.limits import CONTRADICTION, LEAST_CHANGE, SURE
+from onboard.core.estimate.limits import LEAST_CHANGE, SURE
 from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.solution import Solution
@@ -53,7 +53,7 @@ def judged(
 
 def doubt_of(engine: Engine, solution: Solution) -> str:
     """Why the sigmas of a flight may not be believed, in words; empty if they may."""
-    if solution.variance_inflation > CONTRADICTION:
+    if solution.contradicts:
         return (
             "the flight contradicts itself: something is missing from the model, "
             "see onboard explain"

@@ -76,16 +76,16 @@ class Scatter:
         ratio = float(np.mean(found.sum(axis=0) / unit))
         return ratio, float(_counted((expected / unit).sum(axis=1, keepdims=True))[0])
 
-    def noise(self, X: Array, strength: Array, pool: Pool) -> Array:
+    def noise(self, X: Array, strength: Array, pool: Pool, *, widened: bool = True) -> Array:
         """Covariance (m, m) of what the data say along ``X``, in units of what the sums claim.
 
-        In no direction is it less than the sums claim.  It is that of Student's t: what is known
-        with few degrees of freedom is wider.
+        In no direction is it less than the sums claim.
 
         Args:
             X: (m, m) directions in which the data's information is diagonal.
             strength: (m,) that information; along the weak ones all is as the pool is.
             pool: of the flight.
+            widened: that of Student's t: what is known with few degrees of freedom is wider.
         """
         if math.isinf(pool.freedom):
             return np.eye(len(strength)) * max(pool.variance, 1.0)
@@ -94,10 +94,10 @@ class Scatter:
         own = np.where(strength > 1.0, _counted(expected), 0.0)
         total = pool.freedom + own
         freedom = np.maximum(total, FEWEST_FREEDOM)
-        widened = freedom / (freedom - 2.0)
-        share = np.sqrt(widened * own / total) / unit
+        wider = freedom / (freedom - 2.0) if widened else np.ones(len(freedom))
+        share = np.sqrt(wider * own / total) / unit
         scores = self._scores @ X * share
-        V = scores.T @ scores + np.diag(widened * pool.variance * pool.freedom / total)
+        V = scores.T @ scores + np.diag(wider * pool.variance * pool.freedom / total)
         size, turned = np.linalg.eigh(V)
         out: Array = (turned * np.maximum(size, 1.0)) @ turned.T
         return out

@@ -8,12 +8,14 @@ blocks of the flight contradict each other, and it differs from direction to dir
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from onboard.core.estimate.limits import (
+    CONTRADICTION,
     FEWEST_BLOCKS,
     FOLDS,
     GRAM_DOUBT,
@@ -38,6 +40,7 @@ class Solution:
         information: (m, m) of the data alone, inflated likewise.
         variance_inflation: factor on the variance of the six, or of the sum of them that blocks
             contradict each other about most, at least 1.
+        contradicts: whether blocks ask for different parameters.
         nis: mean normalised innovation squared at ``theta``; 1 if the noise model is right.
         rows: number of whitened innovations behind it.
     """
@@ -46,6 +49,7 @@ class Solution:
     covariance: Array
     information: Array
     variance_inflation: float
+    contradicts: bool
     nis: float
     rows: float
 
@@ -75,10 +79,13 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     nis = sums.residual(theta) / max(sums.rows, 1.0)
     X, strength = directions_of(D, prior_information)
     V = np.eye(model.size) * max(1.0, nis)
+    bare: Callable[[], Array] = V.copy
     if len(blocks) >= FEWEST_BLOCKS:
         share = np.divide(np.diag(G), sums.G, out=np.zeros(sums.size), where=sums.G > 0)
         scatter = Scatter.of(blocks, theta, inverse, share)
-        V = scatter.noise(X, strength, scatter.pool(prior_information, max(1.0, nis)))
+        pool = scatter.pool(prior_information, max(1.0, nis))
+        V = scatter.noise(X, strength, pool)
+        bare = partial(scatter.noise, X, strength, pool, widened=False)
     weighing = Weighing(X, strength, V)
     theta = model.prior + weighing.estimate(sums.b - D @ model.prior)
     # Sandwich: the innovations carry D + G of information, of which G is not signal.
@@ -89,11 +96,21 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     covariance = weighing.covariance(noise)
     plain = (X / (np.maximum(strength, 0.0) + 1.0)) @ X.T
     six = model.slices.get("six", slice(None))
+
+    def inflation(by: Weighing) -> float:
+        return _largest_ratio(by.covariance(by.noise(D))[six, six], plain[six, six])
+
+    inflated = inflation(weighing)
+    # That little is known of the noise makes sigmas wider, and is no contradiction.
+    contradicts = inflated > CONTRADICTION and (
+        inflation(Weighing(X, strength, bare())) > CONTRADICTION
+    )
     return Solution(
         theta,
         covariance,
         (information + information.T) / 2,
-        _largest_ratio(weighing.covariance(weighing.noise(D))[six, six], plain[six, six]),
+        inflated,
+        contradicts,
         nis,
         sums.rows,
     )
