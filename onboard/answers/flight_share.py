@@ -18,10 +18,11 @@ from dataclasses import dataclass, replace
 from onboard.answers.answer import Answer
 from onboard.answers.recorded import NO_FLIGHT, Recorded
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.diagnosis.together import Asked
 from onboard.core.estimate.calibration_record import judged_by
 from onboard.core.estimate.calibration_status import doubt_of
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.merged_flights import Apart, FlightSix, flight_six
+from onboard.core.estimate.merged_flights import Apart, FlightSix, flight_six, raw_of
 from onboard.core.estimate.merged_record import of_raw
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameters_of
@@ -42,12 +43,18 @@ class Share:
         said: what it says to the others; None if it does not count.
         judged: its calibration, residuals against the parameters in force last.
         why: it does not count, in words; empty if it does.
+        applied: what the samples were not raw of; None if they were.
     """
 
     given: Answer
     said: FlightSix | None
     judged: Calibration
     why: str
+    applied: SixParameters | None = None
+
+    def of_raw(self, asked: Asked) -> Asked:
+        """What it says of an effect, for the six of the raw sensor."""
+        return asked if self.applied is None else asked.of_raw(raw_of(self.applied))
 
 
 def share_of(
@@ -76,7 +83,7 @@ def share_of(
         given = replace(given, diagnosis=replace(given.diagnosis, calibration=judged))
     elif engine is not None and SixParameters(c.in_force_scale, c.in_force_offset) != in_force:
         judged = judged_by(c, engine, in_force)
-    return Share(given, said, judged, why)
+    return Share(given, said, judged, why, applied)
 
 
 def _center(engine: Engine) -> SixParameters | None:

@@ -13,11 +13,15 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from onboard.answers.answer import Answer, FlightAnswer
 from onboard.answers.chronicles import Chronicles
 from onboard.answers.flight_share import NOT_COMPARED, Share, share_of
 from onboard.answers.flight_words import agreement, contradiction, left_out, others
 from onboard.answers.recorded import KEEPING_ALL, NO_FLIGHT, Recorded
+from onboard.core.diagnosis.together import Told, undecided_together
+from onboard.core.diagnosis.undecided import Undecided, in_words, left_open
 from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.merged_flights import Prior, Reconciled, merged, reconciled
 from onboard.core.estimate.merged_record import merged_calibration, unknown_six
@@ -42,7 +46,7 @@ class Flights:
             watched: keep what a report draws.
         """
         self._names, self._wanted, self._watched = tuple(names), wanted, watched
-        self._flights = [Recorded(wanted, watched=watched)]
+        self._flights = [self._another()]
         self._answers: dict[int, Answer] = {}
         self._seen: dict[int, Observability] = {}
 
@@ -74,8 +78,11 @@ class Flights:
     def restart(self) -> object:
         """Another recording of the same vehicle begins."""
         done = self._flights[-1].finish()
-        self._flights.append(Recorded(self._wanted, watched=self._watched))
+        self._flights.append(self._another())
         return done
+
+    def _another(self) -> Recorded:
+        return Recorded(self._wanted, watched=self._watched, one_of_several=True)
 
     def feed(self, sample: Sample) -> object:
         """Take a sample."""
@@ -149,15 +156,32 @@ class Flights:
             return _with(last.given, replace(made, note=note), answers)
         chosen = [counting[i] for i in found.counted]
         judged = [f.judged for i in chosen if (f := flights[i]) is not None]
+        open_ = self._open_together(imu, flights, chosen, prior)
+        together = merged([said[i] for i in found.counted], prior)
+        together = replace(together, covariance=together.covariance + left_open(open_))
         made, self._seen[imu] = merged_calibration(
             judged,
-            merged([said[i] for i in found.counted], prior),
+            together,
             in_force,
             KEEPING_ALL.needs,
             next((k for f in reversed(self._flights) if (k := f.calibrator.kind)), ""),
         )
-        note = " ".join(x for x in (agreement(answers, found), others(answers), made.note) if x)
+        said_of = in_words(open_, made, "The flights together leave")
+        notes = (agreement(answers, found), others(answers), said_of, made.note)
+        note = " ".join(x for x in notes if x)
         return _with(last.given, replace(made, note=note), answers)
+
+    def _open_together(
+        self, imu: int, flights: Sequence[Share | None], chosen: Sequence[int], prior: Prior
+    ) -> list[Undecided]:
+        """Effects that may be in all flights though none shows it."""
+        told = []
+        for k, (flight, recorded) in enumerate(zip(flights, self._flights, strict=True)):
+            if flight is None or flight.said is None:
+                continue
+            six = flight.said.information if k in chosen else np.zeros((6, 6))
+            told.append(Told([flight.of_raw(a) for a in recorded.effects(imu)], six))
+        return undecided_together(told, prior.sigma)
 
     def _in_force(self, imu: int) -> list[SixParameters | None]:
         """By recording what was in force in it, where only another recording says it."""

@@ -18,6 +18,7 @@ from onboard.answers.answer import Answer, judged
 from onboard.answers.chronicle import Chronicle
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
+from onboard.core.diagnosis.together import Asked, asked_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
@@ -38,17 +39,22 @@ KEEPING_ALL = CalibratorSettings(refine=False, at_once=False, buffer_s=math.inf)
 class Recorded:
     """An estimator for :func:`onboard.answers.replay.replay` whose calibrations are answers."""
 
-    def __init__(self, wanted: Collection[int] = (), *, watched: bool = False) -> None:
+    def __init__(
+        self, wanted: Collection[int] = (), *, watched: bool = False, one_of_several: bool = False
+    ) -> None:
         """Take what to read.
 
         Args:
             wanted: accelerometers to ask about (none named: all); each costs as much as another.
             watched: keep what a report draws.
+            one_of_several: keep what the flight says of effects that it does not show by itself.
         """
         prefer_compiled()  # hundreds of passes pay for the import
         self.calibrator = Calibrator(KEEPING_ALL, only=wanted)
         self.chronicle = Chronicle(self.calibrator) if watched else None
         self._reader = self.chronicle or self.calibrator
+        self._asked_of: dict[int, tuple[Asked, ...]] = {}
+        self._one_of_several = one_of_several
         self._answers: dict[int, Answer] = {}
         self._engines: dict[int, Engine] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
@@ -111,6 +117,10 @@ class Recorded:
             self._answers[imu] = self._asked(imu)
         return self._answers[imu]
 
+    def effects(self, imu: int) -> tuple[Asked, ...]:
+        """What it says, as one of several flights, of effects that are alike in all of them."""
+        return self._asked_of.get(imu, ())
+
     def engine(self, imu: int) -> Engine | None:
         """Whose sums gave the answer; None where there is no diagnosis."""
         return self._engines.get(imu)
@@ -143,6 +153,8 @@ class Recorded:
             plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+        if self._one_of_several:
+            self._asked_of[imu] = asked_of(found.choice)
         found.engine.let_epochs_go()  # a report asks for its sums and states
         self._engines[imu] = found.engine
         if self.chronicle is not None:

@@ -17,6 +17,7 @@ from onboard.cli.table import replay_report
 from onboard.core.estimate.result import Status
 from onboard.report.replay import replay_html
 from sitl import recording
+from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis
 from sitl.builtin.truth import GpsTruth, ImuTruth
 from sitl.recording import FlightSpec
 from tests.report.html_page import Page
@@ -150,3 +151,29 @@ def test_a_single_recording_has_no_flights(files):
 def test_names_tell_files_apart():
     assert distinct(["a/x.BIN", "b/y.BIN"]) == ("x.BIN", "y.BIN")
     assert distinct(["a/x.BIN", "b/x.BIN"]) == ("a/x.BIN", "b/x.BIN")
+
+
+def test_what_no_flight_shows_and_all_have_is_in_the_sigmas(tmp_path):
+    """A loop of 0.03 m/s^2: the y scale of the mean of six planes was 4.2 sigma off."""
+    loop = AccelerometerHysteresis(x=0.03, y=0.03, z=0.03)
+    paths = []
+    for seed in range(500, 506):
+        spec = FlightSpec(
+            vehicle="plane",
+            seed=seed,
+            duration=100.0,
+            imus=(TRUE,),
+            gps=GpsTruth(delay=0.14),
+            effects=(loop,),
+        )
+        paths.append(tmp_path / f"{seed}.tlog")
+        recording.write_tlog(spec, paths[-1])
+    (answer,) = replay(paths, Flights(distinct(paths))).answers
+    assert all(f.counted for f in answer.flights)
+    names = [e.name for f in answer.flights for e in f.given.diagnosis.effects]
+    assert "accelerometer_hysteresis" not in names
+    c = answer.calibration
+    off = np.abs(np.array(c.scale + c.offset) - SIX)
+    assert np.all(off < 3.0 * np.array(c.sigma_with_its_gyroscope))
+    assert "The flights together leave open whether" in c.note
+    assert "(accelerometer_hysteresis)" in c.note

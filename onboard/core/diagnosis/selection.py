@@ -149,6 +149,12 @@ class Fitter:
         out: Array = np.linalg.inv(np.linalg.inv(A)[np.ix_(place, place)])
         return out
 
+    def moved_by(self, free: Sequence[int], columns: Sequence[int]) -> Array:
+        """(f, k) by how much the unknowns ``free`` are larger with one of each of ``columns``."""
+        index, by = list(free), list(columns)
+        A = self._information(self.sums, index) + np.diag(self.prior_information[index])
+        return np.asarray(-np.linalg.solve(A, self.sums.signal[np.ix_(index, by)]), np.float64)
+
     def variance_along(self, fit: Fit, columns: Sequence[int]) -> tuple[float, float]:
         """Variance over what the sums say along some columns of a fit, and its freedom."""
         if np.isinf(self.pool.freedom):

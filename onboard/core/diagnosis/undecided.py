@@ -72,7 +72,9 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
     return out
 
 
-def in_words(models: Sequence[Undecided], calibration: Calibration) -> str:
+def in_words(
+    models: Sequence[Undecided], calibration: Calibration, who: str = "This flight leaves"
+) -> str:
     """Which of them most of the sigma of a number is about; empty if there is none."""
     claimed = np.array(calibration.covariance).diagonal()
     jacobian = parameters_jacobian(SixParameters(calibration.scale, calibration.offset).as_linear())
@@ -85,7 +87,7 @@ def in_words(models: Sequence[Undecided], calibration: Calibration) -> str:
             unit = "" if most < 3 else " m/s^2"
             way = "larger" if moves[most] > 0.0 else "smaller"
             out.append(
-                f"This flight leaves open whether {_clause(model.title)} ({model.effect}): the "
+                f"{who} open whether {_clause(model.title)} ({model.effect}): the "
                 f"other way the {SIX_NAMES[most]} would be {abs(moves[most]):.3f}{unit} {way}, "
                 "which its sigma includes."
             )

@@ -57,14 +57,19 @@ class FlightSix:
 
     def of_raw(self, applied: SixParameters) -> FlightSix:
         """The same of the raw sensor, if the samples were not raw but ``applied`` to it."""
-        s, beta = np.array(applied.scale), applied.as_linear()[3:]
-        back = np.linalg.inv(np.block([[np.diag(s), np.zeros((3, 3))], [np.diag(beta), np.eye(3)]]))
+        back = np.linalg.inv(raw_of(applied))
         return FlightSix(
             back.T @ self.information @ back,
             back.T @ self.vector,
             back.T @ self.floored @ back,
             back.T @ self.floored_vector,
         )
+
+
+def raw_of(applied: SixParameters) -> Array:
+    """(6, 6) scale and beta of the raw sensor, of those of samples with ``applied`` in them."""
+    s, beta = np.array(applied.scale), applied.as_linear()[3:]
+    return np.block([[np.diag(s), np.zeros((3, 3))], [np.diag(beta), np.eye(3)]])
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_status import good_enough
 from onboard.core.estimate.joint import FLOOR
-from onboard.core.estimate.merged_flights import Merged
+from onboard.core.estimate.merged_flights import Merged, raw_of
 from onboard.core.estimate.observability import Needs, Observability, assess
 from onboard.core.estimate.result import (
     Calibration,
@@ -109,8 +109,7 @@ def unknown_six(c: Calibration, in_force: SixParameters) -> Calibration:
 
 def of_raw(c: Calibration, applied: SixParameters) -> Calibration:
     """The record of the raw sensor, if its samples were not raw but ``applied`` to them."""
-    s, o = np.array(applied.scale), np.array(applied.offset)
-    T = np.block([[np.diag(s), np.zeros((3, 3))], [np.diag(applied.as_linear()[3:]), np.eye(3)]])
+    s, o, T = np.array(applied.scale), np.array(applied.offset), raw_of(applied)
     x = linear_of(np.array(c.scale + c.offset))
     back = T @ np.linalg.inv(parameters_jacobian(x))
     mean, square = np.array(c.load_mean), np.array(c.load_square)

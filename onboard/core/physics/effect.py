@@ -139,6 +139,7 @@ class Effect(Family):
         of_attitude: it is the recorded attitude that is wrong.
         in_every_model: its unknowns that are estimated anyway.
         least: size of a timing unknown from which it counts, s; None for what is no timing.
+        of_flight: another flight of the vehicle has another size of it, or none.
         excluded: it is seen in the data themselves; what it spoils is left out of the fit.
         named: False for a description without a physical name.
         untestable: why no recording can show it; empty if one can.
@@ -166,6 +167,7 @@ class Effect(Family):
     of_attitude: ClassVar[bool] = False
     in_every_model: ClassVar[tuple[str, ...]] = ()
     least: ClassVar[float | None] = None
+    of_flight: ClassVar[bool] = False
     excluded: ClassVar[bool] = False
     named: ClassVar[bool] = True
     untestable: ClassVar[str] = ""

@@ -23,6 +23,7 @@ class BiasRamp(Effect):
     source = "first-order drift, IEEE Std 1293"
     cure = "recalibrate; look for a cause that grows with time (warming, moisture, a loose mount)"
     apart = "fly longer, once cold and once warm"
+    of_flight = True
     tilts_ekf = True
     changes_force = True
     response = curves.Response(

@@ -56,6 +56,7 @@ class BiasStep(Effect):
     source = "step in the offset: a shock, a mount that gave way"
     cure = "inspect the mount of the autopilot; recalibrate on the ground"
     apart = "fly on: a step stays"
+    of_flight = True
     tilts_ekf = True
     changes_force = True
     response = curves.Response(

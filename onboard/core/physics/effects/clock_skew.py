@@ -27,6 +27,7 @@ class ClockSkew(Effect):
     source = "delay that grows: rate (t - t0)"
     cure = "look at the time stamps: driver, transport, or a log put together from two clocks"
     apart = "fly longer"
+    of_flight = True
     keys = ("rate",)
     plausible = (0.01,)
     unknowns = (Unknown("clock_rate", "1", 0.0, 3e-3),)

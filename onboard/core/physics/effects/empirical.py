@@ -34,6 +34,7 @@ class Empirical(Effect):
     source = "search among products of measured signals"
     cure = "find out what the formula stands for: no effect of the catalogue has this form"
     apart = "fly the manoeuvre in which the signal changes and nothing else does"
+    of_flight = True
     named = False
     written = ""
 

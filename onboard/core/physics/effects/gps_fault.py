@@ -20,6 +20,7 @@ class GpsFault(Effect):
     source = "innovation gate, and dead reckoning over what the trust window has refused"
     cure = "look at the antenna's view of the sky, at jamming, at the receiver's power"
     apart = "fly the same place again: a multipath returns there, a failing receiver anywhere"
+    of_flight = True
     excluded = True
 
     @classmethod

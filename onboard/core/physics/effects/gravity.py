@@ -24,6 +24,7 @@ class Gravity(Effect):
     source = "Somigliana's formula says what to expect"
     cure = "none: the autopilot integrates with 9.80665 everywhere"
     apart = "fly steep banked turns: an offset turns with the body, gravity does not"
+    of_flight = True
     keys = ("delta_g",)
     is_averaged = False
     # Poles to equator, and 5 km up, it is between 0.03 more and 0.045 less than the standard.
