@@ -32,7 +32,11 @@ def again(first: Match, log: Path, *, seconds: float, speedup: float) -> Match:
     """
     kind = "plane" if first.vehicle.vehicle == "plane" else "copter"
     told = {s.name: s.value for s in first.settings if s.name.startswith("SIM_WIND")}
-    told |= {s.name: s.value for s in first.settings if s.name.startswith("SIM_ARSPD")}
+    airspeed = {s.name: s.value for s in first.settings if s.name.startswith("SIM_ARSPD")}
+    if airspeed:
+        # What the simulated tube has is for an autopilot that reads it as the recorded one does.
+        own = first.real.signals.parameters
+        told |= airspeed | {n: own[n] for n in ("ARSPD_RATIO",) if n in own}
     asyncio.run(
         fly(
             kind,
