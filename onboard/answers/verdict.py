@@ -14,6 +14,7 @@ from onboard.answers.words import (
     setting,
     signed,
 )
+from onboard.core.diagnosis.excess import HEADING
 from onboard.core.diagnosis.records import Diagnosis, Unused, Verdict
 from onboard.core.physics.catalogue import (
     danger_of,
@@ -52,7 +53,9 @@ def headline(diagnosis: Diagnosis) -> str:
         what = "" if diagnosis.silent else " what is missing"
         return f"This flight shows too little to tell{what}"
     if diagnosis.verdict is Verdict.CLEAN:
-        return "Nothing is missing from the model" + (WHERE_BELIEVED if diagnosis.unused else "")
+        where = WHERE_BELIEVED if diagnosis.unused else ""
+        but = ", but the heading is wrong" if HEADING in diagnosis.note else ""
+        return f"Nothing is missing from the model{where}{but}"
     named = [e for e in diagnosis.effects if is_named(e.name)]
     named.sort(key=lambda e: not danger_of(e))  # what is dangerous is not "one more effect"
     if not named:

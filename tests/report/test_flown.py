@@ -42,26 +42,25 @@ def standing(made, t):
 
 
 @pytest.mark.parametrize("cruise", [1350.0, 1500.0, 1800.0])
-def test_a_low_hover_is_no_ground_where_the_rotors_carry_it(cruise):
-    made = found(hop(cruise=cruise))
-    assert standing(made, 3.0)
-    assert standing(made, 57.0)
-    assert not any(standing(made, t) for t in np.arange(13.1, 46.9, 0.5))
+def test_a_recording_that_begins_and_ends_in_a_hover_has_no_ground(cruise):
+    made = found(hop(cruise=cruise, begin=11.0, end=49.0))
+    assert made.grounded == []
 
 
-def test_without_outputs_the_height_decides():
-    """As low as the ground, and still: nobody knows that it hovers."""
-    assert standing(found(hop(motors=False)), 12.0)
+def test_without_outputs_nobody_knows_that_it_hovers():
+    assert standing(found(hop(motors=False, begin=11.0, end=49.0)), 12.0)
 
 
 def test_what_does_not_turn_stands_whatever_its_motors_do():
     """Its battery is empty, or it lies on its back."""
-    assert standing(found(hop(turns=0.0)), 12.0)
+    assert standing(found(hop(turns=0.0, begin=11.0, end=49.0)), 12.0)
 
 
-def test_a_recording_that_begins_and_ends_in_a_hover_has_no_ground():
-    made = found(hop(begin=11.0, end=49.0, height=12.0))
-    assert made.grounded == []
+def test_what_is_still_and_as_low_as_a_stand_is_left_out_with_it():
+    """The air is another one there, and heights wander."""
+    made = found(hop())
+    assert all(standing(made, t) for t in (3.0, 12.0, 48.0, 57.0))
+    assert not any(standing(made, t) for t in np.arange(18.5, 41.5, 0.5))
 
 
 def test_streams_of_two_boots_are_apart():

@@ -11,7 +11,7 @@ from onboard.core.diagnosis.candidates import smallest
 from onboard.core.diagnosis.companions import Companions
 from onboard.core.diagnosis.epochs import rms
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.excess import excess_in_words
+from onboard.core.diagnosis.excess import excess_in_words, spoils
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.hypotheses import Choice, of_others
@@ -195,9 +195,10 @@ class Judge:
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, (
                 "what was found may stand for something that is not in the model. " + note
             )
-        excess = excess_in_words(self.engine.noise)
-        if excess:
-            return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, f"{excess} {note}"
+        if excess := excess_in_words(self.engine.noise):
+            note = f"{excess} {note}"
+        if spoils(self.engine.noise):
+            return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
         if effects:
             if left:
                 return Verdict.PARTLY_EXPLAINED, (

@@ -4,6 +4,9 @@ Noise is estimated with what else is missing, and takes in whatever has no colum
 fails bends the heading by tens of degrees, and a heading's slow error that may be as large as it
 likes makes a perfect fit of that.  Each level has a highest value, which is physics
 (:data:`onboard.core.filter.limits.LIMITS`); a flight that asks for it asks for more.
+
+A heading that is wrong spoils nothing of an accelerometer (so it is with a constant one): it is
+taken out of the calibration, and worth knowing.
 """
 
 from __future__ import annotations
@@ -39,3 +42,8 @@ def excess_in_words(noise: NoiseLevels) -> str:
     """What is no noise any more, one sentence; empty if all is."""
     said = list(dict.fromkeys(WORDS[name] for name in noise.at_highest))
     return f"{', and '.join(said)}." if said else ""
+
+
+def spoils(noise: NoiseLevels) -> bool:
+    """Whether any of it is not the heading's."""
+    return any(WORDS[name] != HEADING for name in noise.at_highest)

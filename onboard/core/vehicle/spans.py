@@ -31,7 +31,8 @@ def grounded_spans(
         height: (n,) m.
         said: (n,) where the autopilot says that it stands; a word that is not taken back in the
             air costs what is still.
-        carried: (n,) where rotors lift as much as in flight: that is no stand.
+        carried: (n,) where rotors lift as much as in flight.  A recording that has no other stand
+            was begun and ended in the air, and knows no ground.
         rolls: whether it may move on the ground: then what is level, and as low as where it
             stands before or after, is the ground.
         wings: whether it is a plane.
@@ -40,16 +41,14 @@ def grounded_spans(
         return []
     v_n = np.where(np.isnan(v_n), np.stack([0.0 * t, 0.0 * t, -_climb(t, height)], axis=1), v_n)
     slow = np.linalg.norm(v_n, axis=1) < STILL_M_S
-    if carried is not None:
-        slow &= ~carried
+    if carried is not None and np.all([np.mean(carried[i:j]) > 0.5 for i, j in _lasting(t, slow)]):
+        return []
     runs = _lasting(t, slow)
     stands = [] if said is None else _lasting(t, slow & said)
     apart_m = HEIGHT_WANDER_M if wings else GROUND_M
     if rolls:
         level = np.abs(v_n[:, 2]) < LEVEL_M_S
         low = height < _ground(t, height, runs, apart_m) + GROUND_M
-        if carried is not None:
-            low &= ~carried
         runs += _lasting(t, level & low)
     levels = [float(np.median(height[i:j])) for i, j in runs]
     lowest = min(levels, default=np.inf)
