@@ -83,7 +83,8 @@ def test_trust_is_told_without_gaps_and_agrees_with_the_window(told):
 def test_a_second_recording_is_drawn_after_the_first(flight, told, tmp_path):
     once = told[1].duration_s
     again = tmp_path / "again.tlog"
-    again.write_bytes(flight.read_bytes())
+    spec = FlightSpec(vehicle="copter", seed=2, duration=100.0, imus=(TRUE,))
+    recording.write_tlog(spec, again)
     recorded = Recorded(watched=True)
     replay([flight, again], recorded)
     chronicle = recorded.chronicle
