@@ -21,7 +21,8 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S, Ground
-from onboard.core.inputs.boot_time import began_anew
+from onboard.core.inputs.boot_time import NEXT_S, Boots
+from onboard.core.inputs.range_checks import impossible
 from onboard.core.inputs.samples import (
     FIX_3D,
     AirData,
@@ -73,7 +74,8 @@ class Flown:
         self.ground = 0.0
         self.flying: list[Batch] = []
         self.kind = ""
-        self._newest, self._shift = -math.inf, 0.0
+        self._boots, self._shift = Boots(), 0.0
+        self._held: list[Sample] = []
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -96,17 +98,29 @@ class Flown:
         Where the autopilot's clock begins anew, all that follows is later: streams of two boots are
         never held against each other.
         """
-        if sample.t is not None and math.isfinite(sample.t):
-            if began_anew(sample.t + self._shift, self._newest):
-                self._shift = self._newest + PAUSE_S - sample.t
-            if self._shift:
-                sample = later(sample, sample.t, self._shift)
-            self._newest = max(self._newest, sample.t or 0.0)
-        if not isinstance(sample, ImuSample) or sample.imu == self.imu:
-            self._kept.append(sample)
         if isinstance(sample, VehicleState) and sample.kind:
             self.kind = sample.kind
+        if not isinstance(sample, ImuSample):
+            self._held.append(sample)
+        elif sample.imu == self.imu and impossible(sample) is None:
+            before = self._boots.newest
+            if self._boots.begins(sample.t):
+                self._shift += before + PAUSE_S - sample.t
+            self._held.append(sample)
+        if not self._boots.doubtful:
+            self._keep(sample.t if isinstance(sample, ImuSample) else math.inf)
         return None
+
+    def _keep(self, now: float) -> None:
+        """Keep what waited for its clock; stamps that no other one confirmed were damaged."""
+        for sample in self._held:
+            if isinstance(sample, ImuSample) and not 0.0 <= now - sample.t <= NEXT_S:
+                continue
+            if self._shift and sample.t is not None:
+                self._kept.append(later(sample, sample.t, self._shift))
+            else:
+                self._kept.append(sample)
+        self._held.clear()
 
     def restart(self) -> object:
         """One recording is one flight: nothing to forget."""
@@ -114,6 +128,7 @@ class Flown:
 
     def finish(self) -> object:
         """Everything is known now: find the ground, and learn from the rest."""
+        self._keep(math.inf)
         fixes = [s for s in self._kept if _counts(s)]
         if fixes:
             t = np.array([f.t for f in fixes])
@@ -180,7 +195,11 @@ class Flown:
                 [s for s in blown if s.wind_sigma is not None],
                 lambda s: (s.wind_n or 0.0, s.wind_e or 0.0, s.wind_sigma or 0.0),
             ),
-            parameters={s.name: s.value for s in kept if isinstance(s, ParameterValue)},
+            parameters={
+                s.name: s.value
+                for s in kept
+                if isinstance(s, ParameterValue) and impossible(s) is None
+            },
             kind=self.kind,
             normalised=normalised,
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from onboard.answers.flown import FlownRecording, flown
 from onboard.answers.match_settings import Setting, settings_of
-from onboard.answers.same_flight import refuse_one_flight_twice, refuse_other_boards
+from onboard.answers.same_flight import refuse_copies, refuse_one_flight_twice, refuse_other_boards
 from onboard.answers.sensor_level import TIMING_NAMES, sensor_differences
 from onboard.core.diagnosis.records import NotTestable, Verdict
 from onboard.core.inputs.segments import Batch
@@ -149,7 +149,9 @@ def _refuse_strangers(first: FlownRecording, others: Sequence[FlownRecording]) -
     for other in others:
         first.source.vehicle.refuse(other.source.vehicle)
     every = (first, *others)
-    refuse_other_boards([r for flown_ in every for r in flown_.source.recordings])
+    recordings = [r for flown_ in every for r in flown_.source.recordings]
+    refuse_copies(recordings)
+    refuse_other_boards(recordings)
     refuse_one_flight_twice([track for flown_ in every for track in flown_.source.vehicle.tracks])
 
 

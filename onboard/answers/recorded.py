@@ -148,13 +148,13 @@ class Recorded:
         try:
             found = examine(self.calibrator, imu)
             given = judged(found.diagnosis())
+            if self._one_of_several:
+                self._asked_of[imu] = asked_of(found.choice)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
             why = f"the flight could not be diagnosed ({error})"
             plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
-        if self._one_of_several:
-            self._asked_of[imu] = asked_of(found.choice)
         found.engine.let_epochs_go()  # a report asks for its sums and states
         self._engines[imu] = found.engine
         if self.chronicle is not None:

@@ -11,7 +11,7 @@ from onboard.answers.same_flight import Track
 from onboard.core.estimate.result import Calibration, Coverage
 from onboard.core.inputs.assembly import mean_step
 from onboard.core.inputs.blocks import Block, Piece
-from onboard.core.inputs.boot_time import began_anew
+from onboard.core.inputs.boot_time import Boots
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
@@ -35,12 +35,17 @@ class Vehicle:
         """Time on the ground, s."""
         self._parameters: dict[str, float] = {}
         self._device: dict[int, tuple[np.float32, Recording]] = {}
-        self.tracks: list[Track] = []
-        """By recording, and by boot."""
+        self._tracks: dict[tuple[int, int], Track] = {}
+        self._boot, self._boots = 0, Boots()
 
-    def begin(self, recording: Recording) -> None:
-        """Its samples come next."""
-        self.tracks.append(Track(recording))
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Where it went: of each recording, boot and receiver."""
+        return tuple(self._tracks.values())
+
+    def begin(self) -> None:
+        """Samples of another recording come next."""
+        self._boot, self._boots = self._boot + 1, Boots()
 
     def check(self, sample: Piece, recording: Recording) -> None:
         """Take a sample, or many.
@@ -51,24 +56,32 @@ class Vehicle:
         if isinstance(sample, Block):
             for columns in sample.imus:
                 self._count(columns.imu, columns.t)
+                self._hear(columns.t)
             for other in sample.others:
                 self.check(other, recording)
         elif isinstance(sample, ImuSample):
             self._count(sample.imu, (sample.t,))
+            self._hear((sample.t,))
         elif isinstance(sample, GpsFix):
             self._fixes += 1
             self._follow(sample, recording)
             self._placed += sample.fix_type >= FIX_3D
         elif isinstance(sample, ParameterValue) and sample.name.startswith("INS"):
             self._parameters[sample.name] = sample.value
-            if sample.name in DEVICE_IDS and sample.value:
+            if sample.name in DEVICE_IDS and sample.value and float(sample.value).is_integer():
                 self._check_device(sample, recording)
 
-    def _follow(self, fix: GpsFix, recording: Recording) -> None:
+    def _hear(self, times: Sequence[float] | Array) -> None:
         """A recording that begins anew may be one that was put behind itself."""
-        if began_anew(fix.t, self.tracks[-1].newest):
-            self.begin(recording)
-        self.tracks[-1].add(fix)
+        # Of many, two of the first tell another boot, and the last how far it has come.
+        for t in (*times[:2], times[-1]) if len(times) > 2 else times:
+            self._boot += self._boots.begins(float(t))
+
+    def _follow(self, fix: GpsFix, recording: Recording) -> None:
+        track = self._tracks.get((self._boot, fix.receiver))
+        if track is None:
+            track = self._tracks[self._boot, fix.receiver] = Track(recording)
+        track.add(fix)
 
     def _count(self, imu: int, times: Sequence[float] | Array) -> None:
         self._samples[imu] += len(times)

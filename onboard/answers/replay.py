@@ -17,7 +17,7 @@ from onboard.answers.flight_document import FlightsDocument, flight_document
 from onboard.answers.recorded import unanswered
 from onboard.answers.recorded_vehicle import Vehicle
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
-from onboard.answers.same_flight import refuse_one_flight_twice, refuse_other_boards
+from onboard.answers.same_flight import refuse_copies, refuse_one_flight_twice, refuse_other_boards
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.blocks import Block
@@ -225,6 +225,7 @@ def read(
     recordings = tuple(p if isinstance(p, Recording) else open_recording(p) for p in paths)
     _refuse_repetition(recordings)
     _refuse_mixture(recordings)
+    refuse_copies(recordings)
     refuse_other_boards(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
     vehicle = Vehicle()
@@ -233,7 +234,7 @@ def read(
     for recording in recordings:
         if recording is not recordings[0]:
             reader.restart()
-        vehicle.begin(recording)
+        vehicle.begin()
         told = fed
         for piece in recording.samples() if gatherer is None else recording.pieces():
             vehicle.check(piece, recording)

@@ -8,6 +8,7 @@ the same centimetres one after the other.
 
 from __future__ import annotations
 
+import filecmp
 import math
 from collections.abc import Sequence
 
@@ -32,18 +33,15 @@ class Track:
 
     Attributes:
         recording: whose it is.
-        newest: time of the newest fix, s.
     """
 
     def __init__(self, recording: Recording) -> None:
         """Begin one."""
         self.recording = recording
-        self.newest = -math.inf
         self._places: set[tuple[int, int]] = set()
 
     def add(self, fix: GpsFix) -> None:
         """Take a fix."""
-        self.newest = max(self.newest, fix.t)
         if fix.fix_type < FIX_3D or not math.hypot(fix.v_n, fix.v_e) > MOVING_M_S:
             return
         place = math.degrees(fix.latitude), math.degrees(fix.longitude)
@@ -53,7 +51,7 @@ class Track:
     def is_of(self, other: Track) -> bool:
         """Whether both went through the same places."""
         fewer = min(len(self._places), len(other._places))
-        return fewer >= FEWEST and len(self._places & other._places) > SHARE * fewer
+        return fewer >= FEWEST and len(self._places & other._places) >= SHARE * fewer
 
 
 def refuse_one_flight_twice(tracks: Sequence[Track]) -> None:
@@ -75,6 +73,24 @@ def refuse_one_flight_twice(tracks: Sequence[Track]) -> None:
             )
 
 
+def refuse_copies(recordings: Sequence[Recording]) -> None:
+    """See that no recording is a copy of another one: a hover goes to no places that tell it.
+
+    Raises:
+        UsageError: one of them is.
+    """
+    for k, recording in enumerate(recordings):
+        for other in recordings[:k]:
+            try:
+                alike = filecmp.cmp(recording.path, other.path, shallow=False)
+            except OSError:  # arrays of a program
+                continue
+            if alike:
+                raise UsageError(
+                    f"{recording.path}: the same flight as {other.path}; give one of the two"
+                )
+
+
 def refuse_other_boards(recordings: Sequence[Recording]) -> None:
     """See that no recording names another board than the others.
 
@@ -93,7 +109,8 @@ def refuse_other_boards(recordings: Sequence[Recording]) -> None:
             continue
         if known is None:
             known = board, recording
-        elif board != known[0]:
+        # MAVLink has a short one and a long one.
+        elif board != known[0] and len(board) == len(known[0]):
             raise RecordingError(
                 f"{recording.path}: of another vehicle than {known[1].path} "
                 f"(board {board}, there {known[0]})"

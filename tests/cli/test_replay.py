@@ -57,9 +57,10 @@ def saved(tmp_path: Path, name: str, data: object) -> Path:
     return path
 
 
-def with_device(device: int) -> DataflashWriter:
+def with_device(device: int, flight: int = 0) -> DataflashWriter:
     log = modern_log(1)
     log.add("PARM", 6_000_000, "INS_ACC_ID", float(device), 0.0)
+    log.add("PARM", 6_000_000, "STAT_BOOTCNT", float(flight), 0.0)
     return log
 
 
@@ -143,7 +144,7 @@ def test_without_any_answer_each_accelerometer_is_insufficient(tmp_path):
 
 def test_recordings_of_another_vehicle_are_refused(tmp_path):
     mine, same, other = (
-        saved(tmp_path, f"{k}.BIN", with_device(device))
+        saved(tmp_path, f"{k}.BIN", with_device(device, k))
         for k, device in enumerate((2_753_028, 2_753_028, 2_753_036))
     )
     assert len(replay([mine, same], Listener()).recordings) == 2

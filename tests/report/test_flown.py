@@ -1,5 +1,7 @@
 """A recording as a flight: where it was on the ground, and where the clock began anew."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,33 @@ def test_streams_of_two_boots_are_apart():
     assert np.all(np.diff(outputs.t) < 11.0)
     assert outputs.t[late][0] == pytest.approx(60.0 - 0.1 + 10.0, abs=0.2)
     assert np.count_nonzero(late) == 550
+
+
+def test_a_receiver_whose_fix_is_old_is_no_other_boot():
+    """Its messages carry the moment of its last fix, again and again."""
+    samples, plain = [], hop()
+    for sample in plain:
+        samples.append(sample)
+        if isinstance(sample, GpsFix):
+            samples.append(GpsFix(2.5, 2, 1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    made, alone = found(samples), found(plain)
+    np.testing.assert_array_equal(made.signals().outputs.t, alone.signals().outputs.t)
+    assert made.grounded == alone.grounded
+
+
+@pytest.mark.parametrize("wrong", [5000.0, 2e6, 3e9, 1.0])
+@pytest.mark.parametrize("kind", [ImuSample, Outputs])
+def test_one_damaged_stamp_costs_itself(wrong, kind):
+    plain = hop()
+    at = next(k for k, s in enumerate(plain) if isinstance(s, kind) and s.t > 30.0)
+    damaged = [*plain[:at], replace(plain[at], t=wrong), *plain[at + 1 :]]
+    alone, made = found(plain), found(damaged)
+    lost = set(alone.signals().outputs.t) - set(made.signals().outputs.t)
+    assert lost <= {plain[at].t}
+    assert made.grounded == alone.grounded
+
+
+def test_parameters_that_are_no_numbers_are_none():
+    made = found([ParameterValue("SERVO9_FUNCTION", float("nan")), *hop()])
+    assert "SERVO9_FUNCTION" not in made.signals().parameters
+    assert made.signals().motors == (0, 1, 2, 3)

@@ -6,6 +6,7 @@ import pytest
 
 from onboard.answers.explain import explain
 from onboard.answers.match import match
+from onboard.answers.recorded_vehicle import Vehicle
 from onboard.answers.replay import read
 from onboard.core.inputs.samples import GpsFix
 from onboard.errors import RecordingError, UsageError
@@ -142,3 +143,30 @@ def test_a_second_log_does_not_move_what_the_latency_is_counted_from(tmp_path):
         told.append(late.parameters["GPS1_DELAY_MS"])
     assert told[1] == pytest.approx(told[0], abs=4.0)
     assert told[0] == pytest.approx(170.0, abs=4.0)
+
+
+def test_a_copy_of_a_hover_is_one_though_it_went_nowhere(flights, tmp_path):
+    still = [
+        replace(s, v_n=0.0, v_e=0.0) if isinstance(s, GpsFix) else s for s in samples_of(flights[0])
+    ]
+    paths = [tmp_path / "a.BIN", tmp_path / "b.BIN"]
+    for path in paths:
+        path.write_bytes(bytes(logged(still, lambda _: 0.0)))
+    with pytest.raises(UsageError, match=r"b\.BIN: the same flight as"):
+        read(paths, Reader())
+
+
+def test_a_receiver_whose_fix_is_old_begins_no_other_boot(flights):
+    recording = open_recording(flights[0])
+    vehicle = Vehicle()
+    vehicle.begin()
+    for sample in samples_of(flights[0]):
+        vehicle.check(sample, recording)
+        if isinstance(sample, GpsFix):
+            vehicle.check(GpsFix(1.0, 2, 1, 0.0, 0.0, 0.0, 0.0, 0.0), recording)
+    assert len(vehicle.tracks) == 2
+    alone = Vehicle()
+    alone.begin()
+    for sample in samples_of(flights[0]):
+        alone.check(sample, recording)
+    assert vehicle.tracks[0].is_of(alone.tracks[0])

@@ -23,7 +23,6 @@ FORCE: Final = "the accelerometer is noisier than vibration makes one that works
 WORDS: Final = {
     "velocity": GPS,
     "velocity_colour": GPS,
-    "vertical": GPS,
     "height": GPS,
     "height_walk": GPS,
     "jitter": GPS,

@@ -108,13 +108,12 @@ def undecided_together(flights: Sequence[Told], prior_sigma: Array) -> list[Unde
     """
     names = dict.fromkeys(a.effect for f in flights for a in f.effects)
     known = np.diag(prior_sigma**-2.0)
-    found = [model for name in names if (model := _model(name, flights, known)) is not None]
-    whole = 1.0 + sum(exp(odds) for odds, _ in found)
-    return [
-        Undecided(m.effect, m.title, exp(odds) / whole, m.moves)
-        for odds, m in found
-        if np.any(m.moves)
-    ]
+    models = [model for name in names if (model := _model(name, flights, known)) is not None]
+    # What is in every flight's model already stands in the way of nothing else.
+    found = [(odds, m) for odds, m in models if np.any(m.moves)]
+    most = max((0.0, *(odds for odds, _ in found)))
+    whole = exp(-most) + sum(exp(odds - most) for odds, _ in found)
+    return [Undecided(m.effect, m.title, exp(odds - most) / whole, m.moves) for odds, m in found]
 
 
 def _model(name: str, flights: Sequence[Told], known: Array) -> tuple[float, Undecided] | None:

@@ -67,11 +67,12 @@ class NoiseLevels:
 
     @property
     def at_highest(self) -> tuple[str, ...]:
-        """Levels as high as noise of their kind goes; a time may be as long as it likes."""
+        """Levels as high as noise of their kind goes; not times and ratios, which are no noise."""
         return tuple(
             name
             for name in ESTIMATED
-            if name != "heading_time" and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
+            if name not in ("heading_time", "vertical")
+            and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
 
 

@@ -16,6 +16,7 @@ from onboard.core.inputs.limits import (
     ATTITUDE_MARGIN_S,
     FEWEST_FIXES,
     FEWEST_SAMPLES,
+    FLYING_M_S,
     IMU_GAP_S,
     KEPT_S,
     LEAST_LAG_S,
@@ -66,6 +67,7 @@ class Assembly:
         self.streams = Streams()
         self.standing_s = 0.0
         self.stuck: dict[int, list[tuple[float, float]]] = {}
+        self._of_this_boot: set[int] = set()  # of which the last time is of this boot
         self._continues: dict[int, float] = {}  # time of the last fix that was handed out
         self._gyro: dict[int, int] = {}  # whose gyroscope was used there
         self._rolling = Rolling()
@@ -79,6 +81,7 @@ class Assembly:
         """Forget all that waits (reboot)."""
         self.streams.clear()
         self._continues.clear()
+        self._of_this_boot.clear()
         self._rolling.forget()
 
     def take(
@@ -156,7 +159,7 @@ class Assembly:
         parameters: ParametersInForce,
     ) -> list[Batch]:
         """Batches of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
-        stamps, rows = self._measured(imu, *live[imu].arrays(), fixes)
+        stamps, rows = self._measured(imu, live, fixes)
         if len(stamps) < FEWEST_SAMPLES or len(self.streams.recorded) < 2:
             return []
         if self._settings.slowest_imu_hz * mean_step(stamps) > 1.0:
@@ -185,8 +188,9 @@ class Assembly:
             self._continues[imu], self._gyro[imu] = float(fixes.t[last]), gyro
         return out
 
-    def _measured(self, imu: int, stamps: Array, rows: Array, fixes: Fixes) -> tuple[Array, Array]:
+    def _measured(self, imu: int, live: dict[int, ImuTrack], fixes: Fixes) -> tuple[Array, Array]:
         """The samples without those of an accelerometer that repeats one reading."""
+        stamps, rows = live[imu].arrays()
         dead = stuck(stamps, rows[:, 3:6])
         if not np.any(dead) or not len(fixes):
             return stamps[~dead], rows[~dead]
@@ -196,10 +200,13 @@ class Assembly:
             if not len(piece):
                 continue
             start, end = float(piece[0]), float(piece[-1])
-            if known and start - known[-1][1] <= IMU_GAP_S:
+            if not _moves(imu, live, fixes, start, end):
+                continue
+            if imu in self._of_this_boot and start - known[-1][1] <= IMU_GAP_S:
                 known[-1] = known[-1][0], max(end, known[-1][1])
             else:
                 known.append((start, end))
+                self._of_this_boot.add(imu)
         del known[:-MOST_STUCK]
         return stamps[~dead], rows[~dead]
 
@@ -251,6 +258,21 @@ def _fixes(taken: Sequence[GpsFix], t: Array) -> Fixes:
         np.array([f.latitude for f in taken]),
         t - np.array([f.t if f.t_message is None else f.t_message for f in taken]),
     )
+
+
+def _moves(imu: int, live: dict[int, ImuTrack], fixes: Fixes, start: float, end: float) -> bool:
+    """Whether anything else shows that an accelerometer that repeats one reading should not.
+
+    A simulator without noise repeats itself where it stands, and where it climbs straight.
+    """
+    for other, track in live.items():
+        stamps, rows = track.arrays()
+        its = rows[(stamps >= start) & (stamps <= end), : 3 if other == imu else 6]
+        if len(its) and np.any(np.ptp(its, axis=0) > 0.0):
+            return True
+    near = (fixes.t >= start - 1.0) & (fixes.t <= end + 1.0)
+    level = np.linalg.norm(np.nan_to_num(fixes.v_n[near, :2]), axis=1)
+    return bool(np.any(level > FLYING_M_S))
 
 
 def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:

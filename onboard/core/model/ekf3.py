@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from onboard.core.inputs.limits import FLYING_M_S
 from onboard.core.inputs.segments import Batch, Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import rotation_from_euler, skew
@@ -41,9 +42,6 @@ BEGINS: Final = np.repeat([0.1, 0.3, 0.5, 0.2, 0.005], 3)
 SETTLED_S: Final = 60.0
 """It has been at rest for as long where a flight begins [physics: its own checks take half]; pauses
 in the air are shorter."""
-
-FLYING_M_S: Final = 3.0
-"""Faster than that a vehicle that has flown is not on the ground for long [physics: a walk]."""
 
 STEP_S: Final = 0.1
 """s; attitudes are taken so far apart, within which nothing of an EKF moves [cost]."""

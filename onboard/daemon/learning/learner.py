@@ -309,9 +309,9 @@ class Learner:
     def _tell_of_stuck(self) -> None:
         """Once for each time that an accelerometer repeats one reading in flight."""
         for imu in self._calibrator.imus:
-            began = max((start for start, _ in self._calibrator.stuck(imu)), default=None)
-            if began is not None and began != self._stuck.get(imu):
-                self._stuck[imu] = began
+            times = self._calibrator.stuck(imu)
+            if times and times[-1][0] != self._stuck.get(imu):
+                self._stuck[imu] = times[-1][0]
                 self._tell("imu_stuck", f"IMU {imu} repeats one reading in flight", warning=True)
 
     # How

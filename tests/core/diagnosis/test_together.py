@@ -88,3 +88,23 @@ def test_numbers_of_another_unit_move_with_it():
     turned = [Told([a.of_raw(T) for a in t.effects], back.T @ t.six @ back) for t in told]
     ((one,), (other,)) = (undecided_together(x, PRIOR * 1e3) for x in (told, turned))
     np.testing.assert_allclose(other.moves, T @ one.moves, rtol=1e-6, atol=1e-9)
+
+
+def test_what_is_certain_overflows_nothing_and_stands_in_the_way_of_nothing():
+    """Odds grow with every flight; what each flight has in its model is no other model of it."""
+    rng = np.random.default_rng(6)
+    big = [flight(rng, np.array([30.0, -20.0]), rows=4000) for _ in range(6)]
+    (alone,) = undecided_together([f[0] for f in big], PRIOR)
+    assert alone.share == pytest.approx(1.0)
+    known = [flight(rng, np.array([30.0, -20.0]), rows=4000, found=True)[0] for _ in range(6)]
+    both = []
+    for (told, *_), other in zip(big, known, strict=True):
+        (asked,) = other.effects
+        named = Asked("antenna", "It is elsewhere", *astuple_of(asked))
+        both.append(Told([*told.effects, named], told.six))
+    (beside,) = undecided_together(both, PRIOR)
+    assert (beside.effect, beside.share) == ("loop", pytest.approx(1.0))
+
+
+def astuple_of(asked):
+    return asked.information, asked.vector, asked.prior, asked.moves

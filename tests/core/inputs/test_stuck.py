@@ -9,7 +9,7 @@ import pytest
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.inputs.limits import STUCK_S
-from onboard.core.inputs.samples import ImuSample
+from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, VehicleState
 from onboard.core.inputs.stuck import stuck
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import ImuTruth
@@ -75,3 +75,41 @@ def test_what_is_learned_is_of_the_flight_without_it(flight):
     found, sigma = np.array(without.scale + without.offset), np.array(without.scale_sigma)
     assert np.all(np.abs(found - np.array(whole.scale + whole.offset))[:3] < 3.0 * sigma)
     assert without.trusted_s == pytest.approx(whole.trusted_s - (ended - died), abs=3.0)
+
+
+def hovering(begin, end, *, dead=(), still=True):
+    """Samples of a hover in a simulator without noise, or of one that turns a little."""
+    out, rng = [], np.random.default_rng(3)
+    said = VehicleState(begin + 0.5, armed=True, landed=False, kind="copter")
+    for t in np.arange(begin, end, 0.02).tolist():
+        w_b = (0.0, 0.0, 0.0) if still else tuple(0.01 * rng.standard_normal(3))
+        f_b = (0.0, 0.0, -9.81)
+        if not still and not any(a <= t <= b for a, b in dead):
+            f_b = tuple(np.array(f_b) + 0.01 * rng.standard_normal(3))
+        out.append(ImuSample(t, 1, f_b, w_b))
+        if round(50.0 * t) % 10 == 0:
+            out += [
+                AttitudeSample(t, 0.01, 0.0, 0.1),
+                GpsFix(t, 1, 3, 0.5, 0.5, 10.0, 0.0, 0.0, satellites=12),
+            ]
+    return sorted([*out, said], key=lambda sample: sample.t)
+
+
+def stuck_of(samples):
+    calibrator = Calibrator()
+    for sample in samples:
+        calibrator.feed(sample)
+    calibrator.finish()
+    return calibrator.stuck(1)
+
+
+def test_a_simulator_without_noise_that_hovers_is_not_told_of():
+    assert stuck_of(hovering(10.0, 60.0)) == ()
+
+
+def test_what_is_repeated_in_another_boot_is_another_time():
+    """Also where it comes earlier by the boot's own clock."""
+    first = hovering(100.0, 150.0, dead=[(130.0, 134.0)], still=False)
+    second = hovering(20.0, 70.0, dead=[(50.0, 54.0)], still=False)
+    spells = stuck_of([*first, *second])
+    assert [start for start, _ in spells] == pytest.approx([130.0, 50.0], abs=0.05)
