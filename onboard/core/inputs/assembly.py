@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.airborne import still
+from onboard.core.inputs.airborne import STILL_RATE_RAD_S, still
 from onboard.core.inputs.gyroscopes import rates_at
 from onboard.core.inputs.limits import (
     AFTER_S,
     AHEAD_S,
     ATTITUDE_MARGIN_S,
+    FELT_M_S2,
     FEWEST_FIXES,
     FEWEST_SAMPLES,
     FLYING_M_S,
@@ -200,11 +201,9 @@ class Assembly:
             if not len(piece):
                 continue
             start, end = float(piece[0]), float(piece[-1])
-            if not _moves(imu, live, fixes, start, end):
-                continue
             if imu in self._of_this_boot and start - known[-1][1] <= IMU_GAP_S:
                 known[-1] = known[-1][0], max(end, known[-1][1])
-            else:
+            elif _moves(imu, live, fixes, start, end):
                 known.append((start, end))
                 self._of_this_boot.add(imu)
         del known[:-MOST_STUCK]
@@ -267,8 +266,11 @@ def _moves(imu: int, live: dict[int, ImuTrack], fixes: Fixes, start: float, end:
     """
     for other, track in live.items():
         stamps, rows = track.arrays()
-        its = rows[(stamps >= start) & (stamps <= end), : 3 if other == imu else 6]
-        if len(its) and np.any(np.ptp(its, axis=0) > 0.0):
+        its = rows[(stamps >= start) & (stamps <= end)]
+        if not len(its):
+            continue
+        turned, felt = (np.linalg.norm(np.std(its[:, k : k + 3], axis=0)) for k in (0, 3))
+        if turned >= STILL_RATE_RAD_S or (other != imu and felt >= FELT_M_S2):
             return True
     near = (fixes.t >= start - 1.0) & (fixes.t <= end + 1.0)
     level = np.linalg.norm(np.nan_to_num(fixes.v_n[near, :2]), axis=1)

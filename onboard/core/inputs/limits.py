@@ -62,6 +62,9 @@ GROUND_M: Final = 2.0
 receiver's height scatters by in a minute or two]."""
 STILL_M_S: Final = 0.3
 """Speed of a vehicle that stands, as a receiver shows it, m/s [data sheet]."""
+FELT_M_S2: Final = 0.02
+"""Standard deviation of a force that surely changes: two steps of a thousandth of g, in which
+telemetry has it [data sheet]."""
 FLYING_M_S: Final = 3.0
 """Faster than that a vehicle that has flown is not on the ground for long [physics: a walk]."""
 ROLLED_OUT_S: Final = 2.0

@@ -82,7 +82,7 @@ def hovering(begin, end, *, dead=(), still=True):
     out, rng = [], np.random.default_rng(3)
     said = VehicleState(begin + 0.5, armed=True, landed=False, kind="copter")
     for t in np.arange(begin, end, 0.02).tolist():
-        w_b = (0.0, 0.0, 0.0) if still else tuple(0.01 * rng.standard_normal(3))
+        w_b = (0.0, 0.0, 0.0) if still else tuple(0.05 * rng.standard_normal(3))
         f_b = (0.0, 0.0, -9.81)
         if not still and not any(a <= t <= b for a, b in dead):
             f_b = tuple(np.array(f_b) + 0.01 * rng.standard_normal(3))
