@@ -223,9 +223,8 @@ def read(
     if not paths:
         raise UsageError("no recording given")
     recordings = tuple(p if isinstance(p, Recording) else open_recording(p) for p in paths)
-    _refuse_repetition(recordings)
-    _refuse_mixture(recordings)
     refuse_copies(recordings)
+    _refuse_mixture(recordings)
     refuse_other_boards(recordings)
     total = sum(sum(recording.counts.values()) for recording in recordings)
     vehicle = Vehicle()
@@ -261,16 +260,6 @@ def read(
     given = [isinstance(p, Recording) for p in paths]
     kept = (r if mine else r.closed() for r, mine in zip(recordings, given, strict=True))
     return Reading(tuple(kept), vehicle)
-
-
-def _refuse_repetition(recordings: Sequence[Recording]) -> None:
-    """A flight counted twice would be believed too much."""
-    seen: set[Path] = set()
-    for recording in recordings:
-        place = recording.path.resolve()
-        if place in seen:
-            raise UsageError(f"{recording.path}: given twice")
-        seen.add(place)
 
 
 def _refuse_mixture(recordings: Sequence[Recording]) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import filecmp
 import math
 from collections.abc import Sequence
+from typing import NoReturn
 
 from onboard.core.inputs.samples import FIX_3D, GpsFix
 from onboard.errors import RecordingError, UsageError
@@ -67,28 +68,29 @@ def refuse_one_flight_twice(tracks: Sequence[Track]) -> None:
                 continue
             if track.recording is other.recording:
                 raise RecordingError(f"{track.recording.path}: the same flight is in it twice")
-            raise UsageError(
-                f"{track.recording.path}: the same flight as {other.recording.path}; "
-                "give one of the two"
-            )
+            _refuse(track.recording, other.recording)
 
 
 def refuse_copies(recordings: Sequence[Recording]) -> None:
-    """See that no recording is a copy of another one: a hover goes to no places that tell it.
+    """See that no recording is another one, or a copy: a hover goes to no places that tell it.
 
     Raises:
         UsageError: one of them is.
     """
     for k, recording in enumerate(recordings):
         for other in recordings[:k]:
+            if recording.path.resolve() == other.path.resolve():
+                raise UsageError(f"{recording.path}: given twice")
             try:
                 alike = filecmp.cmp(recording.path, other.path, shallow=False)
             except OSError:  # arrays of a program
                 continue
             if alike:
-                raise UsageError(
-                    f"{recording.path}: the same flight as {other.path}; give one of the two"
-                )
+                _refuse(recording, other)
+
+
+def _refuse(recording: Recording, other: Recording) -> NoReturn:
+    raise UsageError(f"{recording.path}: the same flight as {other.path}; give one of the two")
 
 
 def refuse_other_boards(recordings: Sequence[Recording]) -> None:

@@ -17,8 +17,8 @@ odds of that, the mean is off by what the flights' own answers are off by, ``sum
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import exp, log
+from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.limits import HARDLY
 from onboard.core.diagnosis.score import surprise
-from onboard.core.diagnosis.undecided import Undecided, log_odds
+from onboard.core.diagnosis.undecided import Undecided, log_odds, shares
 from onboard.core.maths.arrays import Array
 
 
@@ -111,9 +111,8 @@ def undecided_together(flights: Sequence[Told], prior_sigma: Array) -> list[Unde
     models = [model for name in names if (model := _model(name, flights, known)) is not None]
     # What is in every flight's model already stands in the way of nothing else.
     found = [(odds, m) for odds, m in models if np.any(m.moves)]
-    most = max((0.0, *(odds for odds, _ in found)))
-    whole = exp(-most) + sum(exp(odds - most) for odds, _ in found)
-    return [Undecided(m.effect, m.title, exp(odds - most) / whole, m.moves) for odds, m in found]
+    each = shares(0.0, [odds for odds, _ in found])
+    return [replace(m, share=share) for (_, m), share in zip(found, each, strict=True)]
 
 
 def _model(name: str, flights: Sequence[Told], known: Array) -> tuple[float, Undecided] | None:

@@ -109,12 +109,24 @@ def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
     found = [(chosen, 0.0, before), *_likely(fitter, rest, before, _others(choice))]
     own = log_odds(chosen.score(fitter, before, with_it))
-    most = max(own, *(odds for _, odds, _ in found))
-    whole = exp(own - most) + sum(exp(odds - most) for _, odds, _ in found)
     return [
-        Undecided(c.effect, _title(c), exp(odds - most) / whole, fit.theta[:6] - with_it.theta[:6])
-        for c, odds, fit in found
+        Undecided(c.effect, _title(c), share, fit.theta[:6] - with_it.theta[:6])
+        for (c, _, fit), share in zip(
+            found, shares(own, [odds for _, odds, _ in found]), strict=True
+        )
     ]
+
+
+def shares(reported: float, others: Sequence[float]) -> list[float]:
+    """How likely each of other models is, where one of all is right.
+
+    Args:
+        reported: logarithm of the odds of the model that is reported.
+        others: of the others.
+    """
+    most = max((reported, *others))
+    whole = exp(reported - most) + sum(exp(odds - most) for odds in others)
+    return [exp(odds - most) / whole for odds in others]
 
 
 def _title(c: Candidate) -> str:
