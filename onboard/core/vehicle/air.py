@@ -8,6 +8,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.gusts import signed_square
 
 
 class Air:
@@ -55,6 +56,7 @@ class Air:
         self.force_b = np.zeros((n, columns))
         self.alpha = self.pressure = self.lift = np.zeros(n)
         self._u_b: Array | None = None
+        self._square_b: Array | None = None
 
     def copied(self) -> Air:
         """The same, to go on from in another way."""
@@ -74,3 +76,18 @@ class Air:
             moved = np.einsum("nij,nj->ni", self.flight.R_bn, self.wind_n + self.gust_n)
             self._u_b = self.flight.v_b - moved
         return self._u_b
+
+    @property
+    def square_b(self) -> Array:
+        """(n, 3) mean of ``|u| u`` in gusty air, by axis, m^2/s^2; fixed as ``u_b`` is."""
+        if self._square_b is None:
+            variance = np.reshape(self.gust_variance, (-1, 1))
+            self._square_b = signed_square(self.u_b, variance)
+        return self._square_b
+
+    @property
+    def square_through(self) -> Array:
+        """(n,) the same of what comes through the rotors from above."""
+        if isinstance(self.through, float) and self.through == 0.0:
+            return -self.square_b[:, 2]
+        return signed_square(-self.u_b[:, 2] - self.through, self.gust_variance)

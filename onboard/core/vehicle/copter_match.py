@@ -80,7 +80,7 @@ def match_copter(
     if found.turbulence.answered or air.answered:
         variant = replace(answering, gusts=max(air.rms, RECEIVER_M_S))
         model = copter_model(flight, frame, force_sigma, variant)
-        found = matched(model, fitted(model, fit.theta))
+        found = matched(model, fitted(model, fit.theta, fit.noise))
     for name, change in RIVAL_FORMS:
         if name in found.chosen.effects:
             other_form = replace(variant, **change)

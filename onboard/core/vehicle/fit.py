@@ -13,7 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.instruments import whitened_rows
+from onboard.core.vehicle.instruments import (
+    whitened_regressors,
+    whitened_residual,
+    whitened_rows,
+)
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FEWEST_BLOCKS,
@@ -117,19 +121,25 @@ class Fit:
         return float(np.median(self.inflation))
 
 
-def fitted(model: ForceModel, start: Array | None = None) -> Fit:
+def fitted(
+    model: ForceModel, start: Array | None = None, noise: Sequence[AxisNoise] | None = None
+) -> Fit:
     """Find unknowns and noise in turn.
 
     Args:
         model: to be fitted; all its unknowns are free, each within its prior.
         start: (m,) where to begin; the nominal airframe if None.
+        noise: of a fit that has come to the start; it is found once more, and not from nothing.
     """
     theta = model.nominal if start is None else start.copy()
     prior = 1.0 / model.plausible**2
-    noise: tuple[AxisNoise, ...] = tuple(AxisNoise(0.3) for _ in model.axes)
-    n = len(model.flight)
-    sensitivity = np.ones((n, len(model.axes)))
-    for turn in range(NOISE_ROUNDS):
+    turns = NOISE_ROUNDS if noise is None else 1
+    sensitivity = np.ones((len(model.flight), len(model.axes)))
+    if noise is None:
+        noise = tuple(AxisNoise(0.3) for _ in model.axes)
+    else:
+        sensitivity = model.sensitivity(theta)
+    for turn in range(turns):
         theta = _settled(model, theta, prior, noise, sensitivity)
         residual = model.measured() - model.predicted(theta)
         sensitivity = model.sensitivity(theta)
@@ -140,7 +150,7 @@ def fitted(model: ForceModel, start: Array | None = None) -> Fit:
                 windows.mean(sensitivity[:, k]),
                 windows.piece,
                 windows.length_s,
-                gusts=turn == NOISE_ROUNDS - 1,
+                gusts=turn == turns - 1,
             )
             for k in range(len(model.axes))
         )
@@ -192,23 +202,27 @@ def _settled(
     """Gauss-Newton steps, halved where they lead uphill."""
     measured, nominal = model.measured(), model.nominal
 
+    def left(at: Array) -> list[Array]:
+        return whitened_residual(model, measured - model.predicted(at), noise, sensitivity)
+
     def cost(at: Array) -> float:
-        rows = whitened_rows(model, measured - model.predicted(at), None, noise, sensitivity)
         apart = at - nominal
-        return float(sum(np.sum(r[:, 0] ** 2) for r in rows) + prior @ (apart * apart))
+        return float(sum(y @ y for y in left(at)) + prior @ (apart * apart))
+
+    def regressors(at: Array) -> list[Array]:
+        level = _level(model, at)
+        return whitened_regressors(model, model.steps(at), noise, sensitivity, level)
 
     now = cost(theta)
-    at, slope, level = theta, model.steps(theta), _level(model, theta)
+    at, by = theta, regressors(theta)
     share, before = 1.0, math.inf
     for _ in range(MORE_ROUNDS if model.instrumented else ROUNDS):
         if np.max(np.abs(theta - at) / model.plausible) > STALE:
-            at, slope, level = theta, model.steps(theta), _level(model, theta)
-        left = measured - model.predicted(theta)
-        rows = whitened_rows(model, left, slope, noise, sensitivity, level)
+            at, by = theta, regressors(theta)
         N, b = np.diag(prior), prior * (nominal - theta)
-        for r in rows:
-            N = N + r[:, 1:].T @ r[:, 1:]
-            b = b + r[:, 1:].T @ r[:, 0]
+        for h, y in zip(by, left(theta), strict=True):
+            N = N + h.T @ h
+            b = b + h.T @ y
         step = np.linalg.solve(N, b)
         sigma = np.sqrt(np.diag(np.linalg.inv(N)))
         size = float(np.max(np.abs(step) / sigma))

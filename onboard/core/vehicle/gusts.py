@@ -32,7 +32,7 @@ def _erf(x: Array) -> Array:
 
 
 def signed_square(u: Array, variance: Array | float) -> Array:
-    """(n,) mean of ``|u + g| (u + g)``; continued oddly to negative variances, one or (n,)."""
+    """(n, ...) mean of ``|u + g| (u + g)``; continued oddly to negative variances."""
     plain: Array = np.abs(u) * u
     size = np.abs(variance)
     if np.max(size) < LEAST_VARIANCE:
@@ -46,7 +46,7 @@ def signed_square(u: Array, variance: Array | float) -> Array:
     return out
 
 
-def positive_square(u: Array, variance: Array | float) -> Array:
-    """(n,) mean of ``max(0, u + g)^2``."""
-    out: Array = 0.5 * (signed_square(u, variance) + u * u + variance)
+def positive_square(u: Array, variance: Array | float, signed: Array) -> Array:
+    """(n,) mean of ``max(0, u + g)^2``; ``signed`` (n,) is :func:`signed_square` of the same."""
+    out: Array = 0.5 * (signed + u * u + variance)
     return out

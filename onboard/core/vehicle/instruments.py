@@ -30,7 +30,7 @@ LEAST_TOLD = 1e-8
 def whitened_rows(
     model: ForceModel,
     residual: Array,
-    jacobian: Array | None,
+    jacobian: Array,
     noise: Sequence[AxisNoise],
     sensitivity: Array,
     level: Array | None = None,
@@ -40,32 +40,60 @@ def whitened_rows(
     Args:
         model: of k axes and m unknowns.
         residual: (n, k) measured less predicted, m/s^2.
-        jacobian: (n, k, m) of the prediction; None: residuals alone, (r, 1).
+        jacobian: (n, k, m) of the prediction.
         noise: by axis.
         sensitivity: (n, k) to gusts, 1/s.
         level: (n, k, m) of the prediction without a tilt; where axes are instrumented.
     """
+    left = whitened_residual(model, residual, noise, sensitivity)
+    by = whitened_regressors(model, jacobian, noise, sensitivity, level)
+    return [np.column_stack([y, h]) for y, h in zip(left, by, strict=True)]
+
+
+def whitened_residual(
+    model: ForceModel, residual: Array, noise: Sequence[AxisNoise], sensitivity: Array
+) -> list[Array]:
+    """For each axis (r,): the whitened residual (n, k), m/s^2, of means over windows."""
+    rows = (
+        _whitened(model, residual[:, k, None], its, sensitivity[:, k])
+        for k, its in enumerate(noise)
+    )
+    return [made[:, 0] for made in rows]
+
+
+def whitened_regressors(
+    model: ForceModel,
+    jacobian: Array,
+    noise: Sequence[AxisNoise],
+    sensitivity: Array,
+    level: Array | None = None,
+) -> list[Array]:
+    """For each axis (r, m): whitened regressors, told from the past where it is instrumented.
+
+    Arguments are those of :func:`whitened_rows`.
+    """
     windows = windows_of(model.flight)
-    out = []
+    m, out = jacobian.shape[-1], []
     for k, its in enumerate(noise):
-        columns = [residual[:, k, None]]
         instrumented = model.axes[k] in model.instrumented
         sideways = instrumented and model.axes[k] != THRUST_AXIS and level is not None
-        if jacobian is not None:
-            columns.append(jacobian[:, k])
-            if sideways and level is not None:
-                columns.append(level[:, k])
-        rows = windows.mean(np.hstack(columns))
-        sensitive = windows.mean(sensitivity[:, k])
-        made = whitened(rows, its, sensitive, windows.piece, windows.length_s)
-        if jacobian is not None and instrumented:
-            m = jacobian.shape[-1]
-            mine, other = made[:, 1 : 1 + m], made[:, 1 + m :]
+        columns = jacobian[:, k]
+        if sideways and level is not None:
+            columns = np.hstack([columns, level[:, k]])
+        made = _whitened(model, columns, its, sensitivity[:, k])
+        if instrumented:
+            mine, other = made[:, :m], made[:, m:]
             before = (other, PATH_WINDOWS) if sideways else (mine, INSTRUMENT_WINDOWS)
-            by = _past(before[0], windows.piece, before[1])
-            made = np.hstack([made[:, :1], told_by(mine, by)])
+            made = told_by(mine, _past(before[0], windows.piece, before[1]))
         out.append(made)
     return out
+
+
+def _whitened(model: ForceModel, columns: Array, its: AxisNoise, sensitivity: Array) -> Array:
+    """(r, j) means over windows of columns (n, j), whitened; ``sensitivity`` (n,) to gusts."""
+    windows = windows_of(model.flight)
+    rows, sensitive = windows.mean(columns), windows.mean(sensitivity)
+    return whitened(rows, its, sensitive, windows.piece, windows.length_s)
 
 
 def _past(rows: Array, piece: NDArray[np.int64], lags: Sequence[int]) -> Array:

@@ -100,23 +100,24 @@ def described(fit: Fit) -> tuple[Fit, Mask]:
         if np.array_equal(now, kept) or np.mean(~now) > MOST_OUTLYING:
             break
         kept = now
-        fit = likelier(replace(whole, flight=_cut(whole.flight, kept)), fit.theta)
+        fit = likelier(replace(whole, flight=_cut(whole.flight, kept)), fit)
     return fit, kept
 
 
-def likelier(model: ForceModel, start: Array | None = None) -> Fit:
-    """The likelier of two fits: from still air, or ``start`` (m,), and anew in its wind.
+def likelier(model: ForceModel, start: Fit | None = None) -> Fit:
+    """The likelier of two fits: from still air, or another fit, and anew in its wind.
 
     Beside a wind that is not known yet all else is pulled about, and may be left in another valley
     of the likelihood: a propeller that brakes, and twice the thrust to make up for it.
     """
-    first = fitted(model, start)
+    noise = None if start is None else start.noise
+    first = fitted(model, None if start is None else start.theta, noise)
     if model.instrumented:
         # Regressors that are told from the past lead to no minimum of a likelihood.
         return first
     anew, wind = model.nominal, model.indices(Wind.name)
     anew[wind] = first.theta[wind]
-    again = fitted(model, anew)
+    again = fitted(model, anew, noise)
     return min(first, again, key=deviance)
 
 

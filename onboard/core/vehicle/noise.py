@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.limits import (
     CORRELATION_S,
     FINER_LEVELS,
@@ -84,9 +84,12 @@ def whitened(
         piece: (n,) number of the uninterrupted piece; the recursion begins anew with each.
         step_s: s.
     """
-    scaled = rows / noise.size(sensitivity)[:, None]
     rec = _recursion(step_s, noise.correlation_s, noise.white)
-    starts = starts_of(piece)
+    return _innovations(rows / noise.size(sensitivity)[:, None], rec, starts_of(piece))
+
+
+def _innovations(scaled: Array, rec: _Recursion, starts: Mask) -> Array:
+    """(n, m) innovations over their standard deviation, of rows with a variance of one."""
     root = math.sqrt(rec.variance)
     z = scaled.copy()
     z[1:] -= rec.phi * scaled[:-1]
@@ -140,29 +143,26 @@ def fitted_noise(
         step_s: s.
         gusts: whether noise may grow with the sensitivity.
     """
+    left = _Left(residual, sensitivity, starts_of(piece), step_s)
     levels = GUST_LEVELS if gusts else (0.0,)
-    grid = itertools.product(levels, CORRELATION_S, WHITE_SHARES)
-    data = residual, sensitivity, piece, step_s
-
-    def likeliest(shapes: Iterable[tuple[float, float, float]]) -> tuple[float, float, float]:
-        return max(shapes, key=lambda shape: _scored(*data, shape)[0])
-
-    level, tau, white = likeliest(grid)
+    grid = itertools.product(CORRELATION_S, WHITE_SHARES)
+    trials = [trial for tau, white in grid for trial in left.scored(levels, tau, white)]
+    _, noise = max(trials, key=_score)
+    level = noise.gust * left.mean / noise.force
     if level > 0.0:
         near = (level, *(level * by for by in FINER_LEVELS))
-        level, tau, white = likeliest((its, tau, white) for its in near)
-    return _scored(*data, (level, tau, white))[1]
+        _, noise = max(left.scored(near, noise.correlation_s, noise.white), key=_score)
+    return noise
 
 
 def gust_evidence(
     residual: Array, sensitivity: Array, piece: NDArray[np.int64], step_s: float, noise: AxisNoise
 ) -> tuple[float, float]:
     """Twice the log-likelihood that a gust level adds, and that level, m/s."""
-    shape = noise.correlation_s, noise.white
-    none, _ = _scored(residual, sensitivity, piece, step_s, (0.0, *shape))
-    trials = [_scored(residual, sensitivity, piece, step_s, (g, *shape)) for g in GUST_LEVELS]
-    score, trial = max(trials, key=lambda x: x[0])
-    return 2.0 * (score - none), trial.gust
+    left = _Left(residual, sensitivity, starts_of(piece), step_s)
+    none, *trials = left.scored((0.0, *GUST_LEVELS), noise.correlation_s, noise.white)
+    score, trial = max(trials, key=_score)
+    return 2.0 * (score - none[0]), trial.gust
 
 
 def likelihood(
@@ -178,28 +178,49 @@ def likelihood(
     """
     even = np.ones(len(residual)) if sensitivity is None else sensitivity
     level = 0.0 if sensitivity is None else noise.gust * (float(np.mean(even)) or 1.0) / noise.force
-    shape = level, noise.correlation_s, noise.white
-    return _scored(residual, even, piece, step_s, shape)[0]
+    left = _Left(residual, even, starts_of(piece), step_s)
+    return left.scored((level,), noise.correlation_s, noise.white)[0][0]
 
 
-def _scored(
-    residual: Array,
-    sensitivity: Array,
-    piece: NDArray[np.int64],
-    step_s: float,
-    shape: tuple[float, float, float],
-) -> tuple[float, AxisNoise]:
-    """Log-likelihood with the overall size profiled out, and the noise of that size."""
-    level, tau, white = shape
-    mean = float(np.mean(sensitivity)) or 1.0
-    unit = AxisNoise(1.0, level / mean, tau, white)
-    e = whitened(residual[:, None], unit, sensitivity, piece, step_s)[:, 0]
-    n = len(e)
-    size = max(math.sqrt(float(e @ e) / n), LEAST_NOISE_M_S2)
-    log_size = n * math.log(size) + float(np.sum(np.log(unit.size(sensitivity))))
-    log_step = 0.5 * n * math.log(_recursion(step_s, tau, white).variance)
-    score = -log_size - log_step - 0.5 * float(e @ e) / size**2
-    return score, AxisNoise(size, size * level / mean, tau, white)
+@dataclass(frozen=True, slots=True)
+class _Left:
+    """A residual (n,), m/s^2, its sensitivity (n,) to gusts, where (n,) it begins anew."""
+
+    residual: Array
+    sensitivity: Array
+    starts: Mask
+    step_s: float
+
+    @property
+    def mean(self) -> float:
+        """The mean sensitivity, 1/s; one where nothing is sensitive."""
+        return float(np.mean(self.sensitivity)) or 1.0
+
+    def scored(
+        self, levels: Sequence[float], tau: float, white: float
+    ) -> list[tuple[float, AxisNoise]]:
+        """For each gust level: the log-likelihood with the size profiled out, noise of that size.
+
+        Args:
+            levels: of gusts that act by the mean sensitivity, over the force that is always there.
+            tau: of correlation, s.
+            white: share of white noise in the variance.
+        """
+        n, mean, out = len(self.residual), self.mean, []
+        units = [AxisNoise(1.0, level / mean, tau, white) for level in levels]
+        spread = np.column_stack([unit.size(self.sensitivity) for unit in units])
+        rec = _recursion(self.step_s, tau, white)
+        e = _innovations(self.residual[:, None] / spread, rec, self.starts)
+        log_spread = np.sum(np.log(spread), axis=0) + 0.5 * n * math.log(rec.variance)
+        for unit, square, log_its in zip(units, np.sum(e * e, axis=0), log_spread, strict=True):
+            size = max(math.sqrt(square / n), LEAST_NOISE_M_S2)
+            score = -n * math.log(size) - log_its - 0.5 * square / size**2
+            out.append((float(score), AxisNoise(size, size * unit.gust, tau, white)))
+        return out
+
+
+def _score(trial: tuple[float, AxisNoise]) -> float:
+    return trial[0]
 
 
 def rms(x: Array) -> float:

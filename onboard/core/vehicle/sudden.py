@@ -21,7 +21,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.fit import Fit, fitted
-from onboard.core.vehicle.instruments import whitened_rows
+from onboard.core.vehicle.instruments import whitened_residual, whitened_rows
 from onboard.core.vehicle.limits import (
     AMBIGUOUS,
     BLOCK_S,
@@ -179,8 +179,8 @@ def _placed(fit: Fit, changing: Changing, near: Change) -> Change:
     def squares(moment: float) -> float:
         model = changing(Change(moment, moment))
         left = model.measured() - model.predicted(fit.theta)
-        rows = whitened_rows(model, left, None, fit.noise, fit.sensitivity)
-        return float(sum(np.sum(r**2) for r in rows))
+        rows = whitened_residual(model, left, fit.noise, fit.sensitivity)
+        return float(sum(y @ y for y in rows))
 
     moment = min((float(t[k]) for k in steps), key=squares)
     return Change(moment, moment)

@@ -234,7 +234,7 @@ def test_of_two_valleys_the_likelier_is_taken(monkeypatch):
     for order in ([right, worse], [worse, right]):
         left = list(order)
 
-        def fitted_from(its, start=None, left=left):
+        def fitted_from(its, start=None, noise=None, left=left):
             starts.append(start)
             return left.pop(0)
 
@@ -244,6 +244,19 @@ def test_of_two_valleys_the_likelier_is_taken(monkeypatch):
     again = starts[1]
     assert again[model.index("north")] == right.theta[model.index("north")]
     assert again[model.index("log_ratio")] == 0.0
+
+
+def test_a_fit_ends_at_the_same_place_from_another_ones_end_and_noise():
+    """Where some steps are gone and the rest is fitted again, nothing is begun from nothing."""
+    whole = plane_flight(seed=6, wind=(3.0, -5.0))
+    model = plane_model(whole, PlaneAirframe(), SIGMA)
+    kept = np.arange(len(whole)) % 97 > 0
+    fewer = replace(model, flight=whole.kept(kept))
+    before = fitted(model)
+    again, anew = fitted(fewer, before.theta, before.noise), fitted(fewer)
+    assert np.max(np.abs(again.theta - anew.theta) / anew.sigma) < 0.1
+    assert [its.correlation_s for its in again.noise] == [its.correlation_s for its in anew.noise]
+    assert np.allclose(again.sigma, anew.sigma, rtol=0.02)
 
 
 def rolling(flight, seconds):

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
-from onboard.core.vehicle.gusts import signed_square
 
 PLAUSIBLE = 0.1
 """m^2/kg: ballistic coefficients from 10 kg/m^2 up [physics]."""
@@ -37,8 +36,7 @@ class BodyDrag(Effect):
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag."""
         for axis, value in enumerate(values):
-            square = signed_square(air.u_b[:, axis], air.gust_variance)
-            air.force_b[:, axis] -= 0.5 * value * air.rho * square / air.mass
+            air.force_b[:, axis] -= 0.5 * value * air.rho * air.square_b[:, axis] / air.mass
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Ballistic coefficients, as EK3_DRAG_BCOEF_X and _Y; none where there is no drag."""

@@ -25,6 +25,7 @@ class Inflow(Effect):
         """Take it off, and pull."""
         if air.thrust is None:
             return
-        square = positive_square(-air.u_b[:, 2] - air.through, air.gust_variance)
+        up = -air.u_b[:, 2] - air.through
+        square = positive_square(up, air.gust_variance, air.square_through)
         air.thrust = air.thrust - values[0] * air.rho / self._density * square / air.mass
         air.force_b[:, 2] -= air.thrust

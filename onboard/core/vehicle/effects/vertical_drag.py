@@ -12,7 +12,6 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 from onboard.core.vehicle.effects.effect import Effect, Unknown
-from onboard.core.vehicle.gusts import signed_square
 
 LEAST_PULL = 0.05
 """Share of gravity below which rotors are taken to idle [physics]."""
@@ -47,11 +46,11 @@ class VerticalDrag(Effect):
         """Free the measured force of it, and predict it."""
         linear, quadratic = values
         u = air.u_b[:, 2]
-        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance) / air.mass
+        still = 0.5 * air.rho * quadratic * air.square_b[:, 2] / air.mass
         measured = -air.flight.f_b[:, 2]
         air.pull = measured
         for _ in range(TURNS):
             air.pull = measured - linear * rotor_root(air) * u - still
         u = u + air.through
-        still = 0.5 * air.rho * quadratic * signed_square(u, air.gust_variance) / air.mass
+        still = -0.5 * air.rho * quadratic * air.square_through / air.mass
         air.force_b[:, 2] -= linear * rotor_root(air) * u + still
