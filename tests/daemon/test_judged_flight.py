@@ -46,12 +46,21 @@ JUMP = judged("explained", effects=("bias_step",), missing="inspect the mount")
     ],
 )
 def test_what_a_flight_cannot_see_is_not_gone_with_it(later, overrules):
-    assert later.overrules(ANTENNA) is overrules
+    assert (later.after(ANTENNA) == later) is overrules
 
 
 def test_what_held_for_one_flight_is_gone_with_it():
-    assert judged("clean", blind=("bias_step",)).overrules(JUMP)
+    assert judged("clean", blind=("bias_step",)).after(JUMP) is not None
 
 
 def test_a_hover_after_a_flight_that_lacked_nothing_counts():
-    assert judged("insufficient").overrules(judged("clean"))
+    assert judged("insufficient").after(judged("clean")) is not None
+
+
+def test_what_one_accelerometer_shows_is_not_lost_with_what_another_cannot():
+    """The second is withheld for what this flight could not show; the first has jumped since."""
+    before = JudgedFlight(None, {1: judged("clean").imus[1], 2: ANTENNA.imus[1]})
+    blind = judged("insufficient", blind=("gps_lever_arm",)).imus[1]
+    taken = JudgedFlight(None, {1: JUMP.imus[1], 2: blind}).after(before)
+    assert taken is not None
+    assert taken.imus == {1: JUMP.imus[1], 2: ANTENNA.imus[1]}

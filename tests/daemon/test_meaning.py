@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.inputs.samples import ParameterValue
 from onboard.core.maths.accelerometer import parameter_names
+from onboard.daemon.learning.flight import Judged
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
-from onboard.daemon.learning.meaning import all_in_force, carried, hand_on
+from onboard.daemon.learning.meaning import (
+    carried,
+    corrections,
+    hand_on,
+    meanings,
+    same_sensors,
+)
+from onboard.daemon.learning.meaning import in_force as in_force_of
 from onboard.daemon.learning.store import Store
+from onboard.push.diagnosed import Diagnosed
+from tests.daemon.daemons import calibration
 
 SIX = tuple(name for imu in (1, 2) for name in parameter_names(imu).six)
 NAMES = st.sampled_from([*SIX, "AHRS_ORIENTATION", "AHRS_TRIM_X", "GPS1_POS_X"])
@@ -25,7 +36,7 @@ def test_what_is_handed_on_means_the_same_to_the_next_estimator(told):
         first.feed(ParameterValue(name, value))
     hand_on(carried(first.parameters), second)
     assert second.parameters.values == first.parameters.values
-    assert all_in_force(second.parameters.values) == all_in_force(first.parameters.values)
+    assert meanings(second.parameters.values) == meanings(first.parameters.values)
     assert second.parameters.trim == first.parameters.trim
     assert (second.parameters.lever_arm(1) == first.parameters.lever_arm(1)).all()
 
@@ -44,10 +55,10 @@ def in_force(made):
 
 def test_a_reset_forgets_what_was_learned_and_not_what_the_messages_mean(tmp_path):
     made = learner(tmp_path)
-    before = all_in_force(in_force(made))
-    assert before[1] is not None
+    before = meanings(in_force(made))
+    assert before[1].six is not None
     made.reset()
-    assert all_in_force(in_force(made)) == before
+    assert meanings(in_force(made)) == before
 
 
 def test_of_another_board_nothing_is_known_but_what_it_has_told(tmp_path):
@@ -63,3 +74,52 @@ def test_the_same_board_with_a_changed_value_keeps_the_others(tmp_path):
     made.identify(Identity(1, board="aa"), [ParameterValue(SIX[0], 0.99)])
     assert in_force(made)[SIX[0]] == 0.99
     assert in_force(made)[SIX[1]] == 1.02
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "changed"),
+    [
+        ({}, {}, ""),
+        ({"INS_TCAL1_ENABLE": 0.0}, {"INS_TCAL1_ENABLE": 1.0}, "INS_TCAL1_ENABLE"),
+        ({"INS_TCAL1_ENABLE": 1.0}, {"INS_TCAL1_ENABLE": 1.0}, ""),
+        (
+            {"INS_TCAL1_ENABLE": 1.0, "INS_ACC1_CALTEMP": 30.0},
+            {"INS_TCAL1_ENABLE": 1.0, "INS_ACC1_CALTEMP": 45.0},
+            "INS_ACC1_CALTEMP",
+        ),
+        (
+            {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_ACC1_X": 2.0},
+            {"INS_TCAL1_ENABLE": 1.0, "INS_TCAL1_ACC1_X": 3.0},
+            "INS_TCAL1_ACC1_X",
+        ),
+        ({"INS_ACC1_CALTEMP": 30.0}, {"INS_ACC1_CALTEMP": 45.0}, ""),  # nothing is corrected
+        ({}, {"INS_TCAL1_ENABLE": 1.0}, ""),  # it may have been so all the time
+        ({"INS_TCAL2_ENABLE": 0.0}, {"INS_TCAL2_ENABLE": 1.0}, ""),  # another accelerometer
+        ({SIX[0]: 1.0}, {SIX[0]: 1.01}, "INS_ACCSCAL_X from 1 to 1.01"),
+    ],
+)
+def test_what_raw_values_are_is_more_than_the_six(then, now, changed):
+    """A correction for temperature comes before scale and offset."""
+    six = dict.fromkeys(parameter_names(1).six, 1.0)
+    found = Diagnosed(1, "clean", (), calibration())
+    judged = Judged(1.0, in_force_of(six | then, 1), found, corrections(six | then, 1))
+    assert judged.changed_since(six | now, 1, ()) == changed
+
+
+def test_what_we_have_written_ourselves_is_nobodys_change():
+    six = dict.fromkeys(parameter_names(1).six, 1.0)
+    judged = Judged(1.0, (1.0,) * 6, Diagnosed(1, "clean", (), calibration()))
+    written = (1.5, *(1.0,) * 5)
+    assert judged.changed_since(six | {SIX[0]: 1.5}, 1, written) == ""
+    changed = judged.changed_since(six | {SIX[0]: 1.5, SIX[1]: 2.0}, 1, written)
+    assert changed == "INS_ACCSCAL_Y from 1 to 2"
+
+
+def test_another_sensor_or_correction_is_another_meaning():
+    names = parameter_names(1)
+    values = dict.fromkeys(names.six, 1.0) | {names.device_id: 7.0, "INS_TCAL1_ENABLE": 0.0}
+    before = meanings(values)
+    assert same_sensors(before, meanings(values))
+    assert same_sensors(before, meanings({n: x for n, x in values.items() if n in names.six}))
+    for name, value in ((names.device_id, 8.0), (names.six[3], 1.1), ("INS_TCAL1_ENABLE", 1.0)):
+        assert not same_sensors(before, meanings(values | {name: value}))

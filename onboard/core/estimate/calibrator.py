@@ -15,11 +15,13 @@ from collections.abc import Collection, Iterator
 from typing import Final
 
 from onboard.core.estimate.calibration_record import calibration_of
+from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.engines import Engines
 from onboard.core.estimate.events import Advanced, Event, FlightEnded, Restarted
 from onboard.core.estimate.limits import AHEAD_OF_IMU_S
 from onboard.core.estimate.result import Calibration
+from onboard.core.estimate.saving import SavedEngine, dump
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.stream_clock import StreamClock
 from onboard.core.gps.distrust import Distrust, WindowClosed, WindowEvent
@@ -52,7 +54,10 @@ class Calibrator:
     """Estimates the calibration parameters of every accelerometer from a stream of samples."""
 
     def __init__(
-        self, settings: CalibratorSettings | None = None, only: Collection[int] = ()
+        self,
+        settings: CalibratorSettings | None = None,
+        only: Collection[int] = (),
+        flight: str = "",
     ) -> None:
         """Take the settings.
 
@@ -60,12 +65,13 @@ class Calibrator:
             settings: how it works.
             only: accelerometers to estimate, none named: all; nothing about one of them depends
                 on whether others are estimated, too.
+            flight: what sums are called that are kept, so that they are never added twice.
         """
         self.settings = settings = settings or CalibratorSettings()
         self.parameters = ParametersInForce()
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings.assembly)
-        self._engines = Engines(settings, self.parameters, only)
+        self._engines = Engines(settings, self.parameters, only, flight)
         self._counts: Counter[str] = Counter()
         self._clock = StreamClock()
         self._ground = Ground()
@@ -258,9 +264,14 @@ class Calibrator:
             left_open=left_open,
         )
 
+    @property
+    def sums(self) -> list[SavedEngine]:
+        """Sums of every accelerometer, and those that wait."""
+        return self._engines.sums
+
     def to_bytes(self) -> bytes:
-        """Sums of every accelerometer, to go on with after a restart."""
-        return self._engines.to_bytes()
+        """:attr:`sums`, to go on with after a restart."""
+        return dump(self.sums)
 
     @classmethod
     def from_bytes(cls, data: bytes, settings: CalibratorSettings | None = None) -> Calibrator:
@@ -286,6 +297,15 @@ class Calibrator:
         self._engines.earlier.lay_aside(data)
 
     @property
+    def earlier(self) -> EarlierSums:
+        """What was learned before, as it waits."""
+        return self._engines.earlier
+
+    def begin_flight(self, flight: str) -> None:
+        """Learn another flight from nothing: whether it agrees with the one before is asked."""
+        self._engines.begin_flight(flight)
+
+    @property
     def waiting(self) -> tuple[int, ...]:
         """Accelerometers of which something learned before waits for a flight that agrees."""
         return tuple(self._engines.earlier)
@@ -293,6 +313,10 @@ class Calibrator:
     def _parameter(self, parameter: ParameterValue) -> None:
         """Take a report; what was taken for raw before the calibration was known, was not raw."""
         self._assembly.streams.settle()
+        another = self._engines.replaced_by(parameter)
+        if another is not None:
+            self._assembly.forget(another)
+            self._counts["another_sensor"] += 1
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)

@@ -7,30 +7,58 @@ from collections.abc import Iterator, Mapping
 
 from onboard.core.estimate.agreement import agrees
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.limits import MOST_SAVED, MOST_WAITING
-from onboard.core.estimate.saving import SavedEngine, dump, load
+from onboard.core.estimate.limits import MOST_FLIGHTS, MOST_SAVED, MOST_WAITING
+from onboard.core.estimate.saving import SavedEngine, load
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.blocks import Seconds, merged
 
 
 class EarlierSums:
-    """Saved sums by accelerometer, waiting for a flight that agrees with them."""
+    """Saved sums by accelerometer, waiting for a flight that agrees with them.
+
+    Sums that have a flight in common with others are never added to them: neither can be taken
+    out of the other.
+    """
 
     def __init__(self) -> None:
         self._waiting: dict[int, list[SavedEngine]] = {}
+        self._included: dict[int, tuple[str, ...]] = {}
 
     def __iter__(self) -> Iterator[int]:
         """Accelerometers that have some, in order."""
         return iter(sorted(self._waiting))
 
     def lay_aside(self, data: bytes) -> None:
-        """Keep what :meth:`to_bytes` gave.
+        """Keep what :meth:`Calibrator.to_bytes` gave.
 
         Raises:
             StateError: damaged, or of another version.
         """
         for saved in load(data):
-            self._waiting.setdefault(saved.imu, []).append(saved)
+            self.wait_with(saved)
+
+    def wait_with(self, saved: SavedEngine) -> None:
+        """Keep the sums of one accelerometer, unless its flights are there already.
+
+        Of those that share flights the ones with more flight stay.
+        """
+        flights = set(saved.flights)
+        if flights & set(self._included.get(saved.imu, ())):
+            return
+        waiting = self._waiting.setdefault(saved.imu, [])
+        sharing = [w for w in waiting if flights & set(w.flights)]
+        most = max([*sharing, saved], key=lambda its: its.seconds.trusted)
+        waiting[:] = [w for w in waiting if w not in sharing]
+        waiting.append(most)
+        del waiting[:-MOST_WAITING]
+
+    def begins(self, imu: int, flight: str) -> None:
+        """An engine begins to learn: it is of this flight, if it has a name."""
+        self._included[imu] = (flight,) if flight else ()
+
+    def ends(self, imu: int) -> None:
+        """The engine is no more."""
+        self._included.pop(imu, None)
 
     def forget(self, imu: int) -> None:
         """What was learned of one accelerometer is known to be wrong."""
@@ -55,17 +83,19 @@ class EarlierSums:
             # Sums of a sensor that said who it is wait until this one has said it, too.
             opinion = agrees(engine, saved) if device_id == saved.device_id else None
             if opinion is None:
-                waiting = self._waiting.setdefault(imu, [])
-                waiting.append(saved)
-                del waiting[:-MOST_WAITING]
+                self._waiting.setdefault(imu, []).append(saved)
             elif opinion:
                 done["restored"] += 1
                 engine.restore(saved.blocks, saved.point, saved.seconds)
+                of_both = (*saved.flights, *self._included.get(imu, ()))
+                self._included[imu] = of_both[-MOST_FLIGHTS:]
             else:
                 done["saved_contradicted"] += 1
         return done
 
-    def to_bytes(self, engines: Mapping[int, Engine], parameters: ParametersInForce) -> bytes:
+    def with_these(
+        self, engines: Mapping[int, Engine], parameters: ParametersInForce
+    ) -> list[SavedEngine]:
         """The engines' sums, and those that still wait: a flight that says too little loses none.
 
         Args:
@@ -85,7 +115,8 @@ class EarlierSums:
                         engine.noise,
                         Seconds(engine.trusted_s, engine.brisk_s),
                         tuple(blocks),
+                        self._included.get(imu, ()),
                     )
                 )
         saved.extend(e for waiting in self._waiting.values() for e in waiting)
-        return dump(saved)
+        return saved

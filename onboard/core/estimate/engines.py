@@ -4,27 +4,41 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from typing import Final
 
 from onboard.core.estimate.calibration_record import known_well_enough
 from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.samples import ParameterValue
 from onboard.core.inputs.segments import Batch
+from onboard.core.maths.accelerometer import parameter_names
+
+WHICH_SENSOR: Final = {parameter_names(imu).device_id: imu for imu in range(1, 6)}
+NO_SENSOR: Final = 0.0
+"""INS_ACCn_ID where there is none."""
 
 
 class Engines:
     """One engine an accelerometer, made when the first flight of it comes in.
 
     Attributes:
+        flight: what engines that begin now call the flight that they learn.
         earlier: sums of before the last start, until a flight agrees with them.
         beside: flight of accelerometers that are not estimated, as long as the buffer.
     """
 
     def __init__(
-        self, settings: CalibratorSettings, parameters: ParametersInForce, only: Collection[int]
+        self,
+        settings: CalibratorSettings,
+        parameters: ParametersInForce,
+        only: Collection[int],
+        flight: str,
     ) -> None:
-        """Take the settings, the parameters in force, and the accelerometers (none: all)."""
+        """Take settings, parameters in force, accelerometers (none: all), the flight's name."""
+        self.flight = flight
         self._settings = settings
         self._parameters = parameters
         self._only = frozenset(only)
@@ -59,6 +73,7 @@ class Engines:
                 if imu not in self._engines:
                     prior = self._parameters.six(imu).as_linear()
                     self._engines[imu] = Engine(self._settings, prior)
+                    self.earlier.begins(imu, self.flight)
                 engine = self._engines[imu]
                 engine.add(batch)
                 if engine.due and not known_well_enough(imu, engine, self._parameters):
@@ -83,10 +98,26 @@ class Engines:
             done += self.earlier.judge(imu, engine, self._parameters.device_id(imu))
         return done
 
+    def begin_flight(self, flight: str) -> None:
+        """Begin anew with every accelerometer; what is learned from here on has this name."""
+        self.flight = flight
+        for imu in tuple(self._engines):
+            self.forget(imu)
+
+    def replaced_by(self, parameter: ParameterValue) -> int | None:
+        """Forget the accelerometer in whose place this tells of another one; which it was."""
+        imu = WHICH_SENSOR.get(parameter.name)
+        before = None if imu is None else self._parameters.device_id(imu)
+        if imu is None or before in (None, NO_SENSOR, parameter.value):
+            return None
+        return imu if self.forget(imu) else None
+
     def forget(self, imu: int) -> bool:
         """Forget the engine of one accelerometer; False if there was none."""
+        self.earlier.ends(imu)
         return self._engines.pop(imu, None) is not None
 
-    def to_bytes(self) -> bytes:
-        """Sums of every accelerometer, to go on with after a restart."""
-        return self.earlier.to_bytes(self._engines, self._parameters)
+    @property
+    def sums(self) -> list[SavedEngine]:
+        """Those of every accelerometer, to go on with after a restart."""
+        return self.earlier.with_these(self._engines, self._parameters)

@@ -72,6 +72,8 @@ MOST_SAVED: Final = 16
 """Blocks that are saved: enough for folds and clusters [cost]."""
 MOST_WAITING: Final = 4
 """Sums of earlier starts that wait for a flight that agrees with them, the latest [cost]."""
+MOST_FLIGHTS: Final = 500
+"""Names of flights that are kept with their sums, the latest: sums forget what is older [cost]."""
 STRANGER: Final = 0.01
 """Probability with which another sensor may pass for this one [probability]."""
 

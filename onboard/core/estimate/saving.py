@@ -10,6 +10,7 @@ import base64
 import binascii
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -20,9 +21,10 @@ from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.errors import StateError
 
-VERSION = 6
+VERSION = 7
 """1: sums without the antenna's place among the unknowns.  2: with time on the ground in them.
-3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer."""
+3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer.
+6: without the flights that they are of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,8 @@ class SavedEngine:
     """What one accelerometer's engine needs to go on where it stopped.
 
     ``device_id`` is the autopilot's INS_ACCn_ID, None where it was not known: sums of one sensor
-    must never be used for another.
+    must never be used for another.  ``flights`` are those that are in the sums, by what whoever
+    flew them calls them: a flight must never be counted twice.
     """
 
     imu: int
@@ -40,9 +43,10 @@ class SavedEngine:
     noise: NoiseLevels
     seconds: Seconds
     blocks: tuple[Block, ...]
+    flights: tuple[str, ...] = ()
 
 
-def dump(engines: list[SavedEngine]) -> bytes:
+def dump(engines: Iterable[SavedEngine]) -> bytes:
     """The document."""
     body = [
         {
@@ -52,6 +56,7 @@ def dump(engines: list[SavedEngine]) -> bytes:
             "point": asdict(e.point),
             "noise": asdict(e.noise),
             "seconds": asdict(e.seconds),
+            "flights": list(e.flights),
             "portions": [
                 {
                     "start": p.start,
@@ -124,6 +129,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
         blocks,
+        tuple(map(str, e["flights"])),
     )
 
 

@@ -25,12 +25,15 @@ from onboard.answers.knowledge import determined
 from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.result import Calibration, Six, Status
+from onboard.core.estimate.result import Calibration, Status
+from onboard.core.estimate.saving import SavedEngine
+from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
 from onboard.core.maths.chi_square import CHI_SQUARE_999
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.flight import Judged, JudgedFlight
-from onboard.daemon.learning.meaning import all_in_force, in_force
+from onboard.daemon.learning.meaning import Meaning, corrections, in_force, meanings
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
 from onboard.push.watch import preference
@@ -45,8 +48,17 @@ class Frozen:
     flight: Calibrator
     support: Support
     waiting: list[int]
-    at_takeoff: dict[int, Six | None]
+    at_takeoff: dict[int, Meaning]
+    current: bool = True
     imus: dict[int, Judged] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A flight that was judged, and the sums that it ended with, of every accelerometer."""
+
+    flight: JudgedFlight
+    sums: tuple[SavedEngine, ...]
 
 
 class Examiner:
@@ -65,12 +77,12 @@ class Examiner:
         self._wall_clock = wall_clock
         self._frozen: Frozen | None = None
         self._judged_s = 0.0
-        self._at_takeoff: dict[int, Six | None] = {}
+        self._at_takeoff: dict[int, Meaning] = {}
         self._not_before = -np.inf
 
     def took_off(self, parameters: ParametersInForce) -> None:
         """A flight begins: these are the values that it is flown with, unless they are changed."""
-        self._at_takeoff = all_in_force(parameters.values)
+        self._at_takeoff = meanings(parameters.values)
 
     @property
     def waiting(self) -> tuple[int, ...]:
@@ -93,7 +105,13 @@ class Examiner:
         self._frozen = None
         self._judged_s = flight.flown_s
 
-    def examine_next(self) -> JudgedFlight | None:
+    def go_on_with(self, flight: Calibrator) -> None:
+        """What is learned from here on may be of another board: what is under examination, too."""
+        if self._frozen is not None:
+            self._frozen.current = False
+        self._judged_s = flight.flown_s
+
+    def examine_next(self) -> Examined | None:
         """Diagnose one accelerometer; the flight, if that was the last one of it."""
         frozen = self._frozen
         if frozen is None:
@@ -105,7 +123,8 @@ class Examiner:
         if frozen.waiting:
             return None
         self._frozen = None
-        return JudgedFlight(frozen.support, frozen.imus)
+        flight = JudgedFlight(frozen.support, frozen.imus, frozen.current)
+        return Examined(flight, tuple(frozen.flight.sums))
 
     def _freeze(self, flight: Calibrator) -> None:
         trusted_s = flight.flown_s - self._judged_s
@@ -117,7 +136,9 @@ class Examiner:
         flight = frozen.flight
         self.counters["diagnoses"] += 1
         device_id = flight.parameters.device_id(imu)
-        six = frozen.at_takeoff.get(imu) or in_force(flight.parameters.values, imu)
+        values = flight.parameters.values
+        before = frozen.at_takeoff.get(imu, Meaning())
+        six = before.six or in_force(values, imu)
         if device_id is None or six is None:
             self.counters["diagnosis_of_unknown"] += 1
             return
@@ -129,7 +150,8 @@ class Examiner:
             self.counters["diagnosis_failed"] += 1
             logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
             return
-        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found))
+        corrected = before.corrections or corrections(values, imu)
+        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found), corrected)
 
     def _document(self, flight: Calibrator, found: Diagnosis) -> msgspec.Struct:
         batches = since_reboot(flight.engine(found.imu).batches)
@@ -151,8 +173,8 @@ def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
     Support is the flight's own: by its likelihood alone it must prefer those values to the ones in
     force, past the 0.999 quantile of what six numbers that change nothing gain by chance.
     """
-    alone = found.calibration
-    if found.missing or not flight.engine(found.imu).aged:
+    alone, engine = found.calibration, flight.engine(found.imu)
+    if found.missing or not engine.aged or _contradicts(alone, solve(engine.aged, engine.model)):
         return found
     together = flight.calibration(found.imu)
     if together.status is not Status.CALIBRATED or _directions(together) <= _directions(alone):
@@ -165,6 +187,18 @@ def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:
     if gain is None or gain < CHI_SQUARE_999[6]:
         return found
     return replace(found, calibration=_added(together))
+
+
+def _contradicts(alone: Calibration, before: Solution) -> bool:
+    """Whether a flight's own answer is no chance beside that of what was flown before it.
+
+    Past the 0.999 quantile of chi-square, as for sums that were saved.
+    """
+    six = np.array(alone.scale + alone.offset)
+    turn = parameters_jacobian(before.theta[:6])
+    apart = six - np.array(parameters_of(before.theta[:6]))
+    both = np.array(alone.covariance) + turn @ before.covariance[:6, :6] @ turn.T
+    return not float(apart @ np.linalg.solve(both, apart)) <= CHI_SQUARE_999[6]
 
 
 def _directions(c: Calibration) -> int:

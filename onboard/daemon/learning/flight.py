@@ -8,7 +8,7 @@ one model; they only rule sensors out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import msgspec
@@ -16,9 +16,10 @@ import msgspec
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.accelerometer import parameter_names
 from onboard.core.physics.catalogue import bearing_of
 from onboard.core.physics.effect import Bearing
-from onboard.daemon.learning.meaning import in_force
+from onboard.daemon.learning.meaning import corrected_otherwise, corrections, in_force
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.entries import Support
@@ -28,12 +29,35 @@ from onboard.push.entries import Support
 class Judged:
     """One accelerometer of a flight: its identifier, the six in force at take-off, the diagnosis.
 
-    ``in_force`` are float32, in the order of ``parameter_names(imu).six``.
+    ``in_force`` are float32, in the order of ``parameter_names(imu).six``; ``corrections`` are
+    parameters of its correction for temperature, by name.
     """
 
     device_id: float
     in_force: Six
     diagnosed: Diagnosed
+    corrections: Mapping[str, float] = field(default_factory=dict)
+
+    def changed_since(self, now: Mapping[str, float], imu: int, written: Sequence[float]) -> str:
+        """What somebody has changed of what raw values mean, in words; empty if nothing.
+
+        Args:
+            now: parameters in force.
+            imu: number of the accelerometer.
+            written: the six as we have written them since, or empty.
+        """
+        corrected = corrected_otherwise(self.corrections, corrections(now, imu))
+        if corrected:
+            return ", ".join(corrected)
+        six, then = in_force(now, imu), tuple(written) or self.in_force
+        if six is None or six in (self.in_force, then):
+            return ""
+        names = parameter_names(imu).six
+        return ", ".join(
+            f"{name} from {old:.6g} to {new:.6g}"
+            for name, old, new in zip(names, then, six, strict=True)
+            if new != old
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +85,22 @@ class JudgedFlight:
             for found in self.diagnosed.values()
         )
 
-    def overrules(self, before: JudgedFlight) -> bool:
-        """Whether it says enough to take the place of what an earlier flight has said."""
-        return not self.says_nothing and all(
-            _would_have_shown(found, before.diagnosed.get(imu))
+    def after(self, before: JudgedFlight | None) -> JudgedFlight | None:
+        """It in the place of an earlier flight; None if it says too little to take it.
+
+        Of an accelerometer that it could not have shown to be as the earlier flight has found it,
+        that finding, for which it was withheld, stays.
+        """
+        if before is None:
+            return self
+        kept = {
+            imu: before.imus[imu]
             for imu, found in self.diagnosed.items()
-        )
+            if not _would_have_shown(found, before.diagnosed.get(imu))
+        }
+        if self.says_nothing or len(kept) == len(self.imus):
+            return None
+        return replace(self, imus={**self.imus, **kept})
 
     def outdated(self) -> JudgedFlight:
         """The same after a gap in which the board may have been changed for another."""

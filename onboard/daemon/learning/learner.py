@@ -5,13 +5,15 @@ knows no link.
 
 **Gaps.**  While the service is off, or the autopilot reboots or is silent, somebody can change the
 board for another one or calibrate it on a bench.  After each gap :meth:`Learner.identify` is told
-who answers.  The same board (by its own word) with the same values in force goes on as if nothing
-had been; of everything else what was learned is laid aside until a flight agrees with it, and what
-was proposed waits for a flight or a person.
+who answers.  What the same board (by its own word) with the same sensors and values has been judged
+to need still holds; of everything else what was proposed waits for a flight or a person.
 
-What a flight has taught is diagnosed after the landing (:mod:`onboard.daemon.learning.examiner`).
-Where physics was missing that moves the numbers, the sums are forgotten at once: they are known to
-be wrong and must not be added to those of a flight that is right.
+**Sums.**  What a flight has taught is diagnosed after the landing
+(:mod:`onboard.daemon.learning.examiner`).  Only sums that passed it are kept, on disk and over a
+boot of the autopilot, and each flight after a boot learns from nothing: sums of before wait until
+it agrees with them, for a sensor may have changed without anybody saying so.  Where physics was
+missing that moves the numbers, the sums are forgotten at once: they are known to be wrong and must
+not be added to those of a flight that is right.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ import msgspec
 from onboard.answers.knowledge import whole
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Advanced, FlightEnded, Restarted
-from onboard.core.estimate.result import Calibration, Six, Status
+from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.distrust import WindowClosed, WindowOpened
 from onboard.core.inputs.samples import ParameterValue, Sample
@@ -34,7 +36,15 @@ from onboard.daemon.learning.examiner import Examiner
 from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
 from onboard.daemon.learning.identity import Identity
-from onboard.daemon.learning.meaning import all_in_force, carried, hand_on, matters
+from onboard.daemon.learning.kept import Kept, calibrator_anew, name_of_a_flight
+from onboard.daemon.learning.meaning import (
+    Meaning,
+    carried,
+    hand_on,
+    matters,
+    meanings,
+    same_sensors,
+)
 from onboard.daemon.learning.opening import Opening
 from onboard.daemon.learning.proof import ProofFlight, answers
 from onboard.daemon.learning.shelf import Shelf
@@ -95,8 +105,9 @@ class Learner:
         self._clock = clock
         self._wall_clock = wall_clock
         self._identity: Identity | None = None
-        self._before_gap: dict[int, Six | None] = {}
-        self._calibrator = Calibrator(settings)
+        self._before_gap: dict[int, Meaning] = {}
+        self._calibrator = calibrator_anew(settings)
+        self._kept = Kept()
         self._proof = ProofFlight(settings)
         self._flown: dict[int, Calibration] = {}
         self._examiner = Examiner(clock, wall_clock)
@@ -128,19 +139,20 @@ class Learner:
         # Of another board, for all that is known, nothing holds any more.
         values = carried(self._calibrator.parameters) if same or before is None else {}
         values |= {parameter.name: parameter.value for parameter in told if matters(parameter.name)}
-        if same and all_in_force(values) == self._before_gap:
+        if same and same_sensors(self._before_gap, meanings(values)):
             return
-        calibrator = Calibrator(self._settings)
-        kept = None
-        if before is not None and not there.surely_not(before):
-            calibrator.lay_aside(self._calibrator.to_bytes())
-            kept = self._flight
+        maybe = before is not None and not there.surely_not(before)
+        calibrator, kept = calibrator_anew(self._settings), self._flight if maybe else None
+        if maybe:
+            self._end_in_the_air()
+            self._kept.wait_beside(calibrator)
         if before != there:
             if before is not None:
                 self._shelve(before)
             loaded = self._take_from_shelf(calibrator)
             kept = kept or loaded
-        self._begin(calibrator, values)
+        self._kept = Kept(calibrator.sums)
+        self._begin(calibrator, values, forgotten=not maybe)
         self._flight = None if kept is None else kept.outdated()
         if calibrator.waiting:
             text = "what was learned before is added when a flight agrees with it"
@@ -148,7 +160,7 @@ class Learner:
 
     def gap(self) -> None:
         """The autopilot rebooted or was silent: from here on it may be another board."""
-        self._before_gap = all_in_force(self._calibrator.parameters.values)
+        self._before_gap = meanings(self._calibrator.parameters.values)
 
     def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
         """Lay what is on the disk beside this calibrator; the last flight that was judged."""
@@ -163,15 +175,26 @@ class Learner:
     def _shelve(self, whose: Identity) -> None:
         """Before another board takes over; a disk that does not take it costs that board's sums."""
         try:
-            self._shelf.save(whose, self._calibrator, self._flight, self._wall_clock())
+            self._shelf.save(whose, self._kept, self._flight, self._wall_clock())
         except StateError as error:
             self._tell("save_failed", str(error), warning=True)
 
-    def _begin(self, calibrator: Calibrator, parameters: Mapping[str, float]) -> None:
-        """Go on with another calibrator, which is told what the messages mean."""
+    def _begin(
+        self, calibrator: Calibrator, parameters: Mapping[str, float], *, forgotten: bool
+    ) -> None:
+        """Go on with another calibrator, which is told what the messages mean.
+
+        Args:
+            calibrator: has flown nothing.
+            parameters: in force.
+            forgotten: nothing that was flown before counts any more.
+        """
         self._calibrator = calibrator
         hand_on(parameters, calibrator)
-        self._examiner.begin_anew(calibrator)
+        if forgotten:
+            self._examiner.begin_anew(calibrator)
+        else:
+            self._examiner.go_on_with(calibrator)
         self._calibrated.clear()
         self._stuck.clear()
         self._answers = {}
@@ -204,8 +227,8 @@ class Learner:
             if judging:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
-        if self._flight is not None and not self._flight.current:
-            # Of before the restart: forgotten where other sensors say who they are.
+        if self._flight is not None:
+            # Forgotten where other sensors say who they are.
             self._flight = self._flight.of_these_sensors(self._calibrator.parameters)
         learned = self._learned()
         if in_flight and self._in_air:
@@ -217,9 +240,14 @@ class Learner:
     def examine(self) -> Learned:
         """Diagnose one accelerometer of those that wait for it; takes seconds."""
         trim()  # what the refinement of the flight has left
-        flight = self._examiner.examine_next()
-        if flight is not None:
-            self._judged(flight)
+        examined = self._examiner.examine_next()
+        if examined is not None:
+            found = examined.flight.diagnosed
+            missing = {imu: bool(its.missing) for imu, its in found.items()}
+            self._kept.take(examined.sums, missing)
+            # Another boot may have begun since the landing, which knows nothing of them.
+            self._kept.wait_beside(self._calibrator)
+            self._judged(examined.flight)
         trim()
         return self._learned()
 
@@ -229,9 +257,10 @@ class Learner:
         Raises:
             StateError: all is forgotten but for what is on the disk, which keeps it.
         """
-        self._begin(Calibrator(self._settings), carried(self._calibrator.parameters))
+        values = carried(self._calibrator.parameters)
+        self._begin(calibrator_anew(self._settings), values, forgotten=True)
         self._windows = 0
-        self._flight = None
+        self._flight, self._kept = None, Kept()
         if self._identity is not None:
             self._shelf.clear(self._identity)
         return self._learned()
@@ -243,18 +272,19 @@ class Learner:
             StateError: the disk does not take them.
         """
         if self._identity is not None:
-            self._shelf.save(self._identity, self._calibrator, self._flight, saved_at)
+            self._shelf.save(self._identity, self._kept, self._flight, saved_at)
             trim()
 
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what the diagnosis said; a flight that says nothing takes nothing away."""
         self._unjudged = False
-        if self._flight is not None and not flight.overrules(self._flight):
+        taken = flight.after(self._flight)
+        if taken is None:
             self._tell(
                 "flight_too_short", "the flight says too little: what was known before stays"
             )
             return
-        self._flight = flight
+        self._flight = taken
         for imu, found in flight.diagnosed.items():
             if found.missing:
                 self._calibrator.begin_anew(imu)
@@ -332,16 +362,22 @@ class Learner:
                     self._in_air = self._unjudged = True
                 self._counters["event_Advanced"] += 1
             case _:
-                # A flight that ends with the power of the autopilot has ended, too.
-                if isinstance(event, FlightEnded) or (
-                    isinstance(event, Restarted) and self._in_air
-                ):
+                if isinstance(event, FlightEnded):
                     self._in_air = False
                     self._examiner.landed(self._calibrator)
                 if isinstance(event, Restarted):
+                    self._end_in_the_air()
+                    self._calibrator.begin_flight(name_of_a_flight())
+                    self._kept.wait_beside(self._calibrator)
                     self._opening.restarted()
                 self._urgent |= isinstance(event, FlightEnded)
                 self._counters[f"event_{type(event).__name__}"] += 1
+
+    def _end_in_the_air(self) -> None:
+        """A flight that ends with the power of the autopilot, or with its link, has ended, too."""
+        if self._in_air:
+            self._in_air = False
+            self._examiner.landed(self._calibrator)
 
     def _parameter(self, parameter: ParameterValue) -> None:
         """Solve anew where a value changes what the messages mean."""

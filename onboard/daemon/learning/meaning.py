@@ -8,6 +8,7 @@ beside it to judge a push, what matters is handed on here.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Six
@@ -19,6 +20,59 @@ from onboard.mavlink.parameter_messages import to_float32
 CARRIED = ("INS", "AHRS", "GPS", "ARMING")
 """Beginnings of the names that change what an estimator makes of the messages."""
 IMUS = range(1, 6)
+CORRECTED = 1.0
+"""INS_TCALn_ENABLE where raw values are corrected for temperature before all else."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What an accelerometer's messages are of, as far as it was reported.
+
+    Attributes:
+        six: what the autopilot applies, float32; None if one was not reported.
+        device_id: of the sensor.
+        corrections: parameters of the correction for temperature that comes before it.
+    """
+
+    six: Six | None = None
+    device_id: float | None = None
+    corrections: Mapping[str, float] = field(default_factory=dict)
+
+    def is_of(self, now: Meaning) -> bool:
+        """Whether raw values are of the same sensor, corrected alike, for all that is known."""
+        ids = {self.device_id, now.device_id} - {None}
+        return len(ids) < 2 and not corrected_otherwise(self.corrections, now.corrections)
+
+
+def meanings(values: Mapping[str, float]) -> dict[int, Meaning]:
+    """That of every accelerometer that ArduPilot has names for."""
+    return {
+        imu: Meaning(
+            in_force(values, imu),
+            values.get(parameter_names(imu).device_id),
+            corrections(values, imu),
+        )
+        for imu in IMUS
+    }
+
+
+def corrections(values: Mapping[str, float], imu: int) -> dict[str, float]:
+    """Parameters of an accelerometer's correction for temperature, as far as they are reported."""
+    group = f"INS_TCAL{imu}_" if imu <= 3 else f"INS{imu}_TCAL_"
+    reference = f"INS_ACC{imu}_CALTEMP" if imu <= 3 else f"INS{imu}_ACC_CALTEMP"
+    names = [n for n in values if n == reference or n.startswith((f"{group}ACC", f"{group}ENABLE"))]
+    return {name: values[name] for name in sorted(names)}
+
+
+def corrected_otherwise(then: Mapping[str, float], now: Mapping[str, float]) -> list[str]:
+    """Names by which a correction for temperature differs; none where there is no correction."""
+    on = [
+        name
+        for told in (then, now)
+        for name, value in told.items()
+        if name.endswith("_ENABLE") and value == CORRECTED
+    ]
+    return [n for n in then if n in now and now[n] != then[n]] if on else []
 
 
 def matters(name: str) -> bool:
@@ -51,6 +105,8 @@ def in_force(values: Mapping[str, float], imu: int) -> Six | None:
     return a, b, c, d, e, f
 
 
-def all_in_force(values: Mapping[str, float]) -> dict[int, Six | None]:
-    """:func:`in_force` of every accelerometer that ArduPilot has names for."""
-    return {imu: in_force(values, imu) for imu in IMUS}
+def same_sensors(before: Mapping[int, Meaning], now: Mapping[int, Meaning]) -> bool:
+    """Whether raw values mean what they meant, and the same is made of them."""
+    return before.keys() == now.keys() and all(
+        its.six == now[imu].six and its.is_of(now[imu]) for imu, its in before.items()
+    )

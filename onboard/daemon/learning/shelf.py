@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 from onboard import __version__
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.saving import SavedEngine, dump
 from onboard.daemon.learning.flight import JudgedFlight, decode, encode
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.store import Store
@@ -33,15 +35,24 @@ class Shelf:
             saved = self._store.load(whose.system_id, whose.board)
             if saved is None:
                 return None
-            calibrator.lay_aside(saved.sums)
         except StateError:
             self.counters["state_refused"] += 1
             raise
+        try:
+            calibrator.lay_aside(saved.sums)
+        except StateError as error:
+            self.counters["state_refused"] += 1
+            aside = self._store.set_aside(whose.system_id, whose.board)
+            raise StateError(f"{error}, set aside as {aside}") from None
         self.counters["state_resumed"] += 1
         return decode(saved.flight) if saved.flight else None
 
     def save(
-        self, whose: Identity, calibrator: Calibrator, flight: JudgedFlight | None, saved_at: float
+        self,
+        whose: Identity,
+        sums: Iterable[SavedEngine],
+        flight: JudgedFlight | None,
+        saved_at: float,
     ) -> None:
         """Write a board's sums and its last flight.
 
@@ -50,7 +61,7 @@ class Shelf:
         """
         self._store.save(
             whose.system_id,
-            calibrator.to_bytes(),
+            dump(sums),
             version=__version__,
             saved_at=saved_at,
             board=whose.board,
@@ -59,14 +70,15 @@ class Shelf:
         self.counters["saves"] += 1
 
     def clear(self, whose: Identity) -> None:
-        """Forget what was learned of this board.
+        """Forget what was learned of this board, also where it did not tell which it is.
 
         Raises:
             StateError: the disk keeps it.
         """
-        path = self._store.path(whose.system_id, whose.board)
-        try:
-            path.unlink(missing_ok=True)
-        except OSError as error:
-            why = f"{path}: {error.strerror}: it is there again at the next start"
-            raise StateError(why) from None
+        for board in dict.fromkeys((whose.board, "")):
+            path = self._store.path(whose.system_id, board)
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                why = f"{path}: {error.strerror}: it is there again at the next start"
+                raise StateError(why) from None

@@ -121,6 +121,7 @@ class Proposals:
         for imu, why in (refusals.refusals() if refusals is not None else {}).items():
             self.standing(imu).refused = why
         self._flight: JudgedFlight | None = None
+        self._parameters: Mapping[str, float] = {}
 
     def update(
         self,
@@ -133,7 +134,7 @@ class Proposals:
         board: str = "",
     ) -> None:
         """Make them anew from what was learned and the autopilot's values of this moment."""
-        self._flight = learned.flight
+        self._flight, self._parameters = learned.flight, parameters
         calibrations = learned.calibrations
         plans: dict[int, PushPlan] = {}
         for imu, calibration in calibrations.items():
@@ -144,7 +145,7 @@ class Proposals:
                 self.counters["not_proposed"] += 1
         held = {}
         for imu, plan in plans.items():
-            held[imu] = self._beyond_policy(imu, plan, now)
+            held[imu] = self._beyond_policy(imu, now)
             held[imu] |= self._physics(imu, diagnosing=bool(learned.diagnosing))
             found = judge(plan, calibrations[imu], condition, self.settings, values=parameters)
             for refusal in found:  # several of one name (six sigmas): the first says enough
@@ -328,7 +329,7 @@ class Proposals:
     def _diagnosed(self, imu: int) -> Diagnosed | None:
         return None if self._flight is None else self._flight.diagnosed.get(imu)
 
-    def _unconfirmed(self, imu: int, plan: PushPlan) -> str:
+    def _unconfirmed(self, imu: int) -> str:
         """Why it takes another flight, or a person, to believe that this is of what is there."""
         flight = self._flight
         if flight is None or imu not in flight.imus or imu == self.writing:
@@ -338,17 +339,10 @@ class Proposals:
                 "it was learned before the service or the autopilot last started, and no flight "
                 "has confirmed it since"
             )
-        then, now = flight.imus[imu].in_force, tuple(c.before for c in plan.changes)
-        if now in (then, self.standing(imu).written):
-            return ""
-        changed = [
-            f"{c.name} from {old:.6g} to {c.before:.6g}"
-            for c, old in zip(plan.changes, then, strict=True)
-            if c.before != old
-        ]
-        return f"somebody has changed {', '.join(changed)} since the flight began"
+        changed = flight.imus[imu].changed_since(self._parameters, imu, self.standing(imu).written)
+        return f"somebody has changed {changed} since the flight began" if changed else ""
 
-    def _beyond_policy(self, imu: int, plan: PushPlan, now: float) -> dict[str, str]:
+    def _beyond_policy(self, imu: int, now: float) -> dict[str, str]:
         standing = self.standing(imu)
         found: dict[str, str] = {}
         if self.forbidden:
@@ -362,7 +356,7 @@ class Proposals:
         if now < standing.not_before:
             wait = standing.not_before - now
             found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
-        unconfirmed = self._unconfirmed(imu, plan)
+        unconfirmed = self._unconfirmed(imu)
         if unconfirmed and standing.approved is None:
             found["unconfirmed"] = f"{unconfirmed}: fly, or `onboard approve {imu}`"
         if self.approval and standing.approved is None:
