@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from onboard.core.estimate.result import Calibration
-from onboard.core.physics.catalogue import bearing_of
+from onboard.core.physics.catalogue import bearing_of, is_excluded
 from onboard.core.physics.effect import Bearing
 
 HEADLINES = {
@@ -75,3 +75,8 @@ class Diagnosed:
     modelled: bool = False
     document: dict[str, Any] = field(default_factory=dict)
     resumed: bool = False
+
+    @property
+    def left_out(self) -> bool:
+        """Whether something was found that must not be fitted, and was left out of the fit."""
+        return any(is_excluded(name) for name in self.effects)

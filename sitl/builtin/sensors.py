@@ -159,7 +159,7 @@ def read_imu(
     gyro = _gyro(trajectory.w_b @ board, imu, stream(4), stream(5), t)
     return ImuReadings(
         raw=raw,
-        filtered=low_pass(raw, accel_filter_hz),
+        filtered=_spoiled(truth, index, low_pass(raw, accel_filter_hz), stream(6)),
         gyro=gyro,
         gyro_filtered=low_pass(gyro, gyro_filter_hz),
         temperature=temperature,
@@ -176,6 +176,14 @@ def _limit(truth: Truth, index: int) -> float:
     """Rail of IMU ``index``, m/s^2: the chip's range, or less."""
     lower = (e for e in truth.effects if isinstance(e, fx.Saturation) and _hits(e.imu, index))
     return min([RANGE, *(e.limit for e in lower)])
+
+
+def _spoiled(truth: Truth, index: int, readings: Array, chance: np.random.Generator) -> Array:
+    """(n, 3) what the bus makes of readings."""
+    for effect in truth.effects:
+        if isinstance(effect, fx.AccelerometerSpikes) and _hits(effect.imu, index):
+            readings = effect.spoil(readings, chance)
+    return readings
 
 
 def _converted(raw: Array, limit: float) -> tuple[Array, NDArray[np.bool_]]:

@@ -9,7 +9,9 @@ import numpy as np
 
 from onboard.core.diagnosis.clipping import saturation_effect
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.false_samples import spikes_effect
 from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import doubted_of, false_fixes, unclipped
 from onboard.core.diagnosis.testability import testable_of
@@ -18,6 +20,7 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
 from onboard.core.inputs.expected_force import expected, spectrum, white
 from onboard.core.inputs.segments import Batch
+from onboard.core.inputs.spikes import spikes_of
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.finding import Finding
@@ -36,6 +39,7 @@ class Cleared:
     absent: list[NotTestable]
     rail: Finding | None
     fault: Finding | None
+    spikes: Finding | None
     clipped: bool
     sampled: Sequence[Batch]
 
@@ -53,9 +57,17 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     if rail is not None:
         absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
         testable = [f for f in testable if not f.bent_by_clipping]
-    clipped, sampled = rail is not None and batches is flight, batches
+    clipped = rail is not None and batches is flight
     full = _felt(engine, testable, origin.t0, batches)
-    batches = full.batches
+    spiked = None if rail is not None else spikes_of(batches)
+    spikes: Finding | None = None
+    if spiked is not None:
+        without = _felt(engine, testable, origin.t0, spiked.batches)
+        better = 2.0 * (without.log_likelihood - full.log_likelihood)
+        if better > CLEARLY:
+            full, batches = without, spiked.batches
+            spikes = spikes_effect(spiked, better, origin.t0)
+    sampled, batches = batches, full.batches
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
@@ -69,7 +81,7 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
             engine, testable, t0=origin.t0, batches=batches, refused=refused
         ).with_noise()
     full.let_epochs_go()
-    return Cleared(full, testable, absent, rail, fault, clipped, sampled)
+    return Cleared(full, testable, absent, rail, fault, spikes, clipped, sampled)
 
 
 def _felt(

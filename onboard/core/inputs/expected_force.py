@@ -21,12 +21,12 @@ that ``q`` can be; whether it is as much, is for the likelihood of what the rece
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from onboard.core.inputs.joined import joined, runs, times, with_samples
 from onboard.core.inputs.limits import FLOOR_BINS, RESOLVED_S, SPECTRUM_BINS
-from onboard.core.inputs.segments import Batch, Segment
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
 
@@ -35,12 +35,12 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 
     None if they are too few to tell.
     """
-    runs = list(_runs(batches))
-    steps = [np.diff(_times(run)) for run in runs] or [np.ones(1)]
+    every = list(runs(batches))
+    steps = [np.diff(times(run)) for run in every] or [np.ones(1)]
     step = float(np.median(np.concatenate(steps)))
     count, found = 0, np.zeros(1)
-    for run in runs:
-        for p in _periodograms(_joined(run)[1], step):
+    for run in every:
+        for p in _periodograms(joined(run)[1], step):
             count, found = count + 1, found + p
     return found / count if count else None
 
@@ -60,45 +60,7 @@ def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Bat
         noise: (3,) density of what of them is white noise.
     """
     gain = _gain(density, noise)
-    made: dict[int, Segment] = {}
-    for run in _runs(batches):
-        t, raw = _joined(run)
-        felt = _filtered(raw, gain)
-        for s in (batch.segment for batch in run):
-            made[id(s)] = replace(s, raw_s=felt[np.searchsorted(t, s.t)])
-    return [replace(b, segment=made[id(b.segment)]) for b in batches]
-
-
-def _runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:
-    """Batches whose samples follow on each other."""
-    run: list[Batch] = []
-    for batch in batches:
-        t = batch.segment.t
-        if run and not (run[-1].segment.t[0] <= t[0] <= run[-1].segment.t[-1]):
-            yield run
-            run = []
-        run.append(batch)
-    if run:
-        yield run
-
-
-def _joined(run: Sequence[Batch]) -> tuple[Array, Array]:
-    """Samples of all segments, each once: times (n,), s, and raw force (n, 3)."""
-    raw = [b.segment.raw_s[i:] for b, i in zip(run, _new(run), strict=True)]
-    return _times(run), np.concatenate(raw)
-
-
-def _times(run: Sequence[Batch]) -> Array:
-    """(n,) s, those of the samples of all segments, each once."""
-    return np.concatenate([b.segment.t[i:] for b, i in zip(run, _new(run), strict=True)])
-
-
-def _new(run: Sequence[Batch]) -> Iterator[int]:
-    """From which of its samples on a segment goes on where those before it end."""
-    last = -np.inf
-    for t in (batch.segment.t for batch in run):
-        yield int(np.searchsorted(t, last, side="right"))
-        last = max(last, float(t[-1]))
+    return with_samples(batches, lambda _, raw: _filtered(raw, gain))
 
 
 def _periodograms(raw: Array, step: float) -> Iterator[Array]:

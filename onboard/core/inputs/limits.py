@@ -159,3 +159,16 @@ HEADING_LOOKED_AT_S: Final = 60.0
 a compass is off for after a take-off [physics]."""
 HEADING_EVERY_S: Final = 0.1
 """s between the moments whose median is taken [cost]."""
+
+# Single false samples (spikes).
+
+NEVER_SIGMAS: Final = 7.0
+"""By which no sample of a Gaussian is off: one in 4e11, and a flight of ten hours at 400 Hz has
+4e7 numbers [probability].  Heavier tails are decided on by the velocity."""
+SPREAD_SAMPLES: Final = 200
+"""Over which the spread is measured: a median of so many is known to 8 % [probability]."""
+NEAR_SAMPLES: Final = 11
+"""Before and after a sample, over which it is seen that vibration has begun or ends: a median of so
+many is known to a third [probability]."""
+LEAST_SPREAD_M_S2: Final = 0.01
+"""A thousandth of g, which is what telemetry resolves [data sheet]."""

@@ -29,28 +29,27 @@ class Kept:
 
     def __init__(self, sums: Iterable[SavedEngine] = ()) -> None:
         self._sums: dict[int, list[SavedEngine]] = {}
-        self._add(sums)
+        for saved in sums:
+            self._sums.setdefault(saved.imu, []).append(saved)
 
     def __iter__(self) -> Iterator[SavedEngine]:
         """All of them."""
         return (saved for its in self._sums.values() for saved in its)
 
-    def take(self, sums: Iterable[SavedEngine], missing: dict[int, bool]) -> None:
-        """Take what a flight ended with.
+    def take(self, imu: int, sums: Iterable[SavedEngine]) -> None:
+        """What a flight ended with, and what it had not decided on, in the place of those before.
 
         Args:
-            sums: of every accelerometer, with those that it had not decided on.
-            missing: whether physics was, by accelerometer that was judged; others stay as they are.
+            imu: which accelerometer.
+            sums: of every accelerometer.
         """
-        for imu in missing:
-            self._sums.pop(imu, None)
-        self._add(s for s in sums if missing.get(s.imu) is False)
+        self._sums[imu] = [saved for saved in sums if saved.imu == imu]
+
+    def forget(self, imu: int) -> None:
+        """What was learned of one accelerometer is known to be wrong."""
+        self._sums.pop(imu, None)
 
     def wait_beside(self, calibrator: Calibrator) -> None:
         """Have a calibrator's flights decide on them, but for what it has learned itself."""
         for saved in self:
             calibrator.earlier.wait_with(saved)
-
-    def _add(self, sums: Iterable[SavedEngine]) -> None:
-        for saved in sums:
-            self._sums.setdefault(saved.imu, []).append(saved)

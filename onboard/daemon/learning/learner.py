@@ -32,7 +32,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.gps.distrust import WindowClosed, WindowOpened
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.daemon.learning import limits
-from onboard.daemon.learning.examiner import Examiner
+from onboard.daemon.learning.examiner import Examined, Examiner
 from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
 from onboard.daemon.learning.identity import Identity
@@ -242,12 +242,10 @@ class Learner:
         trim()  # what the refinement of the flight has left
         examined = self._examiner.examine_next()
         if examined is not None:
-            found = examined.flight.diagnosed
-            missing = {imu: bool(its.missing) for imu, its in found.items()}
-            self._kept.take(examined.sums, missing)
-            # Another boot may have begun since the landing, which knows nothing of them.
-            self._kept.wait_beside(self._calibrator)
+            self._keep(examined)
             self._judged(examined.flight)
+            # Another boot may have begun since the landing, or an engine: they know nothing of it.
+            self._kept.wait_beside(self._calibrator)
         trim()
         return self._learned()
 
@@ -275,8 +273,25 @@ class Learner:
             self._shelf.save(self._identity, self._kept, self._flight, saved_at)
             trim()
 
+    def _keep(self, examined: Examined) -> None:
+        """Keep sums of what nothing was missing in, and nothing false."""
+        for imu, found in examined.flight.diagnosed.items():
+            if found.missing:
+                self._kept.forget(imu)
+            elif found.left_out:
+                # What was left out of the diagnosis is in the sums; those before are as they were.
+                self._begin_anew(imu, "something false was in the flight")
+            else:
+                self._kept.take(imu, examined.sums)
+
+    def _begin_anew(self, imu: int, why: str) -> None:
+        self._calibrator.begin_anew(imu)
+        self._calibrated.pop(imu, None)
+        self._stale = self._urgent = True
+        self._tell("begun_anew", f"IMU {imu}: learning anew, {why}")
+
     def _judged(self, flight: JudgedFlight) -> None:
-        """Take what the diagnosis said; a flight that says nothing takes nothing away."""
+        """Take what was said; a flight that says nothing takes nothing away."""
         self._unjudged = False
         taken = flight.after(self._flight)
         if taken is None:
@@ -287,10 +302,7 @@ class Learner:
         self._flight = taken
         for imu, found in flight.diagnosed.items():
             if found.missing:
-                self._calibrator.begin_anew(imu)
-                self._calibrated.pop(imu, None)
-                self._stale = self._urgent = True
-                self._tell("begun_anew", f"IMU {imu}: learning anew, physics was missing")
+                self._begin_anew(imu, "physics was missing")
 
     # What goes out
 
@@ -379,10 +391,9 @@ class Learner:
             self._in_air = False
             self._examiner.landed(self._calibrator)
 
-    def _parameter(self, parameter: ParameterValue) -> None:
+    def _parameter(self, told: ParameterValue) -> None:
         """Solve anew where a value changes what the messages mean."""
-        name = parameter.name
-        if matters(name) and self._calibrator.parameters.values.get(name) != parameter.value:
+        if matters(told.name) and self._calibrator.parameters.values.get(told.name) != told.value:
             self._stale = self._urgent = True
 
     def _tell(self, kind: str, text: str, *, warning: bool = False) -> None:

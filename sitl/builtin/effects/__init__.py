@@ -15,6 +15,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from sitl.builtin.effects.accelerometer import (
+    AccelerometerSpikes,
     AccelerometerTilt,
     BiasRamp,
     BiasStep,
@@ -49,6 +50,7 @@ ALL: tuple[type[Effect], ...] = tuple(
 
 __all__ = [
     "ALL",
+    "AccelerometerSpikes",
     "AccelerometerTilt",
     "BiasRamp",
     "BiasStep",

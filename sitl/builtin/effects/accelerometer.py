@@ -220,3 +220,20 @@ class Nameless(ByAxis):
             "climb_rate": -scene.trajectory.v_n[:, 2],
         }
         return np.outer(signals[self.term], self.sizes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccelerometerSpikes(Effect):
+    """Single readings that a bus has spoiled: ``size`` m/s^2 off on every axis, either way."""
+
+    name: ClassVar[str] = "accelerometer_spikes"
+    size: float = 9.8
+    share: float = 0.01
+    imu: int = 0
+
+    def spoil(self, readings: Array, chance: np.random.Generator) -> Array:
+        """(n, 3) m/s^2, those that were handed out."""
+        spoiled = chance.random(len(readings)) < self.share
+        signs = chance.choice([-1.0, 1.0], size=readings.shape)
+        out: Array = readings + self.size * spoiled[:, None] * signs
+        return out
