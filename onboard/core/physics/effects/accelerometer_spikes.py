@@ -15,7 +15,7 @@ class AccelerometerSpikes(Effect):
     title = "The accelerometer has false samples"
     sentence = "single samples of the accelerometer are false"
     meaning = "`size`, m/s², root mean square of what they are off by, `share` of all, and when"
-    bearing = Bearing.NO_ONE_NUMBER
+    bearing = Bearing.HARMLESS
     source = "distance from the samples next to it; the receiver's velocity says if it was felt"
     cure = "look for the sensor's bus errors: cable, supply, clock of the bus; replace it"
     apart = "fly on: what is false does not go with what the vehicle does"
