@@ -98,6 +98,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
     yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
+    yield from (Text(f"note: {note}") for note in result.notes)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
     if d.silent:
