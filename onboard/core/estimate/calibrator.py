@@ -296,6 +296,8 @@ class Calibrator:
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)
+        if "POS" in parameter.name:  # GPS1_POS_X, GPS_POS1_X, INS_POS1_X
+            self._engines.tell_antenna()
         if imu is None or not unknown or not self.parameters.known(imu):
             return
         if self.parameters.six(imu) != SixParameters():

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from onboard.core.estimate.agreement import agrees
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import MOST_SAVED, MOST_WAITING
 from onboard.core.estimate.saving import SavedEngine, dump, load
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.arrays import vector3
 from onboard.core.maths.blocks import Seconds, merged
 
 
@@ -60,7 +63,9 @@ class EarlierSums:
                 del waiting[:-MOST_WAITING]
             elif opinion:
                 done["restored"] += 1
-                engine.restore(saved.blocks, saved.point, saved.seconds)
+                engine.restore(
+                    engine.brought(saved.blocks, saved.point, np.array(saved.told)), saved.seconds
+                )
             else:
                 done["saved_contradicted"] += 1
         return done
@@ -82,6 +87,7 @@ class EarlierSums:
                         parameters.device_id(imu),
                         tuple(float(x) for x in engine.model.prior[:6]),
                         engine.point,
+                        (0.0, 0.0, 0.0) if engine.told is None else vector3(engine.told),
                         engine.noise,
                         Seconds(engine.trusted_s, engine.brisk_s),
                         tuple(blocks),

@@ -14,15 +14,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.maths.arrays import vector3, vector4
+from onboard.core.maths.arrays import Vector3, vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
 from onboard.errors import StateError
 
-VERSION = 6
+VERSION = 7
 """1: sums without the antenna's place among the unknowns.  2: with time on the ground in them.
-3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer."""
+3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer.
+6: without the place that the antenna's counts from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +31,15 @@ class SavedEngine:
     """What one accelerometer's engine needs to go on where it stopped.
 
     ``device_id`` is the autopilot's INS_ACCn_ID, None where it was not known: sums of one sensor
-    must never be used for another.
+    must never be used for another.  ``told`` is the lever arm that the antenna's place counts from,
+    body axes, m.
     """
 
     imu: int
     device_id: float | None
     prior: tuple[float, ...]
     point: Linearisation
+    told: Vector3
     noise: NoiseLevels
     seconds: Seconds
     blocks: tuple[Block, ...]
@@ -50,6 +53,7 @@ def dump(engines: list[SavedEngine]) -> bytes:
             "device_id": e.device_id,
             "prior": list(e.prior),
             "point": asdict(e.point),
+            "told": list(e.told),
             "noise": asdict(e.noise),
             "seconds": asdict(e.seconds),
             "portions": [
@@ -121,6 +125,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             antenna=vector3(map(_finite, point.get("antenna", (0.0, 0.0, 0.0)))),
             shapes=vector4(map(_finite, point.get("shapes", (0.0, 0.0, 0.0, 0.0)))),
         ),
+        vector3(map(_finite, e["told"])),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
         blocks,
