@@ -9,7 +9,9 @@ from pathlib import Path
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
 from onboard.answers.explain_document import ExplainDocument, explain_document
+from onboard.answers.flights import distinct
 from onboard.answers.flown_order import in_order
+from onboard.answers.one_flight import no_answer
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
@@ -98,4 +100,6 @@ def explain(
         imu = min(recorded.imus or source.vehicle.imus, default=1)
     known = imu in recorded.imus
     given = recorded.answer(imu) if known else unanswered(source.vehicle.unanswered(imu))
+    if (apart := recorded.contradiction(imu)) is not None:
+        given = no_answer(given, apart, distinct([r.path for r in source.recordings]))
     return Explanation(given, source, recorded.parameters, flown.notes)

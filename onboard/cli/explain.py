@@ -111,6 +111,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
 def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     """What, how sure, what to do: the same words as on the page."""
     refused = d.silent
+    to_do = "To fly" if refused and not d.split else "To do"
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
@@ -122,7 +123,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
         ("Danger", verdict.dangers(d)),
         ("To know" if verdict.severity(d) == "info" else "Missing", found),
         ("Proof", [verdict.proof(d)]),
-        ("To fly" if refused else "To do", verdict.cures(d, advice)),
+        (to_do, verdict.cures(d, advice)),
         ("Note", verdict.remarks(d)),
     ]
     for label, sentences in rows:

@@ -67,6 +67,7 @@ def explain_html(
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
         silent=refused,
+        split=bool(diagnosis.split),
         headline=verdict.headline(diagnosis),
         severity=verdict.severity(diagnosis),
         dangers=verdict.dangers(diagnosis),

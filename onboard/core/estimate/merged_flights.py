@@ -208,7 +208,7 @@ def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Information (6, 6) and vector (6,) in units of the prior, about its centre."""
+    """Information (k, k) and vector (k,) in units of the prior, about its centre."""
 
     N: Array
     b: Array
@@ -220,7 +220,7 @@ class Normal:
 
 def apart_of(a: Normal, b: Normal) -> Apart:
     """What separate values gain in the directions that both know."""
-    one = np.eye(6)
+    one = np.eye(len(a.b))
     size, V = np.linalg.eigh(np.linalg.inv(a.N + one) + np.linalg.inv(b.N + one))
     both = size <= 2.0 * PRIOR_SHARE**2
     if not np.any(both):
