@@ -9,6 +9,9 @@ from pathlib import Path
 from onboard.answers.advice import Advice, advise
 from onboard.answers.answer import Answer
 from onboard.answers.explain_document import ExplainDocument, explain_document
+from onboard.answers.flights import distinct
+from onboard.answers.flown_order import in_order
+from onboard.answers.one_flight import no_answer
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
@@ -17,11 +20,12 @@ from onboard.recordings.recording import Recording
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """An answer with its diagnosis, and what it was made from."""
+    """An answer with its diagnosis, and what it was made from; ``notes`` are about the files."""
 
     answer: Answer
     source: Reading
     parameters: Mapping[str, float]
+    notes: tuple[str, ...] = ()
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -58,6 +62,7 @@ class Explanation:
             autopilot=self.source.autopilot,
             duration_s=self.duration_s,
             damage=self.source.damage,
+            notes=self.notes,
             samples={
                 "imu": self.source.vehicle.counts.get(f"imu {self.imu}", 0),
                 "gps": self.source.vehicle.counts.get("gps", 0),
@@ -75,21 +80,26 @@ def explain(
     """Read recordings of one vehicle and diagnose one accelerometer.
 
     Args:
-        paths: at least one recording; files, or opened already.
+        paths: at least one recording; files, or opened already; where they do not say when they
+            were flown, in that order.
         imu: which accelerometer; the first that can be diagnosed if None.
         progress: told the share of the reading that is done.
 
     Raises:
         RecordingError: a file that cannot be used.
-        UsageError: there is no such accelerometer.
+        UsageError: there is no such accelerometer; dates contradict the order given of recordings
+            not all of which have one.
     """
+    flown = in_order(paths)
     recorded = Recorded((imu or 1,))
-    source = read(paths, recorded, imu=imu, progress=progress)
+    source = read(flown.recordings, recorded, imu=imu, progress=progress)
     if imu is None and 1 not in recorded.imus:
         recorded = Recorded()
-        source = read(paths, recorded, progress=progress)
+        source = read(flown.recordings, recorded, progress=progress)
     if imu is None:
         imu = min(recorded.imus or source.vehicle.imus, default=1)
     known = imu in recorded.imus
     given = recorded.answer(imu) if known else unanswered(source.vehicle.unanswered(imu))
-    return Explanation(given, source, recorded.parameters)
+    if (apart := recorded.contradiction(imu)) is not None:
+        given = no_answer(given, apart, distinct([r.path for r in source.recordings]))
+    return Explanation(given, source, recorded.parameters, flown.notes)

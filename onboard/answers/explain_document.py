@@ -140,7 +140,10 @@ class UnseenDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
-    """What was read; ``damage``: what was skipped of damaged files, in sentences."""
+    """What was read; ``damage``: what was skipped of damaged files, in sentences.
+
+    ``notes``: in which order the files are taken, where there is something to say of it.
+    """
 
     files: list[str]
     autopilot: str
@@ -148,6 +151,7 @@ class ExplainedRecording(msgspec.Struct, frozen=True, kw_only=True):
     imu: int
     samples: dict[str, int]
     damage: list[str] = []
+    notes: list[str] = []
 
 
 class ExplainDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -188,6 +192,7 @@ def explain_document(
     samples: dict[str, int],
     advice: Advice | None = None,
     damage: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> ExplainDocument:
     """The document of one diagnosis; ``advice`` on what may be set, where it is asked for."""
     sentence, severity = verdict_of(diagnosis)
@@ -199,6 +204,7 @@ def explain_document(
             imu=diagnosis.imu,
             samples=samples,
             damage=list(damage),
+            notes=list(notes),
         ),
         calibration=calibration_document(diagnosis.calibration, autopilot),
         timing=timing_document(diagnosis.timing),

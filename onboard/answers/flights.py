@@ -20,10 +20,10 @@ from onboard.answers.chronicles import Chronicles
 from onboard.answers.flight_share import NOT_COMPARED, Share, share_of
 from onboard.answers.flight_words import agreement, contradiction, left_out, others
 from onboard.answers.recorded import KEEPING_ALL, NO_FLIGHT, Recorded
-from onboard.core.diagnosis.together import Told, undecided_together
-from onboard.core.diagnosis.undecided import Undecided, in_words, left_open
+from onboard.core.diagnosis.joined import WHO, Heard, joined
+from onboard.core.diagnosis.undecided import in_words
 from onboard.core.estimate.comparison import Comparison, compare
-from onboard.core.estimate.merged_flights import Prior, Reconciled, merged, reconciled
+from onboard.core.estimate.merged_flights import Prior, Reconciled
 from onboard.core.estimate.merged_record import merged_calibration, unknown_six
 from onboard.core.estimate.observability import Observability
 from onboard.core.estimate.result import Calibration, Status
@@ -142,46 +142,37 @@ class Flights:
             raise KeyError(imu)
         counting = [i for i in there if (f := flights[i]) is not None and f.said is not None]
         last = [f for f in flights if f is not None and (f.said is not None or not counting)][-1]
-        said = [f.said for f in flights if f is not None and f.said is not None]
+        said = [
+            Heard(f.said, [f.of_raw(a) for a in recorded.effects(imu)])
+            for f, recorded in zip(flights, self._flights, strict=True)
+            if f is not None and f.said is not None
+        ]
         if not said:
             answers = self._listed(flights, counting, None)
             note = f"no flight counts: {left_out(answers)}. {last.given.calibration.note}".rstrip()
             return _with(last.given, replace(last.given.calibration, note=note), answers)
         prior = Prior(in_force.as_linear(), KEEPING_ALL.needs.prior)
-        found = reconciled(said, prior)
+        together = joined(said, prior)
+        found = together.found
         answers = self._listed(flights, counting, found)
-        if not found.counted:
+        if together.merged is None:
             made = unknown_six(last.judged, in_force)
             note = f"{contradiction(answers, found)}. {others(answers)}".rstrip()
             return _with(last.given, replace(made, note=note), answers)
         chosen = [counting[i] for i in found.counted]
         judged = [f.judged for i in chosen if (f := flights[i]) is not None]
-        open_ = self._open_together(imu, flights, chosen, prior)
-        together = merged([said[i] for i in found.counted], prior)
-        together = replace(together, covariance=together.covariance + left_open(open_))
         made, self._seen[imu] = merged_calibration(
             judged,
-            together,
+            together.merged,
             in_force,
             KEEPING_ALL.needs,
             next((k for f in reversed(self._flights) if (k := f.calibrator.kind)), ""),
         )
-        said_of = in_words(open_, made, "The flights together leave")
-        notes = (agreement(answers, found), others(answers), said_of, made.note)
+        claimed = np.array(made.covariance).diagonal()
+        open_ = in_words(together.open, SixParameters(made.scale, made.offset), claimed, WHO)
+        notes = (agreement(answers, found), others(answers), open_, made.note)
         note = " ".join(x for x in notes if x)
         return _with(last.given, replace(made, note=note), answers)
-
-    def _open_together(
-        self, imu: int, flights: Sequence[Share | None], chosen: Sequence[int], prior: Prior
-    ) -> list[Undecided]:
-        """Effects that may be in all flights though none shows it."""
-        told = []
-        for k, (flight, recorded) in enumerate(zip(flights, self._flights, strict=True)):
-            if flight is None or flight.said is None:
-                continue
-            six = flight.said.information if k in chosen else np.zeros((6, 6))
-            told.append(Told([flight.of_raw(a) for a in recorded.effects(imu)], six))
-        return undecided_together(told, prior.sigma)
 
     def _in_force(self, imu: int) -> list[SixParameters | None]:
         """By recording what was in force in it, where only another recording says it."""

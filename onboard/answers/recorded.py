@@ -16,6 +16,7 @@ import numpy as np
 
 from onboard.answers.answer import Answer, judged
 from onboard.answers.chronicle import Chronicle
+from onboard.core.diagnosis.one_flight import Contradiction, contradiction
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
 from onboard.core.diagnosis.together import Asked, asked_of
@@ -58,6 +59,8 @@ class Recorded:
         self._answers: dict[int, Answer] = {}
         self._engines: dict[int, Engine] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
+        self._recordings = [-math.inf]  # when each of them begins, on the clock of the first
+        self._contradictions: dict[int, Contradiction] = {}
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -85,6 +88,7 @@ class Recorded:
         if t is not None and math.isfinite(t):
             if self._begins:
                 self._shift, self._begins = self._newest + PAUSE_S - t, False
+                self._recordings.append(self._newest + PAUSE_S / 2.0)
             if self._shift:
                 sample = later(sample, t, self._shift)
             self._newest = max(self._newest, t + self._shift)
@@ -121,6 +125,10 @@ class Recorded:
         """What it says, as one of several flights, of effects that are alike in all of them."""
         return self._asked_of.get(imu, ())
 
+    def contradiction(self, imu: int) -> Contradiction | None:
+        """Recordings that are no one flight, where an accelerometer that was asked shows it."""
+        return self._contradictions.get(imu)
+
     def engine(self, imu: int) -> Engine | None:
         """Whose sums gave the answer; None where there is no diagnosis."""
         return self._engines.get(imu)
@@ -155,6 +163,10 @@ class Recorded:
             plain = self.calibrator.calibration(imu)
             note = f"{why}. {plain.note}".rstrip()
             return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+        if len(self._recordings) > 1:
+            apart = contradiction(found.engine, self._recordings)
+            if apart is not None:
+                self._contradictions[imu] = apart
         found.engine.let_epochs_go()  # a report asks for its sums and states
         self._engines[imu] = found.engine
         if self.chronicle is not None:

@@ -32,6 +32,7 @@ LACKING = "something is missing from the model"
 """Why a flight that shows the numbers well may be no calibration all the same."""
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 """For terminals, by severity."""
+NOT_ONE = "These recordings are not one flight"
 MOST_NAMED = 2
 NOISE = 1.3
 """Held-out residual, in units of the noise, up to which it may be called noise."""
@@ -49,6 +50,8 @@ SAID_ABOVE = (
 
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict as one short sentence."""
+    if diagnosis.split:
+        return NOT_ONE
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         what = "" if diagnosis.silent else " what is missing"
         return f"This flight shows too little to tell{what}"
@@ -73,6 +76,8 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     """A sentence that needs no sizes, and ``good``, ``info``, ``warning`` or ``error``."""
+    if diagnosis.split:
+        return f"{NOT_ONE}.", "warning"
     names = [e.name for e in diagnosis.effects]
     dangerous = any(danger_of(e) for e in diagnosis.effects)
     return diagnosed.headline(diagnosis.verdict.value, names, dangerous=dangerous)
@@ -91,6 +96,8 @@ def dangers(diagnosis: Diagnosis) -> list[str]:
 
 def missing(diagnosis: Diagnosis) -> list[str]:
     """What is missing, with sizes: one sentence for each effect."""
+    if diagnosis.split:
+        return [f"{diagnosis.split}."]
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         m = diagnosis.mismatch
         if not m.fit:
@@ -130,6 +137,8 @@ def sized(effect: Finding) -> str:
 def proof(diagnosis: Diagnosis) -> str:
     """How sure: the residual on data that were not fitted, before and after."""
     m = diagnosis.mismatch
+    if diagnosis.split:
+        return "What each recording says by itself was compared; nothing else is said of both."
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         return "Nothing could be tested: no effect was accepted or ruled out."
     before, after = m.held_out_velocity_before, m.held_out_velocity_after
@@ -165,6 +174,8 @@ def cures(diagnosis: Diagnosis, advice: Advice | None = None) -> list[str]:
 
     ``advice`` says which parameters may be set; without it none is named.
     """
+    if diagnosis.split:
+        return ["Explain each recording by itself; onboard replay merges what they say of the six."]
     if diagnosis.verdict is Verdict.INSUFFICIENT:
         fly = to_fly(diagnosis) or ["Fly again, with accelerations, turns and climbs."]
         return fly if diagnosis.silent or advice is None else [about_six(advice), *fly]
@@ -227,11 +238,13 @@ def _sentence(cure: str, settings: str) -> str:
 
 def to_fly(diagnosis: Diagnosis) -> list[str]:
     """What this flight did not show, each with what to fly: sentences."""
-    return [s for s in _sentences(diagnosis.note) if ":" in s]
+    return [s for s in _sentences(diagnosis.note) if ":" in s and not diagnosis.split]
 
 
 def remarks(diagnosis: Diagnosis) -> list[str]:
     """What else there is to say: the other sentences of the note, and what was not used."""
+    if diagnosis.split:  # which is the note
+        return []
     out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(SAID_ABOVE)]
     return out + unused_in_words(diagnosis)
 

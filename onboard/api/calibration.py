@@ -109,7 +109,7 @@ def calibrate(
 
     Args:
         source: a recording (.BIN, .tlog, .ulg), :class:`onboard.Arrays`, or several of one vehicle
-            in the order in which they were flown: these are merged.
+            (where they have no dates, in the order in which they were flown): these are merged.
         imu: this accelerometer only, 1 to 5; all of them without.
         progress: told the share of the reading that is done, 0 to 1.
 

@@ -100,7 +100,8 @@ def _done(job: Job, path: Path, progress: Callable[[float], None] | None) -> Out
         if record is not None and page is not None:
             shown = _named(page, sha256, path)
             return Outcome(record=record.named(path), page=shown, notes=tuple(notes), stored=True)
-    recorded = Recorded(() if job.imu is None else (job.imu,), watched=job.paged)
+    wanted = () if job.imu is None else (job.imu,)
+    recorded = Recorded(wanted, watched=job.paged, one_of_several=True)
     result = replay([path], recorded, imu=job.imu, progress=progress)
     record, page = record_of(path, result, recorded, provenance(path), sha256), b""
     if job.paged and recorded.chronicle is not None:

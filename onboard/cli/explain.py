@@ -98,6 +98,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
     yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
+    yield from (Text(f"note: {note}") for note in result.notes)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
     if d.silent:
@@ -110,6 +111,7 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
 def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     """What, how sure, what to do: the same words as on the page."""
     refused = d.silent
+    to_do = "To fly" if refused and not d.split else "To do"
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
@@ -121,7 +123,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
         ("Danger", verdict.dangers(d)),
         ("To know" if verdict.severity(d) == "info" else "Missing", found),
         ("Proof", [verdict.proof(d)]),
-        ("To fly" if refused else "To do", verdict.cures(d, advice)),
+        (to_do, verdict.cures(d, advice)),
         ("Note", verdict.remarks(d)),
     ]
     for label, sentences in rows:

@@ -57,9 +57,9 @@ def replay(
 ) -> None:
     """Calibrate from recordings: DataFlash .BIN, MAVLink .tlog, PX4 .ulg.
 
-    Several LOGs of one vehicle, in the order in which they were flown, are merged: what a single
-    flight does not show, several may.  Each keeps its own noise and timing, and flights that
-    contradict each other are named, not averaged.
+    Several LOGs of one vehicle are merged: what a single flight does not show, several may.  They
+    are taken in the order of their dates; those without a date, in the order given.  Each keeps its
+    own noise and timing, and flights that contradict each other are named, not averaged.
     Nothing is written to any autopilot; the table says which parameters to set.
     """
     refuse_overwriting(logs, json_file, report_file, param_file, mcap_file)

@@ -41,6 +41,9 @@ MOST_IDS = 2**32
 SYSTEM = ("SYSID_THISMAV", "MAV_SYSID", "MAV_SYS_ID")
 ACCELEROMETERS = {imu: parameter_names(imu).device_id for imu in (1, 2, 3, 4, 5)}
 PX4_ACCELEROMETERS = {imu: f"CAL_ACC{imu - 1}_ID" for imu in (1, 2, 3, 4)}
+OVERLAP_S = 1.0
+"""s; recordings that overlap by more are dated at the same time: dates are of GPS, to the second
+[definition]."""
 DELAYS = ("GPS1_DELAY_MS", "GPS_DELAY_MS")
 PLACES = (("GPS1_POS_X", "GPS1_POS_Y", "GPS1_POS_Z"), ("GPS_POS1_X", "GPS_POS1_Y", "GPS_POS1_Z"))
 
@@ -72,6 +75,18 @@ class Provenance:
     antenna_m: tuple[float, float, float] | None = None
     began_unix_s: float | None = None
     ended_unix_s: float | None = None
+
+    @property
+    def dated(self) -> bool:
+        """Whether it says when it was flown."""
+        return self.began_unix_s is not None and self.ended_unix_s is not None
+
+    def before(self, other: Provenance) -> bool:
+        """Whether the dates of both say that it was over when the other began."""
+        mine, ended, its = self.began_unix_s, self.ended_unix_s, other.began_unix_s
+        if mine is None or ended is None or its is None:
+            return False
+        return mine < its and ended <= its + OVERLAP_S
 
 
 def provenance(path: str | Path) -> Provenance:

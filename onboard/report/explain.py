@@ -36,6 +36,7 @@ def explain_html(
     duration_s: float,
     advice: Advice | None,
     damage: Sequence[str] = (),
+    notes: Sequence[str] = (),
     base: str = PAGE,
 ) -> str:
     """The page of one diagnosis.
@@ -47,6 +48,7 @@ def explain_html(
         duration_s: length of the recordings, s.
         advice: which of ArduPilot's parameters to set; None for another autopilot.
         damage: what was skipped of damaged recordings, in sentences.
+        notes: in which order recordings are taken.
         base: the whole page, or its head only (:mod:`onboard.report.page`).
 
     Returns:
@@ -59,11 +61,13 @@ def explain_html(
         base,
         files=list(files),
         damage=list(damage),
+        notes=list(notes),
         autopilot=words.autopilot_in_words(autopilot),
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
         verdict=diagnosis.verdict.value,
         silent=refused,
+        split=bool(diagnosis.split),
         headline=verdict.headline(diagnosis),
         severity=verdict.severity(diagnosis),
         dangers=verdict.dangers(diagnosis),
@@ -107,6 +111,7 @@ def explanation_html(result: Explanation, base: str = PAGE) -> str:
         duration_s=result.duration_s,
         advice=result.advice,
         damage=result.source.damage,
+        notes=result.notes,
         base=base,
     )
 

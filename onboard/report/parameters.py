@@ -74,7 +74,9 @@ def parameter_text(
     lines.append(f"# accelerometer {diagnosis.imu}, verdict {diagnosis.verdict.value}")
     lines.append(f"# calibration: {diagnosis.calibration.status.value}")
     if diagnosis.silent:
-        lines.append("# This flight says too little: nothing to change.")
+        split = diagnosis.split
+        why = "These recordings are not one flight" if split else "This flight says too little"
+        lines.append(f"# {why}: nothing to change.")
     else:
         lines += _about(diagnosis.calibration, advice)
         lines.append("# Compare with the parameters in force before loading.")

@@ -72,6 +72,7 @@ def flown(
     missing="",
     status=Status.CALIBRATED,
     in_force=None,
+    asked=(),
 ):
     """A recording of 200 s with one accelerometer; ``seed`` adds noise of the claimed sigmas."""
     rng = np.random.default_rng(seed) if seed is not None else None
@@ -110,6 +111,7 @@ def flown(
         antenna=Antenna([float(x) for x in place], [0.02, 0.02, 0.02]),
         asks=asks,
         missing=missing,
+        asked=list(asked),
     )
     return Flown(
         path,

@@ -8,10 +8,11 @@ import pytest
 
 from onboard.answers.fleet.document import FleetDocument, fleet_document
 from onboard.answers.fleet.history import history_of
-from onboard.answers.fleet.record import Record
+from onboard.answers.fleet.record import Asked, Record
 from onboard.answers.fleet.severity import Severity, sentences, severity_of, shared_sentence
 from onboard.answers.fleet.shared_numbers import common_of
 from onboard.answers.fleet.vehicles import vehicles_of
+from onboard.core.diagnosis import together
 from onboard.core.estimate.joint import FLOOR
 from onboard.core.estimate.result import Status
 from onboard.core.maths.chi_square import survival
@@ -189,3 +190,56 @@ def test_a_record_goes_through_the_store_unchanged_to_the_last_digit():
     assert one.covariance == other.covariance
     assert one.status is other.status
     assert again.imus[0].said == record.imus[0].said
+
+
+def leaks(size):
+    """What a flight says of axes that are not square: 0.1 sigma of it, which moves the x offset."""
+    information, moves = np.eye(6) / 0.1**2, np.zeros((6, 6))
+    moves[3, 0] = -0.5
+    value = np.array([size, 0.0, 0.0, 0.0, 0.0, 0.0])
+    said = together.Asked("cross_axis", "", information, information @ value, np.ones(6), moves)
+    return Asked.of(said)
+
+
+def test_an_effect_that_all_flights_ask_for_is_in_the_sigmas_and_said():
+    h = history(season(12, asked=[leaks(0.3)]))
+    plain = history(season(12))
+    merged, without = h.accelerometers[0].merged, plain.accelerometers[0].merged
+    assert merged.value == pytest.approx(without.value)
+    assert merged.sigma[3] > 3.0 * without.sigma[3]
+    assert number(h, "x offset").latest[1] > number(plain, "x offset").latest[1]
+    assert number(h, "y offset").latest == pytest.approx(number(plain, "y offset").latest)
+    (said,) = sentences(h)
+    assert said.startswith("accelerometer 1: the flights together leave open whether")
+    assert severity_of(h) is Severity.WELL
+    document = fleet_document(
+        [f.flown for f in h.vehicle.flights], [h], common_of([h.vehicle])
+    ).vehicles[0]
+    assert "cross_axis" in document.accelerometers[0].merged.note
+
+
+def test_what_flights_before_a_step_ask_for_is_asked_of_them_alone():
+    """The sensor that is there now is another one."""
+    old = season(8, lambda k: STEP, asked=[leaks(0.6)])
+    new = [flown(f"new{k}.BIN", TRUE, day=30.0 + k, seed=50 + k) for k in range(8)]
+    merged = history([*old, *new]).accelerometers[0].merged
+    assert len(merged.counted) == 8
+    assert merged.open == ""
+    assert np.all(merged.open_sigma == 0.0)
+
+
+def test_what_a_flight_says_of_effects_is_kept_to_the_last_digit():
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(3, 3))
+    said = together.Asked(
+        "temperature_drift",
+        "",
+        root @ root.T,
+        rng.normal(size=3),
+        rng.normal(size=3) ** 2,
+        rng.normal(size=(6, 3)),
+    )
+    kept = msgspec.msgpack.decode(msgspec.msgpack.encode(Asked.of(said)), type=Asked).asked
+    for name in ("information", "vector", "prior", "moves"):
+        np.testing.assert_array_equal(getattr(kept, name), getattr(said, name))
+    assert "temperature" in kept.title

@@ -139,7 +139,9 @@ def _sums() -> bytes:
         scale=(1.0, 1.0, 1.0), beta=(0.0, 0.0, 0.0), delay=0.1, window=0.0, attitude_delay=0.0
     )
     prior = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
-    engine = SavedEngine(1, 5.0, prior, point, NoiseLevels(), Seconds(9.0, 9.0), (block,) * 2)
+    engine = SavedEngine(
+        1, 5.0, prior, point, (0.0, 0.0, 0.0), NoiseLevels(), Seconds(9.0, 9.0), (block,) * 2
+    )
     return dump([engine])
 
 

@@ -5,21 +5,28 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import os
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from onboard.answers.fleet.history import history_of
+from onboard.answers.fleet.record import Flown
+from onboard.answers.fleet.vehicles import vehicles_of
 from onboard.answers.flights import Flights, distinct
 from onboard.answers.recorded import Recorded
 from onboard.answers.replay import replay
+from onboard.batches.job import Job, done
 from onboard.cli.table import replay_report
 from onboard.core.estimate.result import Status
 from onboard.report.replay import replay_html
 from sitl import recording
+from sitl.builtin.effects.accelerometer import CrossAxis
 from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis
 from sitl.builtin.truth import GpsTruth, ImuTruth
 from sitl.recording import FlightSpec
+from tests.recordings.dated import flown
 from tests.report.html_page import Page
 
 TRUE = ImuTruth(scale=(1.02, 0.985, 1.015), offset=(0.25, -0.2, 0.3))
@@ -177,3 +184,25 @@ def test_what_no_flight_shows_and_all_have_is_in_the_sigmas(tmp_path):
     assert np.all(off < 3.0 * np.array(c.sigma_with_its_gyroscope))
     assert "The flights together leave open whether" in c.note
     assert "(accelerometer_hysteresis)" in c.note
+
+
+def test_a_fleet_says_of_the_same_flights_what_their_replay_says(tmp_path):
+    """One way of merging, and what a record keeps of a flight is all that it takes."""
+    leak = CrossAxis(zx=0.006, xz=0.006)
+    paths = [
+        flown(
+            FlightSpec(seed=30 + k, duration=110.0, imus=(TRUE,), loop_rate=200, effects=(leak,)),
+            tmp_path / f"{k}.tlog",
+            k,
+        )
+        for k in range(3)
+    ]
+    (answer,) = replay(paths, Flights(distinct(paths))).answers
+    every = [Flown(path, path.name, done(Job(path=os.fsencode(path))).record) for path in paths]
+    (vehicle,) = vehicles_of(every, by_folder=True)
+    (heard,) = history_of(vehicle).accelerometers
+    c, m = answer.calibration, heard.merged
+    assert len(m.counted) == sum(f.counted for f in answer.flights) == 3
+    assert list(m.value) == pytest.approx(c.scale + c.offset, rel=1e-9)
+    assert list(m.sigma) == pytest.approx(c.scale_sigma + c.offset_sigma, rel=1e-9)
+    assert m.open in c.note

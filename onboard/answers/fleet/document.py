@@ -106,7 +106,10 @@ class NumberDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class MergedDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """The six of the flights that count, since the last step; ``inflation`` on their variance."""
+    """The six of the flights that count, since the last step; ``inflation`` on their variance.
+
+    ``note``: which effects all of them leave open, where most of a sigma is of one.
+    """
 
     scale: Numbers
     offset: Numbers
@@ -115,6 +118,7 @@ class MergedDocument(msgspec.Struct, frozen=True, kw_only=True):
     counted: list[str]
     contradicted: list[str]
     inflation: float | None
+    note: str = ""
 
 
 class LeftOutDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -262,6 +266,7 @@ def _accelerometer(a: Accelerometer) -> AccelerometerDocument:
             counted=[_file(a.flights[i]) for i in m.counted],
             contradicted=[_file(a.flights[i]) for i in m.contradicted],
             inflation=finite(m.inflation),
+            note=m.open,
         )
     return AccelerometerDocument(
         imu=a.imu,

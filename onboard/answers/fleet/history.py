@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from onboard.answers.document_numbers import TIMING
 from onboard.answers.fleet.record import ImuRecord
 from onboard.answers.fleet.vehicles import Flight, Vehicle
 from onboard.answers.recorded import KEEPING_ALL
+from onboard.core.diagnosis.joined import Heard
 from onboard.core.estimate.joint import FLOOR
 from onboard.core.estimate.limits import TIMING_FLOOR_S
 from onboard.core.estimate.merged_flights import Prior
@@ -45,7 +46,8 @@ class Number:
         series: their values.
         course: what is said of them.
         common: sigma of what is wrong with all flights alike: no drift and no step, and no less in
-            any mean of them (the floors, the gyroscope's axes).
+            any mean of them (the floors, the gyroscope's axes, effects that no flight shows by
+            itself).
     """
 
     name: str
@@ -261,6 +263,12 @@ def _accelerometer(
 ) -> Accelerometer:
     imu, device = key
     merged, why = _merged(heard, numbers)
+    if merged is not None:
+        # What all flights leave open is wrong with all of them alike.
+        open_ = dict(zip(SIX_NAMES, merged.open_sigma, strict=True))
+        numbers = tuple(
+            replace(n, common=math.hypot(n.common, float(open_[n.name]))) for n in numbers
+        )
     return Accelerometer(
         imu, device, tuple(h.flight for h in heard), numbers, merged, why, tuple(left_out)
     )
@@ -282,7 +290,16 @@ def _merged(heard: Sequence[_Heard], numbers: Sequence[Number]) -> tuple[Togethe
     ]
     if not which:
         return None, NOBODY
-    said = [h.imu.said.six for h in heard if h.imu.said is not None]
+    said = [
+        Heard(h.imu.said.six, [a.asked for a in h.imu.asked])
+        for k in which
+        if (h := heard[k]).imu.said is not None
+    ]
     last = heard[which[-1]].imu
-    found = together(said, which, _prior(last), np.array(last.calibration.gyro_sigma))
-    return (found, "") if found is not None else (None, NOBODY)
+    found = together(said, _prior(last), np.array(last.calibration.gyro_sigma))
+    if found is None:
+        return None, NOBODY
+    counted, others = (
+        tuple(which[k] for k in some) for some in (found.counted, found.contradicted)
+    )
+    return replace(found, counted=counted, contradicted=others), ""

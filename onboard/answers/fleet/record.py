@@ -17,11 +17,13 @@ from onboard.answers.flight_share import share_of
 from onboard.answers.recorded import Recorded
 from onboard.answers.replay import Replay
 from onboard.answers.replay_document import ReplayDocument
+from onboard.core.diagnosis import together
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.merged_flights import FlightSix
 from onboard.core.estimate.result import Calibration
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.model.nuisances import LeverArmError
+from onboard.core.physics.catalogue import title_of
 from onboard.recordings.provenance import Provenance
 
 NOT_ASKED = "no stretch of flight with trusted GPS and inertial data"
@@ -52,6 +54,38 @@ class Said(msgspec.Struct, frozen=True):
         )
 
 
+class Asked(msgspec.Struct, frozen=True, array_like=True):
+    """:class:`onboard.core.diagnosis.together.Asked`, packed: most of what is kept of a flight.
+
+    ``numbers`` are little-endian float64: information (its upper triangle), vector, prior, moves.
+    """
+
+    effect: str
+    unknowns: int
+    numbers: bytes
+
+    @classmethod
+    def of(cls, asked: together.Asked) -> Asked:
+        """The same packed."""
+        k = len(asked.vector)
+        upper = asked.information[np.triu_indices(k)]
+        parts = (upper, asked.vector, asked.prior, asked.moves.ravel())
+        return cls(asked.effect, k, np.concatenate(parts).astype("<f8").tobytes())
+
+    @property
+    def asked(self) -> together.Asked:
+        """The same as arrays."""
+        k = self.unknowns
+        half = k * (k + 1) // 2
+        numbers = np.frombuffer(self.numbers, "<f8").astype(float)
+        upper, vector, prior, moves = np.split(numbers, [half, half + k, half + 2 * k])
+        information = np.zeros((k, k))
+        information[np.triu_indices(k)] = upper
+        information = information + np.triu(information, 1).T
+        title = title_of(self.effect)
+        return together.Asked(self.effect, title, information, vector, prior, moves.reshape(6, k))
+
+
 class Antenna(msgspec.Struct, frozen=True):
     """Where the antenna is beside where the autopilot is told, body axes, m; without any prior."""
 
@@ -62,7 +96,8 @@ class Antenna(msgspec.Struct, frozen=True):
 class ImuRecord(msgspec.Struct, frozen=True, kw_only=True):
     """One accelerometer in one recording.
 
-    ``said`` is what it says to other flights; ``why`` says in words why that is nothing.
+    ``said`` is what it says to other flights, and ``asked`` of effects that are alike in all of
+    them; ``why`` says in words why that is nothing.
     ``missing`` is the physics that spoils the calibration, in words; ``asks`` is whether it asks
     for other parameters than are in force, and the policy would set them.
     """
@@ -75,6 +110,7 @@ class ImuRecord(msgspec.Struct, frozen=True, kw_only=True):
     antenna: Antenna | None
     missing: str = ""
     asks: bool = False
+    asked: list[Asked] = []
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -170,6 +206,7 @@ def _imu(answer: Answer, recorded: Recorded, *, asks: bool) -> ImuRecord:
         antenna=None if engine is None else _antenna(engine),
         missing=answer.missing,
         asks=asks,
+        asked=[] if said is None else [Asked.of(a) for a in recorded.effects(answer.imu)],
     )
 
 

@@ -90,6 +90,10 @@ def sentences(h: History) -> tuple[str, ...]:
     ]
     if not out and severity_of(h) is Severity.UNKNOWN:
         out = [f"accelerometer {i.calibration.imu}: {why_not(i)}" for i in h.vehicle.latest.imus]
+    for a in h.accelerometers:
+        if a.merged is not None and a.merged.open:
+            open_ = a.merged.open.rstrip(".")
+            out.append(f"accelerometer {a.imu}: {open_[0].lower()}{open_[1:]}")
     return tuple(out)
 
 

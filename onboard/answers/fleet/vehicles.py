@@ -18,11 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from onboard.answers.fleet.record import Flown, Record
+from onboard.recordings.provenance import OVERLAP_S
 
 BOARD, FOLDER, RECORDING = "board", "folder", "recording"
-OVERLAP_S = 1.0
-"""s; recordings that overlap by more are of one flight: dates are of GPS, to the second
-[definition]."""
 UNDATED = "it does not say when it was flown: it might be another recording of the same flight"
 
 

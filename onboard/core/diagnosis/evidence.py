@@ -41,6 +41,7 @@ from onboard.core.diagnosis.undecided import in_words, left_open, undecided
 from onboard.core.estimate.calibration_status import too_far
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
+from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
 from onboard.core.physics.effect import Effect, Origin
@@ -104,7 +105,9 @@ class Judge:
         verdict, note = self._verdict(effects, mismatch, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
         others = of_others(self.choice, self.final.origin.t0)
-        open_ = in_words(self.undecided, self.calibration)
+        c = self.calibration
+        claimed = np.array(c.covariance).diagonal()
+        open_ = in_words(self.undecided, SixParameters(c.scale, c.offset), claimed)
         note = " ".join(x for x in (note, open_, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
-from onboard.core.estimate.engine import Engine, through
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.going_through import through
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.refused import Refused

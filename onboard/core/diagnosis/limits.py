@@ -86,3 +86,6 @@ LONGEST_FAULT_S: Final = 120.0
 SAME_FIX_S: Final = 0.1
 """s within which a stamp of the trust window and one of a batch are the same fix: the jitter of
 stamps [physics]."""
+ANTENNA_FLOOR_M: Final = 0.01
+"""m; sigma of the antenna's place in each of several recordings beside what their sums say: a
+receiver's phase centre moves by as much with the satellites that it sees [data sheet]."""

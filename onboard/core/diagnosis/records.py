@@ -168,7 +168,8 @@ class Diagnosis:
     """Everything about one accelerometer's recording.
 
     ``calibration`` is that of the model with what was found in it; ``plain`` is the one without,
-    None where nothing was found that is not in every model.
+    None where nothing was found that is not in every model.  ``split`` says in words why the
+    recordings are no one flight; empty where they are.
     """
 
     imu: int
@@ -186,6 +187,7 @@ class Diagnosis:
     plain: Plain | None = None
     unused: tuple[Unused, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+    split: str = ""
 
     @property
     def silent(self) -> bool:

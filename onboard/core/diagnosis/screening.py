@@ -20,7 +20,8 @@ from onboard.core.diagnosis.faults import fault_effect
 from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
 from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.engine import Engine, through
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.going_through import through
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import Traces, residual

@@ -18,7 +18,7 @@ from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibration_model import calibration_model
-from onboard.core.estimate.engine import through
+from onboard.core.estimate.going_through import through
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Kept, Source
 from onboard.core.filter.prepared import Prepared

@@ -92,7 +92,7 @@ def _asked(choice: Choice, c: Candidate) -> Asked:
     return Asked(
         c.effect,
         "" if c.columns is None else c.columns.title,
-        (known - np.diag(prior)) / variance,
+        (known + known.T - 2.0 * np.diag(prior)) / (2.0 * variance),
         vector / variance,
         prior,
         moves,
@@ -106,59 +106,70 @@ def undecided_together(flights: Sequence[Told], prior_sigma: Array) -> list[Unde
         flights: at least one of which counts.
         prior_sigma: (6,) of what is known of the six beforehand.
     """
-    names = dict.fromkeys(a.effect for f in flights for a in f.effects)
+    every: dict[str, list[tuple[Asked, Array]]] = {}
+    for f in flights:
+        for a in f.effects:
+            every.setdefault(a.effect, []).append((a, f.six))
     known = np.diag(prior_sigma**-2.0)
-    models = [model for name in names if (model := _model(name, flights, known)) is not None]
+    models = [model for told in every.values() if (model := _model(told, known)) is not None]
     # What is in every flight's model already stands in the way of nothing else.
     found = [(odds, m) for odds, m in models if np.any(m.moves)]
     each = shares(0.0, [odds for odds, _ in found])
     return [replace(m, share=share) for (_, m), share in zip(found, each, strict=True)]
 
 
-def _model(name: str, flights: Sequence[Told], known: Array) -> tuple[float, Undecided] | None:
+def _model(told: Sequence[tuple[Asked, Array]], known: Array) -> tuple[float, Undecided] | None:
     """The logarithm of the odds of one effect, and its model with a share of one; None: hardly."""
-    told = [(a, f.six) for f in flights for a in f.effects if a.effect == name]
     first = told[0][0]
     if any(len(a.vector) != len(first.vector) for a, _ in told):
         return None
-    N = np.sum([a.information for a, _ in told], axis=0) + np.diag(first.prior)
-    vector = np.sum([a.vector for a, _ in told], axis=0)
+    said = _Said(
+        np.array([a.information for a, _ in told]),
+        np.array([a.vector for a, _ in told]),
+        np.array([a.prior for a, _ in told]),
+    )
+    N = said.information.sum(axis=0) + np.diag(first.prior)
+    vector = said.vector.sum(axis=0)
     e = np.linalg.solve(N, vector)
-    every = [a for a, _ in told]
-    gain = min(float(e @ vector), _elsewhere(every, N, vector)) / _scatter(every, e)
-    moved = np.sum([six @ a.moves @ e for a, six in told], axis=0)
+    gain = min(float(e @ vector), _elsewhere(said, N, vector)) / _scatter(said, e)
+    moved = np.sum([six @ (a.moves @ e) for a, six in told], axis=0)
     moves = np.linalg.solve(np.sum([six for _, six in told], axis=0) + known, moved)
     odds = log_odds(surprise(gain, len(e)))
     if odds < log(HARDLY):
         return None
-    return odds, Undecided(name, first.title, 1.0, moves)
+    return odds, Undecided(first.effect, first.title, 1.0, moves)
 
 
-def _elsewhere(told: Sequence[Asked], N: Array, vector: Array) -> float:
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """What n flights say of one effect: information (n, k, k), vector (n, k), prior (n, k)."""
+
+    information: Array
+    vector: Array
+    prior: Array
+
+
+def _elsewhere(said: _Said, N: Array, vector: Array) -> float:
     """What the effect explains of each flight with the size that the others ask for.
 
     It is no more evidence than that; twice the number of unknowns is given back, as
     :meth:`~onboard.core.diagnosis.candidates.Candidate.score` does within a flight.
     """
-    out = 2.0 * len(vector)
-    for a in told:
-        e = np.linalg.solve(N - a.information, vector - a.vector)
-        out += float(2.0 * a.vector @ e - e @ a.information @ e)
-    return out
+    e = np.linalg.solve(N - said.information, (vector - said.vector)[..., None])[..., 0]
+    asks = 2.0 * np.sum(said.vector * e)
+    return float(2.0 * len(vector) + asks - np.einsum("nj,njk,nk->", e, said.information, e))
 
 
-def _scatter(told: Sequence[Asked], e: Array) -> float:
+def _scatter(said: _Said, e: Array) -> float:
     """By how much the flights' values scatter about ``e``, over what chance does; at least one."""
-    if len(told) < 2:
+    if len(said.vector) < 2:
         return 1.0
-    square, freedom = 0.0, -float(len(e))
-    for a in told:
-        # In directions in which a flight knows nothing it has no value of its own.
-        root = np.sqrt(np.maximum(a.prior, np.finfo(float).tiny))
-        size, turned = np.linalg.eigh(a.information / np.outer(root, root))
-        known = size > 1.0
-        own = turned[:, known].T @ (a.vector / root) / size[known]
-        apart = own - turned[:, known].T @ (e * root)
-        square += float(size[known] @ apart**2)
-        freedom += float(np.count_nonzero(known))
+    # In directions in which a flight knows nothing it has no value of its own.
+    root = np.sqrt(np.maximum(said.prior, np.finfo(float).tiny))
+    size, turned = np.linalg.eigh(said.information / (root[:, :, None] * root[:, None, :]))
+    known = size > 1.0
+    apart = np.einsum("njk,nj->nk", turned, said.vector / root)
+    apart = apart / np.where(known, size, 1.0) - np.einsum("njk,nj->nk", turned, e * root)
+    square = float(np.sum((size * apart**2)[known]))
+    freedom = float(np.count_nonzero(known) - len(e))
     return max(1.0, square / freedom) if freedom > 0.0 else 1.0

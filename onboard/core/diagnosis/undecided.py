@@ -23,7 +23,7 @@ from onboard.core.diagnosis.candidates import Candidate, believable
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.limits import CLEARLY, HARDLY, PRESENT
 from onboard.core.diagnosis.selection import Fit, Fitter
-from onboard.core.estimate.result import SIX_NAMES, Calibration
+from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.maths.accelerometer import SixParameters, parameters_jacobian
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
@@ -73,11 +73,20 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
 
 
 def in_words(
-    models: Sequence[Undecided], calibration: Calibration, who: str = "This flight leaves"
+    models: Sequence[Undecided],
+    six: SixParameters,
+    claimed: Array,
+    who: str = "This flight leaves",
 ) -> str:
-    """Which of them most of the sigma of a number is about; empty if there is none."""
-    claimed = np.array(calibration.covariance).diagonal()
-    jacobian = parameters_jacobian(SixParameters(calibration.scale, calibration.offset).as_linear())
+    """Which of them most of the sigma of a number is about; empty if there is none.
+
+    Args:
+        models: that may be right instead.
+        six: what is said.
+        claimed: (6,) its variances.
+        who: leaves it open.
+    """
+    jacobian = parameters_jacobian(six.as_linear())
     out = []
     for model in models:
         moves = jacobian @ model.moves

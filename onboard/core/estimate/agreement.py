@@ -23,7 +23,6 @@ from onboard.core.estimate.limits import STRANGER
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
 from onboard.core.maths.chi_square import CHI_SQUARE_999
 
 
@@ -46,8 +45,7 @@ def agrees(engine: Engine, saved: SavedEngine) -> bool | None:
 
 
 def _agree(engine: Engine, found: Solution, saved: SavedEngine) -> bool | None:
-    shift = engine.shift(saved.point, engine.point)
-    then = solve([Block(p.start, p.end, p.sums.shifted(shift)) for p in saved.blocks], engine.model)
+    then = solve(engine.brought(saved.blocks, saved.point, np.array(saved.told)), engine.model)
     apart = found.theta[:6] - then.theta[:6]
     both = found.covariance[:6, :6] + then.covariance[:6, :6]
     if float(apart @ np.linalg.solve(both, apart)) > CHI_SQUARE_999[6]:

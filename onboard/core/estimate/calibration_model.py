@@ -88,7 +88,7 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
             np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
         ),
         heading=float(np.clip(point.heading + theta[i["heading"]], *HEADING_RANGE_RAD)),
-        antenna=vector3(theta[_antenna(model)]),
+        antenna=vector3(theta[antenna_of(model)]),
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,
         shapes=vector4(np.clip(point.shapes + theta[[i[n] for n in SHAPES]], *SHAPE_RANGE)),
@@ -143,7 +143,7 @@ def beyond_range(
     return out
 
 
-def _antenna(model: Model) -> slice:
+def antenna_of(model: Model) -> slice:
     """Unknowns of the antenna's place: a nuisance of centimetres, or the effect instead of it."""
     place = LeverArmError.name
     name = next(f.name for f in model.families if place in (f.name, f.instead_of))

@@ -15,7 +15,6 @@ from collections.abc import Collection, Iterator
 from typing import Final
 
 from onboard.core.estimate.calibration_record import calibration_of
-from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.engines import Engines
 from onboard.core.estimate.events import Advanced, Event, FlightEnded, Restarted
@@ -65,13 +64,14 @@ class Calibrator:
             settings: how it works.
             only: accelerometers to estimate, none named: all; nothing about one of them depends
                 on whether others are estimated, too.
-            flight: what sums are called that are kept, so that they are never added twice.
+            flight: the name of what is learned, so that sums are never added twice.
         """
         self.settings = settings = settings or CalibratorSettings()
         self.parameters = ParametersInForce()
         self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings.assembly)
         self._engines = Engines(settings, self.parameters, only, flight)
+        self.earlier = self._engines.earlier
         self._counts: Counter[str] = Counter()
         self._clock = StreamClock()
         self._ground = Ground()
@@ -296,11 +296,6 @@ class Calibrator:
         """
         self._engines.earlier.lay_aside(data)
 
-    @property
-    def earlier(self) -> EarlierSums:
-        """What was learned before, as it waits."""
-        return self._engines.earlier
-
     def begin_flight(self, flight: str) -> None:
         """Learn another flight from nothing: whether it agrees with the one before is asked."""
         self._engines.begin_flight(flight)
@@ -320,6 +315,8 @@ class Calibrator:
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
         self.parameters.set(parameter.name, parameter.value)
+        if "POS" in parameter.name:  # GPS1_POS_X, GPS_POS1_X, INS_POS1_X
+            self._engines.tell_antenna()
         if imu is None or not unknown or not self.parameters.known(imu):
             return
         if self.parameters.six(imu) != SixParameters():

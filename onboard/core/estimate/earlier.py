@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from onboard.core.estimate.agreement import agrees
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import MOST_FLIGHTS, MOST_SAVED, MOST_WAITING
 from onboard.core.estimate.saving import SavedEngine, load
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.maths.arrays import vector3
 from onboard.core.maths.blocks import Seconds, merged
 
 
@@ -86,7 +89,9 @@ class EarlierSums:
                 self._waiting.setdefault(imu, []).append(saved)
             elif opinion:
                 done["restored"] += 1
-                engine.restore(saved.blocks, saved.point, saved.seconds)
+                engine.restore(
+                    engine.brought(saved.blocks, saved.point, np.array(saved.told)), saved.seconds
+                )
                 of_both = (*saved.flights, *self._included.get(imu, ()))
                 self._included[imu] = of_both[-MOST_FLIGHTS:]
             else:
@@ -112,6 +117,7 @@ class EarlierSums:
                         parameters.device_id(imu),
                         tuple(float(x) for x in engine.model.prior[:6]),
                         engine.point,
+                        (0.0, 0.0, 0.0) if engine.told is None else vector3(engine.told),
                         engine.noise,
                         Seconds(engine.trusted_s, engine.brisk_s),
                         tuple(blocks),

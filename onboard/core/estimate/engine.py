@@ -13,12 +13,12 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.dead_reckoning import KnownIntervals
+from onboard.core.estimate.going_through import PassObserver, through
 from onboard.core.estimate.limits import (
     MOST_AGED,
     MOST_IDLE,
@@ -31,6 +31,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.noise_search import NoiseSearch
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
+from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
 from onboard.core.filter.noise import NoiseLevels, log_prior
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
@@ -44,29 +45,6 @@ from onboard.core.model import ekf3
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
-
-
-class PassObserver(Protocol):
-    """Told of every pass whose sums count; an engine that has one keeps the traces of epochs."""
-
-    def begin(self) -> None:
-        """A pass begins: what was seen of the one before is void."""
-
-    def take(self, result: PassResult) -> None:
-        """A batch has gone through it."""
-
-
-def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
-    """One batch through a pass.
-
-    Args:
-        made: the pass; its filter begins anew where it has gone without fixes for too long.
-        batch: flight.
-        coast_s: longest dead reckoning, s.
-    """
-    if batch.fresh or batch.fixes.t[0] - made.dead_reckoning_since > coast_s:
-        made.restart()
-    return made.process(batch.segment, batch.fixes, batch.trusted)
 
 
 class Engine:
@@ -100,6 +78,8 @@ class Engine:
         self.point = point or Linearisation()
         self.noise = noise or NoiseLevels()
         self._uses = uses or Uses()
+        self.told: Array | None = None
+        """(3,) lever arm that the antenna's place counts from, body axes, m; None: no flight."""
         self.batches: list[Batch] = []
         self._heading = SteadyHeading()
         self.sample: Sequence[Sequence[Batch]] | None = None
@@ -189,6 +169,7 @@ class Engine:
 
     def add(self, batch: Batch) -> None:
         """Process a batch."""
+        self.tell_antenna(batch.segment.lever_arm_b)
         fresh = [i for i, before in enumerate([*self.batches, batch]) if before.fresh]
         run = slice(fresh[-1] if fresh else 0, None)
         known = self.batches[run]
@@ -203,6 +184,20 @@ class Engine:
         passed = any(before < s <= self.trusted_s for s in self.settings.refine_at_s)
         self._due |= passed and self.settings.refine
         self._age()
+
+    def tell_antenna(self, lever: Array) -> None:
+        """Count the antenna's place from a lever arm (3,), body axes, m, in all flight."""
+        before, self.told = self.told, lever
+        if before is None or np.array_equal(before, lever):
+            return
+        seed, by = self.known, shift_by(self.model, lever - before)
+        self.batches = [batch_from(batch, lever) for batch in self.batches]
+        self.aged, self.blocks = shifted(self.aged, by), shifted(self.blocks, by)
+        self.point, self._solution = point_from(self.point, lever - before), None
+        if seed is not None:
+            self._seed = replace(seed, theta=seed.theta - by)
+        # Its gates go on with what is known: its own sums count from the place before.
+        self._pass = self._new_pass()
 
     def _catch_up(self) -> None:
         """Go through what waits."""
@@ -318,8 +313,7 @@ class Engine:
         return bool(steps) and float(np.median(steps)) <= AROUND_SPAN_S
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
-        shift = self.shift(self.point, point)
-        self.aged = [Block(p.start, p.end, p.sums.shifted(shift)) for p in self.aged]
+        self.aged = shifted(self.aged, self.shift(self.point, point))
         self.point, self.noise = point, levels
         self.model = self._model()
 
@@ -356,16 +350,21 @@ class Engine:
             shift[self.model.index[name]] = to - origin
         return shift
 
-    def restore(self, earlier: Sequence[Block], about: Linearisation, seconds: Seconds) -> None:
-        """Take the sums of earlier flights.
+    def brought(self, earlier: Sequence[Block], about: Linearisation, told: Array) -> list[Block]:
+        """Sums of earlier flights as this engine's: about its point, from its antenna's place.
 
         Args:
             earlier: with the unknowns of this engine's model.
             about: the linearisation that they were made about.
-            seconds: how much flight is behind them.
+            told: (3,) lever arm that the antenna's place counted from, m.
         """
-        shift = self.shift(about, self.point)
-        self.aged = [Block(p.start, p.end, p.sums.shifted(shift)) for p in earlier] + self.aged
+        now = told if self.told is None else self.told
+        by = self.shift(about, self.point) + shift_by(self.model, now - told)
+        return shifted(list(earlier), by)
+
+    def restore(self, earlier: Sequence[Block], seconds: Seconds) -> None:
+        """Take the sums of earlier flights, :meth:`brought` here; ``seconds`` are behind them."""
+        self.aged = [*earlier, *self.aged]
         self.trusted_s += seconds.trusted
         self._refined_s += seconds.trusted
         self.left_brisk_s += seconds.brisk

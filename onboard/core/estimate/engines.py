@@ -11,6 +11,7 @@ from onboard.core.estimate.earlier import EarlierSums
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.estimate.told_antenna import batch_from
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue
 from onboard.core.inputs.segments import Batch
@@ -81,6 +82,14 @@ class Engines:
                 end = float(batch.fixes.t[-1])
                 newest = end if newest is None else max(newest, end)
         return newest
+
+    def tell_antenna(self) -> None:
+        """The autopilot was told of the antenna's or an accelerometer's place: count from there."""
+        for imu, engine in self._engines.items():
+            engine.tell_antenna(self._parameters.lever_arm(imu))
+        for imu, kept in self.beside.items():
+            lever = self._parameters.lever_arm(imu)
+            kept[:] = [batch_from(batch, lever) for batch in kept]
 
     def _lay_beside(self, imu: int, made: list[Batch]) -> None:
         """Keep flight of one that is not estimated: it still tells of those that are."""

@@ -84,6 +84,8 @@ BY_CHANCE: Final = 1e-3
 MOST_ODD_FLIGHTS: Final = 2
 """Flights that may have erred among others that agree; more are looked for only before a change of
 the sensor [cost: three of 30 flights are 4060 sets]."""
+MOST_RECONCILED: Final = 16
+"""Last flights of which the consistent sets are looked for [cost: a second and a half]."""
 
 # Solution.
 

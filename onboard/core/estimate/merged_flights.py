@@ -19,20 +19,25 @@ contradicts itself.
 counts if it has that flight and at least one more, and if the flights left out are either all from
 before it (the sensor may have changed since) or fewer than half (they erred).  If there is no such
 set, or several of which none has the others in it, nobody can say which flights are right, and none
-counts: of two flights neither.
+counts: of two flights neither.  Of many flights the sets of the last :data:`MOST_RECONCILED` are
+looked for; those before count, the last of them first, up to one that contradicts the set.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
-from itertools import combinations
+from itertools import accumulate, combinations
 
 import numpy as np
 
 from onboard.core.estimate.joint import FLOOR, without_prior
-from onboard.core.estimate.limits import BY_CHANCE, MOST_ODD_FLIGHTS, PRIOR_SHARE
+from onboard.core.estimate.limits import (
+    BY_CHANCE,
+    MOST_ODD_FLIGHTS,
+    MOST_RECONCILED,
+    PRIOR_SHARE,
+)
 from onboard.core.estimate.result import Calibration
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
@@ -186,14 +191,14 @@ def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:
     said = [_in_units(f, prior) for f in flights]
     every = tuple(range(len(said)))
     scatter = scatter_of(said)
-    counted = every if not scatter.contradicted else _counting(said)
+    counted, since = (every, 0) if not scatter.contradicted else _counting(said)
     others = counted or every
     before = every[:-1]
     if not counted and len(before) > 1 and not scatter_of(said[:-1]).contradicted:
         others = before  # only the last one contradicts: it erred, or the sensor has changed
-    apart = tuple(_against(said, i, others) for i in every)
+    apart = _each_against(said, others)
     if others != every or counted:
-        odd = tuple(i for i in every if i not in others)
+        odd = tuple(i for i in every if i >= since and i not in others)
     else:
         odd = tuple(i for i in every if apart[i].contradicted)
         odd = odd or (min(every, key=lambda i: apart[i].p_value),)
@@ -203,7 +208,7 @@ def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Information (6, 6) and vector (6,) in units of the prior, about its centre."""
+    """Information (k, k) and vector (k,) in units of the prior, about its centre."""
 
     N: Array
     b: Array
@@ -215,7 +220,7 @@ class Normal:
 
 def apart_of(a: Normal, b: Normal) -> Apart:
     """What separate values gain in the directions that both know."""
-    one = np.eye(6)
+    one = np.eye(len(a.b))
     size, V = np.linalg.eigh(np.linalg.inv(a.N + one) + np.linalg.inv(b.N + one))
     both = size <= 2.0 * PRIOR_SHARE**2
     if not np.any(both):
@@ -244,19 +249,55 @@ def _in_units(f: FlightSix, prior: Prior) -> Normal:
     return Normal(f.floored * np.outer(prior.sigma, prior.sigma), b * prior.sigma)
 
 
-def _against(said: Sequence[Normal], i: int, others: Sequence[int]) -> Apart:
-    rest = [said[j] for j in others if j != i]
-    return apart_of(said[i], reduce(lambda a, b: a + b, rest)) if rest else Apart(0.0, 0)
+def _each_against(said: Sequence[Normal], others: Sequence[int]) -> tuple[Apart, ...]:
+    """Each flight against the others without it."""
+    nothing = Normal(np.zeros((6, 6)), np.zeros(6))
+    those = [said[j] for j in others]
+    before = list(accumulate(those, initial=nothing))
+    after = list(accumulate(reversed(those), lambda a, b: b + a, initial=nothing))[::-1]
+    place = {j: k for k, j in enumerate(others)}
+    out = []
+    for i, one in enumerate(said):
+        k = place.get(i)
+        rest = before[-1] if k is None else before[k] + after[k + 1]
+        alone = len(others) == (0 if k is None else 1)
+        out.append(Apart(0.0, 0) if alone else apart_of(one, rest))
+    return tuple(out)
 
 
-def _counting(said: Sequence[Normal]) -> tuple[int, ...]:
-    """The one consistent set that counts; empty if there is none, or no telling which."""
+def _counting(said: Sequence[Normal]) -> tuple[tuple[int, ...], int]:
+    """The one consistent set that counts, and since when flights were looked at.
+
+    Empty if there is none, or no telling which.
+    """
+    since = max(0, len(said) - MOST_RECONCILED)
+    last = said[since:]
     found: list[tuple[int, ...]] = []
-    for chosen in _sets(len(said)):  # larger ones first
+    whole = [tuple(range(len(last)))] if since else []
+    for chosen in (*whole, *_sets(len(last))):  # larger ones first
         within = any(set(chosen) <= set(larger) for larger in found)
-        if not within and not scatter_of([said[i] for i in chosen]).contradicted:
+        if not within and not scatter_of([last[i] for i in chosen]).contradicted:
             found.append(chosen)
-    return found[0] if len(found) == 1 else ()
+    if len(found) != 1:
+        return (), since
+    counted = tuple(i + since for i in found[0])
+    return _with_earlier(said, counted, since) if since else (counted, since)
+
+
+def _with_earlier(
+    said: Sequence[Normal], counted: tuple[int, ...], since: int
+) -> tuple[tuple[int, ...], int]:
+    """A set with the flights before it, up to one that contradicts it; up to which it was asked."""
+    scatter = scatter_of([said[i] for i in counted])
+    so_far = sum((said[i] for i in counted[1:]), start=said[counted[0]])
+    while since:
+        since -= 1
+        apart = apart_of(said[since], so_far)
+        scatter = Apart(scatter.chi_square + apart.chi_square, scatter.dof + apart.dof)
+        if scatter.contradicted:
+            break
+        counted, so_far = (since, *counted), so_far + said[since]
+    return counted, since
 
 
 def _sets(count: int) -> Iterator[tuple[int, ...]]:

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.maths.arrays import vector3, vector4
+from onboard.core.maths.arrays import Vector3, vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
@@ -24,7 +24,7 @@ from onboard.errors import StateError
 VERSION = 7
 """1: sums without the antenna's place among the unknowns.  2: with time on the ground in them.
 3: without what an EKF takes the receiver's delay for.  4: without errors of its accelerometer.
-6: without the flights that they are of."""
+6: without the flights that they are of, and the place that the antenna's counts from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +32,16 @@ class SavedEngine:
     """What one accelerometer's engine needs to go on where it stopped.
 
     ``device_id`` is the autopilot's INS_ACCn_ID, None where it was not known: sums of one sensor
-    must never be used for another.  ``flights`` are those that are in the sums, by what whoever
-    flew them calls them: a flight must never be counted twice.
+    must never be used for another.  ``told`` is the lever arm that the antenna's place counts from,
+    body axes, m.  ``flights`` are those that are in the sums, by what whoever flew them calls them:
+    a flight must never be counted twice.
     """
 
     imu: int
     device_id: float | None
     prior: tuple[float, ...]
     point: Linearisation
+    told: Vector3
     noise: NoiseLevels
     seconds: Seconds
     blocks: tuple[Block, ...]
@@ -54,6 +56,7 @@ def dump(engines: Iterable[SavedEngine]) -> bytes:
             "device_id": e.device_id,
             "prior": list(e.prior),
             "point": asdict(e.point),
+            "told": list(e.told),
             "noise": asdict(e.noise),
             "seconds": asdict(e.seconds),
             "flights": list(e.flights),
@@ -126,6 +129,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             antenna=vector3(map(_finite, point.get("antenna", (0.0, 0.0, 0.0)))),
             shapes=vector4(map(_finite, point.get("shapes", (0.0, 0.0, 0.0, 0.0)))),
         ),
+        vector3(map(_finite, e["told"])),
         noise,
         Seconds(_finite(e["seconds"]["trusted"]), _finite(e["seconds"]["brisk"])),
         blocks,

@@ -29,7 +29,5 @@ FEWEST_VEHICLES: Final = 3
 SHARED_FALSE_ALARM: Final = 0.01
 """Probability that a type is said to share something though none of what was looked at is shared
 [probability]."""
-MOST_RECONCILED: Final = 16
-"""Flights of which the consistent sets are looked for [cost: a second and a half]."""
 WIDE: Final = 100.0
 """Times the prior's sigma: as wide as nothing known, and narrow enough to be solved [cost]."""

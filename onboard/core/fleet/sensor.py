@@ -6,9 +6,9 @@ and a number counts where the flight alone knows it to half of the usual prior's
 those with its gyroscope (:func:`onboard.core.estimate.calibration_record.gyro_sigma`): the
 gyroscope's part is the same in all flights of a vehicle and neither a drift nor a step.
 
-Merged are the flights after the last step of any of the six
-(:mod:`onboard.core.estimate.merged_flights`), none of those that are odd, and nothing at all where
-a number drifts: of that there is no mean.
+Merged are the flights after the last step of any of the six, as several recordings are
+(:mod:`onboard.core.diagnosis.joined`), none of those that are odd, and nothing at all where a
+number drifts: of that there is no mean.
 """
 
 from __future__ import annotations
@@ -18,19 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.diagnosis.joined import WHO, Heard, joined
+from onboard.core.diagnosis.undecided import in_words, left_open
 from onboard.core.estimate.joint import FLOOR
 from onboard.core.estimate.limits import PRIOR_SHARE
-from onboard.core.estimate.merged_flights import (
-    FlightSix,
-    Normal,
-    Prior,
-    merged,
-    reconciled,
-    scatter_of,
-)
-from onboard.core.fleet.limits import MOST_RECONCILED, WIDE
-from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
-from onboard.core.maths.arrays import Array
+from onboard.core.estimate.merged_flights import FlightSix, Normal, Prior
+from onboard.core.fleet.limits import WIDE
+from onboard.core.maths.accelerometer import SixParameters, parameters_jacobian, parameters_of
+from onboard.core.maths.arrays import Array, vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +45,12 @@ class Together:
 
     Attributes:
         value: (6,) scale (1) and offset (m/s^2).
-        sigma: (6,) of them, with the gyroscope's part.
+        sigma: (6,) of them, with the gyroscope's part and what all flights leave open.
         counted: indices of the flights in it.
         contradicted: indices of flights that contradict the others.
         inflation: factor on the variance of all flights, for their scatter.
+        open_sigma: (6,) the part of ``sigma`` that is of effects which no flight shows by itself.
+        open: those of them that most of the sigma of a number is about, in words.
     """
 
     value: Array
@@ -61,6 +58,8 @@ class Together:
     counted: tuple[int, ...]
     contradicted: tuple[int, ...]
     inflation: float
+    open_sigma: Array
+    open: str = ""
 
 
 def alone(flight: FlightSix, prior: Prior) -> Alone:
@@ -80,41 +79,29 @@ def alone(flight: FlightSix, prior: Prior) -> Alone:
     return Alone(np.where(known, value, np.nan), np.where(known, sigma, np.nan))
 
 
-def together(
-    flights: Sequence[FlightSix], which: Sequence[int], prior: Prior, gyro_sigma: Array
-) -> Together | None:
+def together(flights: Sequence[Heard], prior: Prior, gyro_sigma: Array) -> Together | None:
     """Flights merged; None if nobody can say which are right.
 
     Args:
-        flights: of one accelerometer, in order.
-        which: indices of those that may count, in order, at least one.
+        flights: of one accelerometer, in order, at least one.
         prior: of any sensor, about what was in force last.
         gyro_sigma: (6,) what the gyroscope's axes put into the six.
     """
-    counted, odd = _agreeing([flights[i] for i in which], prior)
-    if not counted:
+    made = joined(flights, prior)
+    if (found := made.merged) is None:
         return None
-    found = merged([flights[which[i]] for i in counted], prior)
     J = parameters_jacobian(found.estimate)
     P = J @ found.covariance @ J.T + np.diag(FLOOR**2 + gyro_sigma**2)
+    value = parameters_of(found.estimate)
+    claimed, six = np.diag(P), SixParameters(vector3(value[:3]), vector3(value[3:]))
     return Together(
-        parameters_of(found.estimate),
-        np.sqrt(np.diag(P)),
-        tuple(which[i] for i in counted),
-        tuple(which[i] for i in odd),
+        value,
+        np.sqrt(claimed),
+        made.found.counted,
+        made.found.contradicted,
         found.inflation,
-    )
-
-
-def _agreeing(said: Sequence[FlightSix], prior: Prior) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Which flights count and which contradict; of many that contradict each other, the last."""
-    if not scatter_of([_in_units(f, prior) for f in said]).contradicted:
-        return tuple(range(len(said))), ()
-    recent = max(0, len(said) - MOST_RECONCILED)
-    found = reconciled(said[recent:], prior)
-    return (
-        tuple(i + recent for i in found.counted),
-        tuple(i + recent for i in found.contradicted),
+        np.sqrt(np.diag(J @ left_open(made.open) @ J.T)),
+        in_words(made.open, six, claimed, WHO),
     )
 
 

@@ -19,6 +19,7 @@ def saved(*flights, trusted=100.0):
         7.0,
         (0.0,) * 6,
         Linearisation(),
+        (0.0, 0.0, 0.0),
         NoiseLevels(),
         Seconds(trusted, trusted),
         (block,),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from onboard.core.diagnosis.joined import Heard
+from onboard.core.diagnosis.together import Asked
 from onboard.core.estimate.merged_flights import FlightSix, Prior
 from onboard.core.fleet.sensor import alone, together
 from onboard.core.maths.accelerometer import linear_of, parameters_of
@@ -18,6 +20,11 @@ def flight(six, sigma=SIGMA):
     """What a flight says that knows scale and beta with these sigmas, independently."""
     N = np.diag(1.0 / np.asarray(sigma) ** 2)
     return FlightSix(N, N @ linear_of(np.asarray(six)), N, N @ linear_of(np.asarray(six)))
+
+
+def heard(*flights, effects=()):
+    """Flights, each of which says the same of effects."""
+    return [Heard(f, effects) for f in flights]
 
 
 def prior(center=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)):
@@ -43,7 +50,7 @@ def test_merged_is_the_weighted_mean_and_never_surer_than_the_floor():
         flight(parameters_of(linear_of(TRUE) + SIGMA * rng.standard_normal(6))) for _ in range(40)
     ]
     gyro = np.array([0, 0, 0, 0.03, 0.03, 0])
-    found = together(flights, range(40), prior(), gyro)
+    found = together(heard(*flights), prior(), gyro)
     assert found.counted == tuple(range(40))
     assert not found.contradicted
     assert np.all(np.abs(found.value - TRUE) < 4.0 * found.sigma)
@@ -55,7 +62,7 @@ def test_a_flight_that_contradicts_is_named_and_not_averaged(count):
     off = TRUE + np.array([0.02, 0, 0, 0.3, 0, 0])
     flights = [flight(TRUE)] * count
     flights[count - 3] = flight(off)
-    found = together(flights, range(count), prior(), np.zeros(6))
+    found = together(heard(*flights), prior(), np.zeros(6))
     assert found.contradicted == (count - 3,)
     assert count - 3 not in found.counted
     assert found.value == pytest.approx(TRUE, abs=1e-3)
@@ -63,4 +70,35 @@ def test_a_flight_that_contradicts_is_named_and_not_averaged(count):
 
 def test_of_two_that_contradict_nobody_knows():
     off = TRUE + np.array([0.02, 0, 0, 0.3, 0, 0])
-    assert together([flight(TRUE), flight(off)], (0, 1), prior(), np.zeros(6)) is None
+    assert together(heard(flight(TRUE), flight(off)), prior(), np.zeros(6)) is None
+
+
+def asked(size, sigma, moves):
+    """An effect of one unknown with a prior of one: what a flight knows of it and it moves."""
+    information = np.array([[sigma**-2.0]])
+    moved = np.zeros((6, 1))
+    moved[3, 0] = moves
+    return Asked("cross_axis", "It leaks", information, information[0] * size, np.ones(1), moved)
+
+
+def test_what_no_flight_shows_and_all_ask_for_is_in_the_sigma_and_named():
+    """Eight flights, each two sigma from none of an effect that moves the x offset."""
+    one = asked(0.2, 0.1, 0.5)
+    found = together(heard(*[flight(TRUE)] * 8, effects=[one]), prior(), np.zeros(6))
+    without = together(heard(*[flight(TRUE)] * 8), prior(), np.zeros(6))
+    assert found.value == pytest.approx(without.value)
+    assert found.sigma**2 == pytest.approx(without.sigma**2 + found.open_sigma**2)
+    assert found.open_sigma[3] == pytest.approx(0.1, rel=0.1)  # 0.5 of an effect of 0.2
+    assert found.open_sigma[4] == pytest.approx(0.0, abs=1e-9)
+    assert "(cross_axis)" in found.open
+    single = together(heard(flight(TRUE), effects=[one]), prior(), np.zeros(6))
+    assert single.open == ""
+
+
+def test_many_flights_are_merged_and_the_last_of_them_after_a_change():
+    """Of more flights than sets are looked for, those before count as far back as they agree."""
+    off = TRUE + np.array([0.02, 0, 0, 0.3, 0, 0])
+    found = together(heard(*[flight(off)] * 4, *[flight(TRUE)] * 36), prior(), np.zeros(6))
+    assert found.counted == tuple(range(4, 40))
+    assert found.contradicted == (3,)
+    assert found.value == pytest.approx(TRUE, abs=1e-3)
