@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,3 +37,7 @@ class Drag(Effect):
         drag = air.pressure * (values[0] + values[1] * air.lift**2)
         air.force_b[:, 0] -= drag * np.cos(air.alpha)
         air.force_b[:, 2] -= drag * np.sin(air.alpha)
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Coefficients are by the airframe's mass; what is induced goes with the lift's square."""
+        return [values[0] * math.exp(-log_ratio), values[1] * math.exp(log_ratio)]

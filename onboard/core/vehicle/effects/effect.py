@@ -87,6 +87,11 @@ class Effect(ABC):
             for u, v, s in zip(self.unknowns, values, sigmas, strict=True)
         ]
 
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """The unknowns of the same airframe with ``exp(log_ratio)`` times the mass."""
+        del log_ratio
+        return list(values)
+
     def missing(self, air: Air) -> str:
         """Why this recording cannot speak of it; empty where it can."""
         del air

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -49,6 +50,10 @@ class RotorDrag(Effect):
         if self._by_components:
             drag = drag * np.array([1.0 + _root(air.tilt[1]), 1.0 + _root(air.tilt[0])])
         air.force_b[:, :2] -= drag
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """By the root: the thrust that holds it has grown with the mass."""
+        return [values[0] * math.exp(-0.5 * log_ratio)]
 
 
 def _root(share: float) -> float:
