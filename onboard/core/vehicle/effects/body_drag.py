@@ -27,9 +27,10 @@ class BodyDrag(Effect):
     def __init__(self, frame: CopterAirframe) -> None:
         """Nominally the frame's, the same on both axes."""
         nominal = frame.body_drag
+        floor = FLOOR_SHARE * max(nominal, 0.02)
         super().__init__(
             [
-                Unknown(axis, nominal, PLAUSIBLE, FLOOR_SHARE * max(nominal, 0.02), "m^2/kg", DOUBT)
+                Unknown(axis, nominal, PLAUSIBLE, floor, "m^2/kg", DOUBT, least=0.0)
                 for axis in ("x", "y")
             ]
         )

@@ -29,6 +29,7 @@ class Unknown:
         doubt: what the form of the law itself is good for, as a standard deviation.
         share: the same as a share of the value.
         within: by how much it may be off in an airframe that is nominal all the same.
+        least: below which it cannot be.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Unknown:
     doubt: float = 0.0
     share: float = 0.0
     within: float = 0.0
+    least: float = -math.inf
 
     def doubted(self, value: float, sigma: float) -> float:
         """A sigma of the fit with what the law is good for."""

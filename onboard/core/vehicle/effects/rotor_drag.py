@@ -40,8 +40,9 @@ class RotorDrag(Effect):
         """
         self._by_components = by_components
         nominal = frame.rotor_drag
+        floor = FLOOR_SHARE * nominal
         super().__init__(
-            [Unknown("mcoef", nominal, PLAUSIBLE, FLOOR_SHARE * nominal, "1/s", share=DOUBT)]
+            [Unknown("mcoef", nominal, PLAUSIBLE, floor, "1/s", share=DOUBT, least=0.0)]
         )
 
     def act(self, air: Air, values: Sequence[float]) -> None:
