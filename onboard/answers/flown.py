@@ -38,7 +38,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.signals import Signals, Stream
-from onboard.core.vehicle.spans import grounded_spans, scatter_near
+from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
@@ -144,7 +144,7 @@ class Flown:
                     rolls=self.kind != "copter",
                     wings=self.kind == "plane",
                 )
-            self.ground = float(np.percentile(height, 0.5))
+            self.ground = float(np.percentile(lasting_height(t, height), 0.5))
         step = _averaged_over(self._kept)
         for sample in _with_landings(_slower(self._kept, step), self.grounded):
             self.recorded.feed(sample)

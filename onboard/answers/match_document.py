@@ -75,10 +75,11 @@ class MatchedRecordings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OtherFlightDocument(msgspec.Struct, frozen=True, kw_only=True):
-    """A further flight of the vehicle, and its wind."""
+    """A further flight of the vehicle, and its wind; ``set_aside``: it contradicts the others."""
 
     recording: str
     wind: WindDocument
+    set_aside: bool = False
 
 
 class TwiceDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -133,6 +134,7 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
     """The document of a match, with its verification if there was one."""
     vehicle = match.vehicle
     alone = AxisMismatch(vehicle.alone_before, vehicle.alone_after)
+    aside = {a.number for a in vehicle.aside}
     return MatchDocument(
         vehicle=vehicle.vehicle,
         recordings=MatchedRecordings(
@@ -146,8 +148,8 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
         effects=[_effect(d) for d in match.effects],
         wind=None if vehicle.wind is None else _wind(vehicle.wind),
         others=[
-            OtherFlightDocument(recording=its.name, wind=_wind(wind))
-            for its, wind in zip(match.others, vehicle.other_winds, strict=False)
+            OtherFlightDocument(recording=its.name, wind=_wind(wind), set_aside=k in aside)
+            for k, (its, wind) in enumerate(zip(match.others, vehicle.other_winds, strict=False), 1)
         ],
         mismatch=_mismatch({**vehicle.mismatch, "velocity_after_10s": alone}),
         settings={s.name: s.value for s in match.settings},

@@ -215,8 +215,11 @@ def _facts(result: Match) -> Table:
     wind = wind_sentence(result)
     if wind:
         table.add_row("Wind", wind)
-    for other, its in zip(result.others, vehicle.other_winds, strict=False):
-        table.add_row("", f"{blown(its)}: {other.name}")
+    aside = {a.number for a in vehicle.aside}
+    flights = zip(result.others, vehicle.other_winds, strict=False)
+    for k, (other, its) in enumerate(flights, 1):
+        name = f"{other.name} (flight {k + 1}, set aside)" if k in aside else other.name
+        table.add_row("", f"{blown(its)}: {name}")
     for k, (axis, m) in enumerate(vehicle.mismatch.items()):
         said = f"{axis}: {m.before:.3f} -> {m.after:.3f} m/s^2 RMS on flight not used in the fit"
         table.add_row("" if k else "Force", said)

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from onboard.answers.match_document import match_document
 from onboard.answers.match_files import settings_text
 from onboard.cli.main import run
 from onboard.core.vehicle.airframe import CopterAirframe
+from onboard.core.vehicle.records import Aside, Compared, WindEstimate
 from tests.recordings.dataflash_writer import modern_log
 from tests.report.matches_by_hand import by_hand
 
@@ -34,6 +37,14 @@ def test_a_recording_of_which_nothing_can_be_said_is_one_line_and_status_2(log, 
 def test_three_recordings_are_one_too_many(log, capsys):
     assert run(["match", str(log), str(log), str(log)]) == 2
     assert "match takes one recording" in failed(capsys)
+
+
+def test_a_flight_that_is_set_aside_is_marked_in_the_document():
+    two = WindEstimate(1.0, 0.0, 0.1, 0.1, 30.0)
+    drag = Compared(17.0, 13.6, 0.1, "kg/m^2")
+    made = by_hand(other_winds=(two, two), aside=(Aside(2, 0, "body_drag", "bcoef_x", drag, drag),))
+    told = match_document(replace(made, others=(made.real, made.real)))
+    assert [o.set_aside for o in told.others] == [False, True]
 
 
 def test_another_flight_is_not_written_over(log, tmp_path, capsys):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.fit import BlockSums, Fit
 from onboard.core.vehicle.limits import FOLDS, SURE, TESTABLE
 
@@ -126,7 +127,8 @@ class Choices:
         x[free] = 0.0
         full_N, full_b = N + np.diag(f.prior), b + f.prior * self._nominal
         rest = full_b - full_N @ x
-        x[free] = np.linalg.solve(full_N[np.ix_(free, free)], rest[free])
+        bound = (f.model.least - f.theta)[free]
+        x[free] = least_above(full_N[np.ix_(free, free)], rest[free], bound)
         return x, free
 
 

@@ -64,6 +64,7 @@ class Variant:
         moving: by how much several flights differ in the force that goes with their own motion,
             1/s; zero: not at all.
         through: by how much in the wind that their thrust shows, beside the drag's, m/s; likewise.
+        among: whether there are other flights of the vehicle, though one alone is looked at.
     """
 
     profile_top: float = TOP_M
@@ -72,6 +73,7 @@ class Variant:
     change: Change | None = None
     moving: float = 0.0
     through: float = 0.0
+    among: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +206,7 @@ def copter_model(
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),
         ThrustScale(frame),
-        own([Charge(alone=flight.parts == 1) for _ in parts]),
+        own([Charge(alone=flight.parts == 1 and not variant.among) for _ in parts]),
         *([ThrustChange(change, flight)] if change else []),
         GroundEffect(frame),
         Inflow(frame),

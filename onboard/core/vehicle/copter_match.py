@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.agreement import ToldAlone, told_alone
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.airframe_file import DIGITS, numbers_of_file
 from onboard.core.vehicle.battery import fitted_battery
@@ -39,6 +40,7 @@ from onboard.core.vehicle.matching import Matched, held_out, likelier, matched
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
+from onboard.core.vehicle.said import change_in
 from onboard.core.vehicle.signals import Signals
 from onboard.core.vehicle.sudden import CHANGES, change_of
 from onboard.core.vehicle.turbulence import turbulence_of
@@ -71,7 +73,32 @@ def match_copter(
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
-    variant, found = _with_change(flight, frame, force_sigma, _apart(flight, frame, force_sigma))
+    told = told_alone(
+        flight, force_sigma, lambda of, sigma: _found(of, frame, sigma, Variant(among=True))
+    )
+    flight, force_sigma = told.counting(flight), told.sigmas(force_sigma)
+    found = _found(flight, frame, force_sigma, Variant(change=_change(told)))
+    effects = tuple(
+        _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
+    )
+    absent = copter_missing(flight, frame)
+    untested = not_testable_of(found, absent, MANOEUVRES)
+    match = vehicle_match(
+        found,
+        "copter",
+        untested,
+        effects=effects,
+        frame=_frame(found, signals, frame, effects),
+        curves=copter_curves(found, frame, signals),
+    )
+    return told.beside(match)
+
+
+def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, variant: Variant) -> Matched:
+    """What is found with the likeliest of the model's forms, beginning with this one."""
+    apart = _apart(flight, frame, force_sigma)
+    plain = replace(variant, moving=apart.moving, through=apart.through)
+    variant, found = _with_change(flight, frame, force_sigma, plain)
     seen = max(found.turbulence.rms, RECEIVER_M_S)
     answering = replace(variant, gusts=seen)
     fit = fitted(copter_model(flight, frame, force_sigma, answering))
@@ -87,19 +114,20 @@ def match_copter(
             other = matched(copter_model(flight, frame, force_sigma, other_form))
             if _better(other, found):
                 variant, found = other_form, other
-    effects = tuple(
-        _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
-    )
-    absent = copter_missing(flight, frame)
-    untested = not_testable_of(found, absent, MANOEUVRES)
-    return vehicle_match(
-        found,
-        "copter",
-        untested,
-        effects=effects,
-        frame=_frame(found, signals, frame, effects),
-        curves=copter_curves(found, frame, signals),
-    )
+    return found
+
+
+def _change(told: ToldAlone) -> Change | None:
+    """The change that explains most, of those in flights that count; None if none has one.
+
+    It is one within a flight: of a difference between flights it is asked in none.
+    """
+    changed = [
+        (sum(m.chosen.gains.get(n, 0.0) for n in CHANGES), change)
+        for m in told.of_counted
+        if (change := change_in(m.model.effects)) is not None
+    ]
+    return max(changed, key=lambda c: c[0])[1] if changed else None
 
 
 def _apart(flight: Flight, frame: CopterAirframe, force_sigma: Array) -> Variant:
@@ -127,13 +155,16 @@ def _with_change(
     """The model, with a sudden change of mass or thrust where one is needed, and what it finds.
 
     Before anything else is asked: whatever else may be free would be bent to take the change in.
+    Of several flights it is that of ``plain``.
     """
 
     def model(change: Change | None) -> ForceModel:
         return copter_model(flight, frame, force_sigma, replace(plain, change=change))
 
-    first = likelier(model(None))
-    change = change_of(first, model)
+    first, change = None, plain.change
+    if flight.parts == 1:
+        first = likelier(model(None))
+        change = change_of(first, model)
     if change is not None:
         found = matched(model(change))
         if set(CHANGES) & set(found.chosen.effects):
@@ -143,7 +174,7 @@ def _with_change(
             if _better(other, found):
                 change, found = since, other
             return replace(plain, change=change), found
-    return plain, matched(model(None), first)
+    return replace(plain, change=None), matched(model(None), first)
 
 
 def _better(other: Matched, found: Matched) -> bool:

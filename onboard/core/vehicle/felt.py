@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.across import UP, Rows, across, whitened_axis
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.drag import Drag
@@ -75,7 +76,7 @@ def felt_by(fit: Fit) -> Felt | None:
         N = rows.regressors[:, mine].T @ rows.regressors[:, mine] + np.diag(fit.prior[mine])
         b = rows.regressors[:, mine].T @ rows.left
         b = b + fit.prior[mine] * (model.nominal - theta)[mine]
-        step = np.linalg.solve(N, b)
+        step = least_above(N, b, (model.least - theta)[mine])
         far = float(np.max(np.abs(step) / model.plausible[mine]))
         theta = theta.copy()
         theta[mine] += step / max(1.0, far / LONGEST_STEP)
@@ -197,7 +198,7 @@ def _summed(fit: Fit, theta: Array, rows: tuple[Rows, ...], mine: Sequence[int])
         fit,
         theta=theta,
         blocks=tuple(sums),
-        inflation=inflation_of(sums, fit.prior),
+        inflation=inflation_of(sums, fit.prior, theta <= model.least),
         noise=noise,
         residual=residual,
         jacobian=jacobian,

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.instruments import (
     whitened_regressors,
     whitened_residual,
@@ -186,7 +187,7 @@ def summed(
         theta,
         prior,
         tuple(sums),
-        inflation_of(sums, prior),
+        inflation_of(sums, prior, theta <= model.least),
         tuple(noise),
         residual,
         jacobian,
@@ -223,7 +224,7 @@ def _settled(
         for h, y in zip(by, left(theta), strict=True):
             N = N + h.T @ h
             b = b + h.T @ y
-        step = np.linalg.solve(N, b)
+        step = least_above(N, b, model.least - theta)
         sigma = np.sqrt(np.diag(np.linalg.inv(N)))
         size = float(np.max(np.abs(step) / sigma))
         if model.instrumented:
@@ -253,14 +254,15 @@ def _level(model: ForceModel, theta: Array) -> Array | None:
     return model.levelled.steps(theta) if model.instrumented else None
 
 
-def inflation_of(blocks: Sequence[BlockSums], prior: Array) -> Array:
+def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array:
     """(m,) variance of the estimate by the scatter of the scores, over that of the sums.
 
     The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
     Each unknown has its own, but none less than the mean of all: a few blocks know single ones
     badly.  Errors of one flight go together (its sensors, its load, how well its wind was
     measured), and flights that contradict each other do not show it from block to block: where
-    there are enough of them, their scores' scatter counts, too, if it is the larger.
+    there are enough of them, their scores' scatter counts, too, if it is the larger.  The scores of
+    what is ``held`` (m,) at its bound have a mean, which is no scatter.
     """
     m = len(prior)
     inverse = np.linalg.inv(sum((b.N for b in blocks), np.diag(prior)))
@@ -271,12 +273,13 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array) -> Array:
     of_flights = np.zeros((len(numbers), m))
     np.add.at(of_flights, which, scores)
     out = np.ones(m)
-    for clusters in (scores, of_flights):
-        count = len(clusters)
+    for by_block, every in ((True, scores), (False, of_flights)):
+        count = len(every)
+        clusters = every - np.where(held, np.mean(every, axis=0), 0.0)
         if count < FEWEST_BLOCKS:
             continue
         robust = inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
         ratio = np.diag(robust) / np.maximum(known, 1e-300)
-        mean = float(np.mean(ratio[told])) if told.any() and clusters is scores else 1.0
+        mean = float(np.mean(ratio[told])) if told.any() and by_block else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
     return out

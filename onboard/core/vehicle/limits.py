@@ -147,6 +147,11 @@ SENSED_GUST_M_S: Final = 0.15
 """Gusts below this are within what an airspeed sensor wanders by: a per cent of a plane's speed,
 m/s [data sheet]."""
 
+# Several flights (agreement).
+
+ANOTHER_MASS: Final = 1.0
+"""Of the logarithm: no vehicle flies with a third or with three times its mass [physics]."""
+
 # What is shown (flown_alone, curves).
 
 ALONE_S: Final = 10.0

@@ -12,6 +12,7 @@ from onboard.core.diagnosis.records import Ambiguity, NotTestable
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
+from onboard.core.vehicle.bounds import below_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.limits import SURE
@@ -81,6 +82,8 @@ def differences(m: Matched) -> tuple[Difference, ...]:
     whole = sum(max(chosen.gains[n], 0.0) for n in chosen.effects)
     out = []
     for name in chosen.effects:
+        if name in m.below:
+            continue
         without = tuple(n for n in chosen.effects if n != name)
         places = m.model.indices(name)
         effect = m.model.effect(name)
@@ -203,7 +206,7 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 def is_explained(m: Matched) -> bool:
     """Whether what is left is less than errors of the motion, or the gusts found, make."""
-    if m.remainders or m.chosen.suspected:
+    if m.remainders or m.chosen.suspected or m.below:
         return False
     unclear = m.model.unclear(m.fit.theta)
     gusts = _gusts(m) * m.fit.sensitivity
@@ -228,6 +231,7 @@ def note_of(m: Matched) -> str:
     said = (
         *dict.fromkeys(m.model.effect(n).note for n in m.chosen.effects),
         suspected_sentence(m.chosen.suspected),
+        below_sentence(m.below),
         remainder_sentence(m.remainders),
         left_out_sentence(m.left_out),
     )

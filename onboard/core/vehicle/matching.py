@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.bounds import at_bounds, below_bounds
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -38,6 +39,7 @@ class Matched:
         turbulence: of the air.
         remainders: spans that the model does not describe.
         left_out: spans, s since the start, that were not used.
+        below: effects that would go below what they can be, and stand for something else.
     """
 
     fit: Fit
@@ -48,6 +50,7 @@ class Matched:
     turbulence: Turbulence
     remainders: tuple[Remainder, ...] = ()
     left_out: tuple[tuple[float, float], ...] = ()
+    below: tuple[str, ...] = ()
 
     @property
     def model(self) -> ForceModel:
@@ -62,16 +65,15 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         model: of the whole flight.
         first: the fit of it, where it is there already.
     """
-    whole = model
-    fit, kept = described(likelier(model) if first is None else first)
+    whole = model.flight
+    fit, kept, turbulence = _finished(likelier(model) if first is None else first)
+    below: tuple[str, ...] = ()
+    if at_bounds(fit):
+        free = _finished(likelier(replace(model, bounded=False), fit))
+        below = below_bounds(free[0])
+        if below:
+            fit, kept, turbulence = free
     model = fit.model
-    turbulence = turbulence_of(fit)
-    if AirspeedScale.name in {e.name for e in model.effects}:
-        felt = felt_by(fit) if turbulence.found else None
-        fit = fit if felt is None else felt.fit
-        if turbulence.seen:
-            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
-    fit = replace(fit, doubt=propeller_doubt(fit))
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)
@@ -82,9 +84,22 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         held_out(choices, chosen.effects),
         nominal,
         turbulence,
-        remainders(whole, fit),
-        left_out(whole.flight, kept),
+        remainders(replace(model, flight=whole), fit),
+        left_out(whole, kept),
+        below,
     )
+
+
+def _finished(first: Fit) -> tuple[Fit, Mask, Turbulence]:
+    """The fit of what the model describes, with what gusts did to it; the steps; the air."""
+    fit, kept = described(first)
+    turbulence = turbulence_of(fit)
+    if AirspeedScale.name in {e.name for e in fit.model.effects}:
+        felt = felt_by(fit) if turbulence.found else None
+        fit = fit if felt is None else felt.fit
+        if turbulence.seen:
+            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
+    return replace(fit, doubt=propeller_doubt(fit)), kept, turbulence
 
 
 def described(fit: Fit) -> tuple[Fit, Mask]:

@@ -38,6 +38,7 @@ class ForceModel:
         start: makes the air.
         instrumented: axes along which what the vehicle does answers the disturbance, so that
             regressors must be told from what does not (:mod:`onboard.core.vehicle.instruments`).
+        bounded: whether unknowns stay above what they can be at least.
     """
 
     flight: Flight
@@ -45,6 +46,7 @@ class ForceModel:
     axes: tuple[int, ...]
     start: Start
     instrumented: tuple[int, ...] = ()
+    bounded: bool = True
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -66,6 +68,11 @@ class ForceModel:
     def plausible(self) -> Array:
         """(m,) prior standard deviations."""
         return np.array([u.plausible for u in self.unknowns])
+
+    @property
+    def least(self) -> Array:
+        """(m,) below which they cannot be."""
+        return np.array([u.least if self.bounded else -math.inf for u in self.unknowns])
 
     @property
     def levelled(self) -> ForceModel:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.agreement import told_alone
 from onboard.core.vehicle.airframe_file import numbers_of_file
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -33,6 +34,25 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """
+    told = told_alone(flight, force_sigma, lambda of, sigma: _found(of, frame, sigma))
+    found = _found(told.counting(flight), frame, told.sigmas(force_sigma))
+    if found is None:
+        return None
+    effects = differences(found)
+    untested = not_testable_of(found, plane_missing(found.model.flight), MANOEUVRES)
+    match = vehicle_match(
+        found,
+        "plane",
+        untested,
+        effects=effects,
+        frame=_coefficients(found, frame, effects),
+        curves=plane_curves(found, frame),
+    )
+    return told.beside(match)
+
+
+def _found(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Matched | None:
+    """What is found in flight that is not stalled; None if there is too little."""
     flying = unstalled(flight, frame, np.zeros((flight.parts, 2)))
     if len(flying) < FEWEST_STEPS:
         return None
@@ -43,16 +63,7 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     if len(flying) >= FEWEST_STEPS and float(np.max(np.linalg.norm(winds, axis=1))) > 1.0:
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma))
-    effects = differences(found)
-    untested = not_testable_of(found, plane_missing(flying), MANOEUVRES)
-    return vehicle_match(
-        found,
-        "plane",
-        untested,
-        effects=effects,
-        frame=_coefficients(found, frame, effects),
-        curves=plane_curves(found, frame),
-    )
+    return found
 
 
 def _coefficients(

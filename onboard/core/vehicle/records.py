@@ -131,6 +131,29 @@ class AxisMismatch:
 
 
 @dataclass(frozen=True, slots=True)
+class Aside:
+    """A further flight whose vehicle is another than that of the flights that count.
+
+    Attributes:
+        number: of the flight, 0 being the first.
+        against: number of the flight that it contradicts.
+        name: effect that differs most.
+        shown: the number of it that is told.
+        its: what this flight alone says of it.
+        theirs: what the other one says.
+        mass: over that of the other, if another mass is all that differs; else None.
+    """
+
+    number: int
+    against: int
+    name: str
+    shown: str
+    its: Compared
+    theirs: Compared
+    mass: Compared | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleMatch:
     """The vehicle level of one recording against an airframe.
 
@@ -139,6 +162,7 @@ class VehicleMatch:
         effects: found, the strongest first.
         wind: of the flight; None where nothing could be said.
         other_winds: of the other flights of the vehicle that were matched with it.
+        aside: those of them that contradict it or each other, and were not used.
         mismatch: by axis.
         alone_before: RMS of the velocity that the nominal model gains or loses in ten seconds
             alone, m/s.
@@ -159,6 +183,7 @@ class VehicleMatch:
     effects: tuple[Difference, ...] = ()
     wind: WindEstimate | None = None
     other_winds: tuple[WindEstimate, ...] = ()
+    aside: tuple[Aside, ...] = ()
     mismatch: Mapping[str, AxisMismatch] = field(default_factory=dict)
     alone_before: float = NAN
     alone_after: float = NAN

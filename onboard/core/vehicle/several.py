@@ -64,9 +64,21 @@ def joined(flights: Sequence[Flight]) -> Flight:
         **whole,
         velocity_sigma=max(f.velocity_sigma for f in flights),
         attitude_sigma=max(f.attitude_sigma for f in flights),
-        rest_volts=float(np.fmax.reduce([f.rest_volts for f in flights])),
+        rest_volts=float(np.fmax.reduce([_highest_volts(f) for f in laid])),
         ground_seen=all(f.ground_seen for f in flights),
     )
+
+
+def of_parts(flight: Flight, numbers: Sequence[int]) -> Flight:
+    """Some of several recordings, on the clock of all and above the same ground.
+
+    Args:
+        flight: of several.
+        numbers: of those that are kept, in order.
+    """
+    out = flight.kept(np.isin(flight.part, numbers))
+    out.part[:] = np.searchsorted(numbers, out.part)
+    return out
 
 
 def wind_sigmas(flight: Flight) -> list[float]:
@@ -77,6 +89,13 @@ def wind_sigmas(flight: Flight) -> list[float]:
         known = measured.shape[1] > 0 and bool(np.isfinite(measured).all())
         out.append(float(np.mean(measured[:, 2])) if known else PLAUSIBLE_M_S)
     return out
+
+
+def _highest_volts(flight: Flight) -> float:
+    """At rest or flown, V: of one battery for all flights the same is full; NaN if unknown."""
+    if not flight.battery.shape[1]:
+        return flight.rest_volts
+    return float(np.fmax(np.percentile(flight.battery[:, 0], 99), flight.rest_volts))
 
 
 def _measured(flight: Flight) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from onboard.core.inputs.limits import GROUND_M, STILL_M_S
@@ -39,6 +41,7 @@ def grounded_spans(
     """
     if len(t) < 2:
         return []
+    height = lasting_height(t, height)
     v_n = np.where(np.isnan(v_n), np.stack([0.0 * t, 0.0 * t, -_climb(t, height)], axis=1), v_n)
     slow = np.linalg.norm(v_n, axis=1) < STILL_M_S
     if carried is not None and np.all([np.mean(carried[i:j]) > 0.5 for i, j in _lasting(t, slow)]):
@@ -58,6 +61,24 @@ def grounded_spans(
             run for run, level_m in zip(runs, levels, strict=True) if level_m < lowest + apart_m
         ]
     return [(float(t[i]) - MARGIN_S, float(t[j - 1]) + MARGIN_S) for i, j in sorted(stands)]
+
+
+def lasting_height(t: Array, height: Array) -> Array:
+    """(n,) height, m, without what does not last as long as a stand has to: a damaged fix is none.
+
+    The median of the fixes around each, as far as there are any; a climb stays what it is.
+    """
+    if len(t) < 2:
+        return height
+    step = max(float(np.median(np.diff(t))), 1e-3)
+    half = math.ceil(0.5 * STILL_S / step)
+    if len(t) <= 2 * half:
+        return np.full(len(t), float(np.median(height)))
+    around = np.lib.stride_tricks.sliding_window_view(height, 2 * half + 1)
+    begin = [np.median(height[: half + 1 + k]) for k in range(half)]
+    end = [np.median(height[len(t) - half - 1 - k :]) for k in reversed(range(half))]
+    out: Array = np.concatenate([begin, np.median(around, axis=1), end])
+    return out
 
 
 def _ground(t: Array, height: Array, stands: list[tuple[int, int]], apart_m: float) -> Array:

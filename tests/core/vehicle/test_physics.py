@@ -17,7 +17,7 @@ from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.recursion import accumulated, behind, lagged
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
-from onboard.core.vehicle.spans import grounded_spans, inside
+from onboard.core.vehicle.spans import grounded_spans, inside, lasting_height
 from tests.core.vehicle.flights import copter_flight
 
 
@@ -154,6 +154,27 @@ def test_a_plane_rolls_before_it_flies_wherever_its_height_wanders_to(wander_m, 
     assert _covered(spans, 0.0, 15.5)
     assert _covered(spans, 181.0, 199.0)
     assert not inside(np.linspace(25.0, 170.0, 50), spans).any()
+
+
+@pytest.mark.parametrize("damaged", [-1e4, -300.0, 300.0, 1e6])
+@pytest.mark.parametrize("measured", [True, False])
+@pytest.mark.parametrize("at_s", [0.0, 5.0, 12.0, 60.0, 199.8])
+def test_one_damaged_height_hides_no_stand_and_makes_none(damaged, measured, at_s):
+    t, v, height = _taken_off(-2.5, measured=measured)
+    height[np.argmin(np.abs(t - at_s))] += damaged
+    spans = grounded_spans(t, v, height, rolls=True, wings=True)
+    assert _covered(spans, 0.0, 15.5)
+    assert _covered(spans, 181.0, 199.0)
+    assert not inside(np.linspace(25.0, 170.0, 50), spans).any()
+    assert abs(np.min(lasting_height(t, height)) + 2.5) < 0.1
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 50])
+def test_a_climb_is_what_it_was(count):
+    t = 0.2 * np.arange(count)
+    lasting = lasting_height(t, 3.0 * t)
+    np.testing.assert_allclose(lasting[3:-3], 3.0 * t[3:-3])
+    assert np.max(np.abs(lasting - 3.0 * t)) <= 3.0 * 0.6 + 1e-9
 
 
 def test_what_may_hover_has_not_landed_above_where_it_stood():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from onboard.core.vehicle.air import Air
@@ -26,9 +27,10 @@ class BodyDrag(Effect):
     def __init__(self, frame: CopterAirframe) -> None:
         """Nominally the frame's, the same on both axes."""
         nominal = frame.body_drag
+        floor = FLOOR_SHARE * max(nominal, 0.02)
         super().__init__(
             [
-                Unknown(axis, nominal, PLAUSIBLE, FLOOR_SHARE * max(nominal, 0.02), "m^2/kg", DOUBT)
+                Unknown(axis, nominal, PLAUSIBLE, floor, "m^2/kg", DOUBT, least=0.0)
                 for axis in ("x", "y")
             ]
         )
@@ -37,6 +39,10 @@ class BodyDrag(Effect):
         """Add the drag."""
         for axis, value in enumerate(values):
             air.force_b[:, axis] -= 0.5 * value * air.rho * air.square_b[:, axis] / air.mass
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Less area by mass."""
+        return [v * math.exp(-log_ratio) for v in values]
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Ballistic coefficients, as EK3_DRAG_BCOEF_X and _Y; none where there is no drag."""

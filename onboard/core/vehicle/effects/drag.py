@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,12 +23,12 @@ class Drag(Effect):
 
     def __init__(self, frame: PlaneAirframe) -> None:
         """Nominally the file's."""
+        profile, induced = frame.c_drag_p, frame.induced
+        floors = FLOOR_SHARE * profile, 2 * FLOOR_SHARE * induced
         super().__init__(
             [
-                Unknown("c_drag_p", frame.c_drag_p, 0.1, FLOOR_SHARE * frame.c_drag_p, "1", 0.003),
-                Unknown(
-                    "induced", frame.induced, 0.03, 2 * FLOOR_SHARE * frame.induced, "1", 0.005
-                ),
+                Unknown("c_drag_p", profile, 0.1, floors[0], "1", 0.003, least=min(0.0, profile)),
+                Unknown("induced", induced, 0.03, floors[1], "1", 0.005, least=0.0),
             ]
         )
 
@@ -36,3 +37,7 @@ class Drag(Effect):
         drag = air.pressure * (values[0] + values[1] * air.lift**2)
         air.force_b[:, 0] -= drag * np.cos(air.alpha)
         air.force_b[:, 2] -= drag * np.sin(air.alpha)
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Coefficients are by the airframe's mass; what is induced goes with the lift's square."""
+        return [values[0] * math.exp(-log_ratio), values[1] * math.exp(log_ratio)]

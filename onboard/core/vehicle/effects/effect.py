@@ -29,6 +29,7 @@ class Unknown:
         doubt: what the form of the law itself is good for, as a standard deviation.
         share: the same as a share of the value.
         within: by how much it may be off in an airframe that is nominal all the same.
+        least: below which it cannot be.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Unknown:
     doubt: float = 0.0
     share: float = 0.0
     within: float = 0.0
+    least: float = -math.inf
 
     def doubted(self, value: float, sigma: float) -> float:
         """A sigma of the fit with what the law is good for."""
@@ -86,6 +88,11 @@ class Effect(ABC):
             Shown(u.name, u.nominal, v, s, u.unit)
             for u, v, s in zip(self.unknowns, values, sigmas, strict=True)
         ]
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """The unknowns of the same airframe with ``exp(log_ratio)`` times the mass."""
+        del log_ratio
+        return list(values)
 
     def missing(self, air: Air) -> str:
         """Why this recording cannot speak of it; empty where it can."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -49,3 +50,7 @@ class Lift(Effect):
         air.lift = values[0] + values[1] * air.alpha
         air.force_b[:, 0] += air.pressure * air.lift * np.sin(air.alpha)
         air.force_b[:, 2] -= air.pressure * air.lift * np.cos(air.alpha)
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Coefficients are by the airframe's mass."""
+        return [v * math.exp(-log_ratio) for v in values]

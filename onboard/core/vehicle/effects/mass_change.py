@@ -55,14 +55,14 @@ class _Changed(Effect):
     def __init__(self, change: Change, flight: Flight) -> None:
         """Nominally nothing changes."""
         super().__init__([Unknown("log_ratio", 0.0, PLAUSIBLE, FLOOR, "1")])
-        self._change = change
+        self.change = change
         first = float(flight.t[flight.part == change.part(flight)][0])
         self._moment = 0.5 * (change.begin + change.end) - first
         side = "after" if change.since else "before"
         self.note = f"all other numbers are those of the vehicle {side} the change"
 
     def _factor(self, air: Air, value: float) -> Array:
-        return np.exp(value * self._change.share(air.flight))
+        return np.exp(value * self.change.share(air.flight))
 
     def missing(self, air: Air) -> str:
         """It takes outputs."""

@@ -31,6 +31,10 @@ class Propulsion(Effect):
             air.thrust = scale * air.commands[:, THROTTLE]
             air.force_b[:, 0] += air.thrust
 
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Less thrust by mass."""
+        return [values[0] - log_ratio]
+
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """The ratio to the simulator's thrust by mass."""
         ratio = math.exp(min(values[0], 5.0))

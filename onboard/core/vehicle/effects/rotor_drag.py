@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -39,8 +40,9 @@ class RotorDrag(Effect):
         """
         self._by_components = by_components
         nominal = frame.rotor_drag
+        floor = FLOOR_SHARE * nominal
         super().__init__(
-            [Unknown("mcoef", nominal, PLAUSIBLE, FLOOR_SHARE * nominal, "1/s", share=DOUBT)]
+            [Unknown("mcoef", nominal, PLAUSIBLE, floor, "1/s", share=DOUBT, least=0.0)]
         )
 
     def act(self, air: Air, values: Sequence[float]) -> None:
@@ -49,6 +51,10 @@ class RotorDrag(Effect):
         if self._by_components:
             drag = drag * np.array([1.0 + _root(air.tilt[1]), 1.0 + _root(air.tilt[0])])
         air.force_b[:, :2] -= drag
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """By the root: the thrust that holds it has grown with the mass."""
+        return [values[0] * math.exp(-0.5 * log_ratio)]
 
 
 def _root(share: float) -> float:

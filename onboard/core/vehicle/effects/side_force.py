@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,3 +44,7 @@ class SideForce(Effect):
         if air.commands is not None:
             coefficient = coefficient + values[1] * air.commands[:, RUDDER]
         air.force_b[:, 1] += air.pressure * coefficient
+
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Coefficients are by the airframe's mass."""
+        return [v * math.exp(-log_ratio) for v in values]

@@ -30,6 +30,10 @@ class ThrustScale(Effect):
             scale = self._full * math.exp(min(values[0], 5.0))
             air.thrust = scale * air.rho / self._density * air.power / air.mass
 
+    def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
+        """Less thrust by mass."""
+        return [values[0] - log_ratio]
+
     def missing(self, air: Air) -> str:
         """It takes outputs."""
         return "" if air.commands is not None else "no motor outputs in the recording"
