@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -160,6 +161,29 @@ def beyond_range(
             out.append(f"{words} would have to be further off than can be told")
         elif longer and not shaped:
             out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
+    return out + [
+        f"{name} would have to be the other way round than it can be"
+        for name in reversed_of(model, model.families, theta, covariance)
+    ]
+
+
+def reversed_of(
+    model: Model, families: Sequence[Family], theta: Array, covariance: Array
+) -> list[str]:
+    """Names of families of which an unknown that cannot be negative surely is.
+
+    Args:
+        model: has the families.
+        families: that are asked for.
+        theta: (m,) estimate.
+        covariance: (m, m) of it.
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    out = []
+    for family in families:
+        index = [model.index[name] for name in family.never_negative]
+        if np.any(theta[index] < -BEYOND * sigma[index]):
+            out.append(family.name)
     return out
 
 

@@ -8,6 +8,7 @@ import pytest
 from onboard.core.estimate.calibration_model import beyond_range, calibration_model, least_square
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.accelerometer_hysteresis import AccelerometerHysteresis
 from onboard.core.physics.effects.gps_overshoot import GpsOvershoot
 
 SIGMA = 1e-3
@@ -44,6 +45,21 @@ def test_samples_that_are_means_are_no_receiver_that_overshoots():
     for step in (0.1, AT_50_HZ):
         mean = np.mean(0.5 * bend * (step * t) ** 2)
         assert -least_square(step) * bend / 24.0 == pytest.approx(mean, rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", [AccelerometerHysteresis, GpsOvershoot])
+@pytest.mark.parametrize(("sigmas", "said"), [(-2.9, False), (-3.1, True), (9.0, False)])
+def test_no_size_is_surely_of_the_sign_that_nature_does_not_allow(kind, sigmas, said):
+    point, effect = Linearisation(), kind(Origin(t0=0.0))
+    model = calibration_model(point, more=(effect,))
+    sizes, shapes = effect.unknowns[: len(effect.keys)], effect.unknowns[len(effect.keys) :]
+    for unknown in sizes:
+        theta, covariance = np.zeros(model.size), SIGMA**2 * np.eye(model.size)
+        theta[model.index[unknown.name]] = sigmas * SIGMA
+        theta[[model.index[u.name] for u in shapes]] = -9.0 * SIGMA
+        words = f"{kind.effect} would have to be the other way round than it can be"
+        found = beyond_range(point, model, theta, covariance, step=AT_50_HZ)
+        assert found == [words] * said
 
 
 def test_sums_of_earlier_flights_do_not_say_how_often_they_were_sampled():

@@ -44,7 +44,9 @@ class AccelerometerHysteresis(Effect):
     three play operators, one for each half-width of :data:`PLAYS`: a play has a follower that the
     load drags along once it is that far away from it, and which remembers its place from segment to
     segment.  The sum of the weights is half the height of the loop; how it is shared among the
-    plays is the loop's shape, an unknown too, so that the height's sigma holds it.
+    plays is the loop's shape, an unknown too, so that the height's sigma holds it.  A loop costs
+    energy each time that it is gone round (second law of thermodynamics), and so is run through one
+    way: the reading is behind, and never ahead.
     """
 
     effect = "accelerometer_hysteresis"
@@ -57,6 +59,7 @@ class AccelerometerHysteresis(Effect):
     cure = "ArduPilot has no parameter for it: replace the sensor"
     apart = "load and unload in turn: steep turns both ways, accelerate and brake, climb and dive"
     changes_force = True
+    positive = True
 
     def __init__(self, origin: Origin) -> None:
         """No reference is needed."""

@@ -45,6 +45,7 @@ class GpsOvershoot(Effect):
     source = "second-order tracking loop: (2 zeta w s + w^2) / (s^2 + 2 zeta w s + w^2)"
     cure = "set the receiver's dynamic model to airborne and raise its rate"
     apart = "accelerate and brake hard and often, quickly and slowly"
+    positive = True
     goes_below = ("window_squared",)
     keys = ("square",)
     plausible = (LARGEST,)
