@@ -82,7 +82,7 @@ class Receiver:
         v_n, p_n = self._antenna(trajectory, truth)
         window = smoothing_window(truth)
         spread = SPREADING[gps.response]
-        velocity = _sample(spread(v_n, window), valid - start)
+        velocity = _sample(_tracked(spread(v_n, window), truth), valid - start)
         position = _sample(spread(p_n, window), valid - start)
         return [
             self._fix(truth, float(t), velocity[i], position[i], origin)
@@ -184,6 +184,35 @@ def _filtered(x: Array, window_s: float) -> Array:
     size = 2 ** int(np.ceil(np.log2(len(padded) + 12 * n)))
     response = np.fft.rfft(weights, size)[:, None] * np.fft.rfft(padded, size, axis=0)
     out: Array = np.fft.irfft(response, size, axis=0)[12 * n + late : 12 * n + late + len(x)]
+    return out
+
+
+def _tracked(x: Array, truth: Truth) -> Array:
+    """What the receiver's tracking loop makes of it; it begins in step."""
+    for effect in truth.effects:
+        if isinstance(effect, fx.GpsOvershoot):
+            x = np.column_stack([_loop(u, effect.square, effect.damping) for u in x.T])
+    return x
+
+
+def _loop(u: Array, square: float, damping: float) -> Array:
+    """Second-order loop (alpha-beta filter): what it is off corrects velocity and acceleration.
+
+    ``y' = a + 2 damping w (u - y)``, ``a' = w^2 (u - y)``; from sample to sample by the implicit
+    midpoint rule, with ``w = 1 / sqrt(square)`` rad/s.
+    """
+    w = 1.0 / np.sqrt(square)
+    p, q = float(damping * w * DT), float(0.25 * (w * DT) ** 2)
+    y, a = float(u[0]), float(u[1] - u[0]) / DT
+    out = np.empty_like(u)
+    out[0] = y
+    middles = (0.5 * (u[1:] + u[:-1])).tolist()
+    for i, middle in enumerate(middles, 1):
+        # Half a step ahead: off = middle - (y + half DT (a half-way + 2 p / DT off)), solved.
+        off = (middle - y - 0.5 * DT * a) / (1.0 + p + q)
+        y += DT * a + 2.0 * (p + q) * off
+        a += 4.0 * q / DT * off
+        out[i] = y
     return out
 
 

@@ -175,6 +175,27 @@ def test_gps_smoothing_is_the_mean_over_the_window(trajectory):
     assert np.abs(v - way / window)[inner].max() < 1e-6
 
 
+@pytest.mark.parametrize("damping", [0.4, 0.7])
+def test_gps_overshoot_is_the_response_of_its_loop(trajectory, damping):
+    hertz = 1.5
+    w = 2.0 * np.pi * hertz
+    found = fixes(trajectory, fx.GpsOvershoot(square=w**-2, damping=damping))
+    v, p = table(found)
+    valid = np.array([f.t_valid for f in found])
+    # By frequencies, of a velocity that ends where it began: it is flown there and back.
+    there_and_back = np.concatenate([trajectory.v_n, trajectory.v_n[::-1]])
+    s = 2.0j * np.pi * np.fft.rfftfreq(len(there_and_back), DT)
+    H = (2.0 * damping * w * s + w**2) / (s**2 + 2.0 * damping * w * s + w**2)
+    loop = np.fft.irfft(
+        H[:, None] * np.fft.rfft(there_and_back, axis=0), len(there_and_back), axis=0
+    )
+    settled = slice(int(5.0 * EXACT.rate), -5)
+    off = v - at(trajectory, loop[: trajectory.n], valid)
+    assert np.abs(off)[settled].max() < 1e-4
+    assert np.abs(v - at(trajectory, trajectory.v_n, valid))[settled].max() > 0.05
+    assert np.abs(p - at(trajectory, trajectory.p_n, valid)).max() < 1e-9
+
+
 def test_gps_lever_arm(trajectory):
     arm = np.array([0.5, 0.2, -0.3])
     found = fixes(trajectory, fx.GpsLeverArm(x=0.5, y=0.2, z=-0.3))

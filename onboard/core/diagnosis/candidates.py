@@ -15,6 +15,7 @@ from onboard.core.diagnosis.limits import (
 )
 from onboard.core.diagnosis.score import least, needed, surprise
 from onboard.core.diagnosis.selection import Fit, Fitter, Gain
+from onboard.core.estimate.limits import BEYOND
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect
 from onboard.core.physics.effects.bias_step import Witness
@@ -27,7 +28,8 @@ class Candidate:
     ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
     ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
     the offsets at one moment; other accelerometers may have been ``witness`` of it.  ``room_for``
-    are effects that it is when some of its unknowns are told by the others.
+    are effects that it is when some of its unknowns are told by the others.  No size of what is
+    ``positive`` can be negative; what it is then is in every model if it is ``mirrored``.
     """
 
     effect: str
@@ -38,6 +40,8 @@ class Candidate:
     jump: bool = False
     witness: Witness | None = None
     room_for: tuple[str, ...] = ()
+    positive: bool = False
+    mirrored: bool = False
 
     @property
     def sizes(self) -> list[int]:
@@ -55,6 +59,11 @@ class Candidate:
         if self.witness is None:
             return surprise(gain.fall, unknowns, self.places, gain.variance, gain.freedom)
         return surprise(self.witness.gain + gain.weakened, unknowns, self.witness.places)
+
+    def merit(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """The score, of what cannot be only by as much as it is clearly more than of what can."""
+        score = self.score(fitter, before, after)
+        return score if possible(fitter, after, self) else score - CLEARLY
 
     def margin(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """By how much a jump is rather one of this accelerometer than of another one.
@@ -94,7 +103,8 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     """Whether an effect is no chance, holds on flight not fitted, is believable and matters."""
     if c.score(fitter, before, after) < least() or c.margin(fitter, before, after) <= CLEARLY:
         return False
-    if not believable(fitter, after, c):
+    # What nothing has a name for may be taken all the same, and is told of as what cannot be.
+    if not _small_enough(fitter, after, c) or (c.mirrored and not possible(fitter, after, c)):
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
@@ -105,8 +115,21 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
 
 def believable(fitter: Fitter, after: Fit, c: Candidate) -> bool:
     """Whether an effect of the size that ``after`` has it can be."""
+    return _small_enough(fitter, after, c) and possible(fitter, after, c)
+
+
+def _small_enough(fitter: Fitter, after: Fit, c: Candidate) -> bool:
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     return bool(np.all(np.abs(value) <= np.array(c.plausible)))
+
+
+def possible(fitter: Fitter, after: Fit, c: Candidate) -> bool:
+    """Whether no size that ``after`` has is surely of the sign that nature does not allow."""
+    if not c.positive:
+        return True
+    value = after.theta[c.sizes] - fitter.absent[c.sizes]
+    sigma = np.sqrt(np.diag(fitter.covariance(after))[c.sizes])
+    return bool(np.all(value >= -BEYOND * sigma))
 
 
 def _matters(fitter: Fitter, before: Fit, after: Fit) -> bool:

@@ -13,6 +13,7 @@ from onboard.core.diagnosis.hypotheses import Choice, confounders_of
 from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
 from onboard.core.diagnosis.score import least
+from onboard.core.estimate.calibration_model import reversed_of
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
@@ -42,7 +43,12 @@ class Findings:
             for name, (quantities, cure) in nuisance_effects(nuisances).items()
             if name not in doubts and name not in named and self._holds(name)
         ]
-        return out + [self._effect(f) for f in self._final.families]
+        return out + [self._effect(f) for f in self._final.families if not self._reversed(f)]
+
+    def _reversed(self, f: Effect) -> bool:
+        """Whether it surely has the sign that nature does not allow it: then it is another one."""
+        made, solution = self._final.engine.model, self._final.solution
+        return bool(reversed_of(made, (f,), solution.theta, solution.covariance))
 
     def _nuisance(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
         final = self._final

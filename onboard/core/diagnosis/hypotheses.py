@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
-from onboard.core.diagnosis.candidates import Candidate, accepted
+from onboard.core.diagnosis.candidates import Candidate, accepted, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least
@@ -78,7 +78,7 @@ def confounders_of(
     for other in others:
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
         score = other.score(fitter, before, instead)
-        if score < least():
+        if score < least() or not possible(fitter, instead, other):
             continue
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if other.score(fitter, with_it, both) >= least():
@@ -111,7 +111,7 @@ def choose(
         best, most = None, least()
         for c in offered:
             after = wide.fit([*choice.free, *c.index])
-            score = c.score(wide, before, after)
+            score = c.merit(wide, before, after)
             if score >= most and accepted(wide, before, after, c):
                 best, most = c, score
         if best is None:
@@ -179,15 +179,15 @@ def _reconsider(choice: Choice) -> None:
     for c in list(choice.chosen[:-1]):
         rest = [i for i in choice.free if i not in c.index]
         before = fitter.fit(rest)
-        score = c.score(fitter, before, fitter.fit([*rest, *c.index]))
-        if score < least():
+        with_it = fitter.fit([*rest, *c.index])
+        if c.score(fitter, before, with_it) < least():
             choice.chosen.remove(c)
             continue
-        better, most = c, score + CLEARLY
+        better, most = c, c.merit(fitter, before, with_it) + CLEARLY
         for other in choice.candidates:
             if other not in choice.chosen:
                 after = fitter.fit([*rest, *other.index])
-                its = other.score(fitter, before, after)
+                its = other.merit(fitter, before, after)
                 if its > most and accepted(fitter, before, after, other):
                     better, most = other, its
         choice.chosen[choice.chosen.index(c)] = better

@@ -204,4 +204,6 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         jump=jump,
         witness=family.witness if isinstance(family, BiasStep) else None,
         room_for=family.room_for,
+        positive=family.positive,
+        mirrored=bool(family.goes_below),
     )

@@ -82,7 +82,14 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         calibrator,
         imu,
         Evidence(
-            full, choice, final, tuple(families), rivals, companions, believed(flight), unused
+            full,
+            choice,
+            final,
+            tuple(families),
+            rivals,
+            companions,
+            believed(flight, calibrator.trust.refusals),
+            unused,
         ),
         origin,
         clear.absent,

@@ -73,13 +73,23 @@ def refused(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> list[
     return out
 
 
-def believed(batches: Sequence[Batch]) -> int:
-    """How many fixes of a flight were to be used; batches share their ends."""
+def believed(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> int:
+    """How many fixes of a flight were to be used; batches share their ends.
+
+    Those that contradict each other are among them: which of two is false the trust window does
+    not know, and has refused both.  What the receiver or the autopilot complained of is not.
+
+    Args:
+        batches: the flight.
+        refusals: of the trust window.
+    """
+    glitches = [r for r in refusals if r.reason is Distrust.GPS_GLITCH]
     count, last = 0, float("-inf")
     for batch in batches:
-        fresh = batch.fixes.t != last
-        count += int((batch.trusted & fresh).sum())
-        last = float(batch.fixes.t[-1])
+        for t, trusted in zip(batch.fixes.t.tolist(), batch.trusted.tolist(), strict=True):
+            if t != last:
+                count += trusted or _reason(t, glitches) is not None
+            last = t
     return count
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -95,8 +96,25 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
     )
 
 
+def least_square(step: float) -> float:
+    """The least that the square of a receiver's span can be, s^2: it averages, or does not.
+
+    A span is told against that of the force.  What is read may be the mean over the ``step`` to the
+    next sample, s.  An autopilot's low-pass before it takes ``w^2 / (s^2 + 2 zeta w s + w^2)`` of
+    the force: a delay, and the variance ``(4 zeta^2 - 2) / w^2``, which is nil for its damping of
+    ``1 / sqrt(2)`` at any frequency (INS_ACCEL_FILTER).
+    """
+    return -(step**2)
+
+
 def beyond_range(
-    point: Linearisation, model: Model, theta: Array, covariance: Array, *, shaped: bool = True
+    point: Linearisation,
+    model: Model,
+    theta: Array,
+    covariance: Array,
+    *,
+    shaped: bool = True,
+    step: float = math.inf,
 ) -> list[str]:
     """What would have to be further off than it is looked for, by :data:`BEYOND` of its sigmas.
 
@@ -111,6 +129,7 @@ def beyond_range(
         theta: (m,) estimate.
         covariance: (m, m) of it.
         shaped: whether the linearisation follows the shape of the receiver's averaging.
+        step: between inertial samples, s; infinite where nobody knows it any more.
 
     Returns:
         In words; empty if all is where the flight wants it.
@@ -121,7 +140,7 @@ def beyond_range(
             "the receiver's averaging",
             "window_squared",
             point.window**2,
-            (-np.inf, LONGEST_WINDOW_S**2),
+            (least_square(step), LONGEST_WINDOW_S**2),
         ),
         (
             "the lateness of the attitude",
@@ -131,8 +150,10 @@ def beyond_range(
         ),
         ("the error of the heading", "heading", point.heading, HEADING_RANGE_RAD),
     )
+    free = {name for family in model.families for name in family.goes_below}
     out = []
-    for words, name, taken, (low, high) in ranges:
+    for words, name, taken, (least, high) in ranges:
+        low = -math.inf if name in free else least
         i = model.index[name]
         asked, sigma = taken + theta[i], math.sqrt(covariance[i, i])
         longer = name == "window_squared" and asked + SHORTER * sigma > AROUND_SPAN_S**2
@@ -140,6 +161,29 @@ def beyond_range(
             out.append(f"{words} would have to be further off than can be told")
         elif longer and not shaped:
             out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
+    return out + [
+        f"{name} would have to be the other way round than it can be"
+        for name in reversed_of(model, model.families, theta, covariance)
+    ]
+
+
+def reversed_of(
+    model: Model, families: Sequence[Family], theta: Array, covariance: Array
+) -> list[str]:
+    """Names of families of which an unknown that cannot be negative surely is.
+
+    Args:
+        model: has the families.
+        families: that are asked for.
+        theta: (m,) estimate.
+        covariance: (m, m) of it.
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    out = []
+    for family in families:
+        index = [model.index[name] for name in family.never_negative]
+        if np.any(theta[index] < -BEYOND * sigma[index]):
+            out.append(family.name)
     return out
 
 

@@ -8,6 +8,7 @@ contradicts the model, for then its sigmas say nothing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +69,9 @@ def too_far(engine: Engine, solution: Solution) -> list[str]:
     found = solution.theta, solution.covariance
     # Sums of earlier flights alone have followed what their fixes showed.
     shaped = engine.shaped or not engine.batches
-    return beyond_range(engine.point, engine.model, *found, shaped=shaped)
+    steps = [float(np.median(np.diff(b.segment.t))) for b in engine.batches]
+    step = float(np.median(steps)) if steps else math.inf
+    return beyond_range(engine.point, engine.model, *found, shaped=shaped, step=step)
 
 
 def good_enough(made: Calibration, needs: Needs) -> bool:

@@ -367,6 +367,9 @@ class Calibrator:
         if self._clock.is_ahead(fix.t):
             self._counts["gps_ahead"] += 1
             return events
+        if self._trust.repeats:
+            self._counts["gps_held"] += 1
+            return events
         if self._assembly.streams.fixes.add(fix, trusted=self._trust.is_open):
             self._finished = False
             return (*events, *self._advance())

@@ -2,7 +2,8 @@
 
 A receiver that is being spoofed, multipathed or stuck often still claims a good fix.  Three
 contradictions show it: velocity that jumps, position that does not follow velocity, and a
-moving receiver that repeats itself to the last digit.
+moving receiver that repeats itself to the last digit for a while.  One that does so once has
+measured nothing: what comes next is held against the fix before.
 """
 
 from __future__ import annotations
@@ -39,31 +40,61 @@ class FixPlausibility:
         self._longest_step = 0.0
         self._changed_at = 0.0
         self._position_moves = False
+        self._repeats = 0
+
+    def repeats(self, fix: GpsFix) -> bool:
+        """Whether a moving receiver says again what it has said, and not for long yet: nothing new.
+
+        Nothing of the kind can be said where positions do not move with the vehicle, nor of a
+        receiver at rest, whose readings may honestly be alike.
+        """
+        last = self._last
+        if last is None or not _identical(last, fix):
+            self._repeats = 0
+            return False
+        if not self._position_moves or not self._moves(fix):
+            return False
+        self._repeats += 1
+        return not self._frozen(fix)
 
     def check(self, fix: GpsFix) -> Contradiction | None:
         """The worst contradiction of ``fix`` with its predecessors; they must be in order."""
-        last, self._last = self._last, fix
-        if last is None or self._anchor is None:
-            self._anchor, self._changed_at = fix, fix.t
+        last = self._last
+        if last is None:
+            self._last, self._changed_at = fix, fix.t
+            self._restart_baseline(fix)
             return None
+        if _identical(last, fix) and self._moves(fix) and self._frozen(fix):
+            # Nothing was measured: what comes next is held against the fix before, its place not.
+            self._anchor = None
+            return Contradiction.FROZEN
+        self._last = fix
+        if _identical(last, fix):
+            # Its position lags its velocity by as long as it stands still: no verdict from that.
+            self._restart_baseline(fix)
+            return None
+        self._changed_at = fix.t
+        # Some recordings carry velocity only, and one constant position.
+        moved = (fix.latitude, fix.longitude) != (last.latitude, last.longitude)
+        self._position_moves = self._position_moves or moved
         dt = fix.t - last.t
         if _velocity_change(last, fix) > self._limits.jump + self._limits.acceleration * dt:
             self._restart_baseline(fix)
             return Contradiction.JUMP
-        if not _identical(last, fix):
-            self._changed_at = fix.t
-            return Contradiction.DRIFT if self._drifts(last, fix) else None
-        # Its position lags its velocity by as long as it stands still: no verdict from that.
-        self._restart_baseline(fix)
-        moving = math.hypot(fix.v_n, fix.v_e) > self._limits.frozen_speed
-        frozen = moving and fix.t - self._changed_at >= self._limits.frozen_after
-        return Contradiction.FROZEN if frozen else None
+        if self._anchor is None:
+            self._restart_baseline(fix)
+            return None
+        return Contradiction.DRIFT if self._drifts(last, self._anchor, fix) else None
 
-    def _drifts(self, last: GpsFix, fix: GpsFix) -> bool:
-        """Adds one step to the baseline and judges it once it is long enough."""
-        anchor = self._anchor
-        if anchor is None:
-            return False
+    def _moves(self, fix: GpsFix) -> bool:
+        return math.hypot(fix.v_n, fix.v_e) > self._limits.frozen_speed
+
+    def _frozen(self, fix: GpsFix) -> bool:
+        """Whether it has repeated itself for too long, and not just once, as a slow one may."""
+        return self._repeats != 1 and fix.t - self._changed_at >= self._limits.frozen_after
+
+    def _drifts(self, last: GpsFix, anchor: GpsFix, fix: GpsFix) -> bool:
+        """Adds one step to the baseline from ``anchor`` and judges it once it is long enough."""
         dt = fix.t - last.t
         self._longest_step = max(self._longest_step, dt)
         self._travelled = (
@@ -76,8 +107,6 @@ class FixPlausibility:
         north = (fix.latitude - anchor.latitude) * _METRES_PER_RADIAN
         eastward = math.remainder(fix.longitude - anchor.longitude, 2 * math.pi)
         east = eastward * math.cos(fix.latitude) * _METRES_PER_RADIAN
-        # Some recordings carry velocity only, and one constant position.
-        self._position_moves = self._position_moves or north != 0.0 or east != 0.0
         mismatch = math.hypot(north - self._travelled[0], east - self._travelled[1]) / span
         limit = self._limits.drift + self._limits.drift_acceleration * self._longest_step
         self._restart_baseline(fix)

@@ -77,6 +77,7 @@ class TrustWindow:
         self._now = -math.inf
         self._first_opened: float | None = None
         self._late = 0
+        self._repeats = False
 
     @property
     def phase(self) -> Phase:
@@ -87,6 +88,11 @@ class TrustWindow:
     def is_open(self) -> bool:
         """Whether the latest fix may be used."""
         return self._phase is Phase.OPEN
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the latest fix says again what a moving receiver has said: it is no fix."""
+        return self._repeats
 
     @property
     def reason(self) -> Distrust | None:
@@ -180,6 +186,7 @@ class TrustWindow:
             if not self._watched.changes_for(fix):
                 return ()
             self._forget_fixes()
+        self._repeats = False
         self._now = max(self._now, fix.t)
         self._last_heard = self._now
         last = self._last_fix
@@ -188,6 +195,10 @@ class TrustWindow:
         if last is not None and fix.t < last:
             return self._late_fix(last)
         self._late = 0
+        has_fix = fix.fix_type >= self._limits.fix_type
+        self._repeats = has_fix and self._plausibility.repeats(fix)
+        if self._repeats:
+            return self.pass_time(fix.t)
         events: tuple[WindowEvent, ...] = ()
         if last is not None and fix.t - last > self._limits.gap:
             self._held.report(Distrust.GPS_GAP, fix.t, bad=True)

@@ -32,6 +32,29 @@ bends by 2 % [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
+class Past:
+    """The antenna's velocity before K epochs, as far as nodes reach (:data:`AROUND_SPAN_S`).
+
+    Attributes:
+        gained: velocity, in the axes of the segment's first node.
+        epoch: (K,) s.
+        R: (K, 3, 3) body axes of the epoch to those of the first node.
+    """
+
+    gained: Gained
+    epoch: Array
+    R: Array
+
+    def changes(self, before: Array) -> Array:
+        """(n, K, 3) by how much it was larger ``before`` (n,) s, body axes of the epochs, m/s."""
+        t = self.epoch - before[:, None]
+        then = self.gained.velocity(t.ravel()).reshape(*t.shape, 3)
+        more = then - self.gained.velocity(self.epoch)
+        out: Array = (more[..., None, :] @ self.R)[..., 0, :]
+        return out
+
+
+@dataclass(frozen=True, slots=True)
 class Around:
     """K epochs and what is around them; all but ``R`` in the body axes of the epochs.
 
@@ -47,6 +70,7 @@ class Around:
             (:mod:`onboard.core.model.response`).
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
             span that it averages, 1/s.
+        past: what the antenna's velocity was before.
         spread: what a receiver makes of accelerations; None if it averages over nothing.
     """
 
@@ -58,6 +82,7 @@ class Around:
     slope: Array
     shapes: Array
     swing: Array
+    past: Past
     spread: Spread | None = None
 
 
@@ -100,6 +125,7 @@ def around(
         own(response.slope()),
         np.moveaxis(own(response.shapes), 0, -1),
         swing,
+        Past(there, epoch, R),
         followed.spread(epoch, R, window, response.apart, shares) if window > 0.0 else None,
     )
 

@@ -65,12 +65,20 @@ class Family:
         instead_of: name of a nuisance that has the same regressors and gives way to this family.
         is_averaged: whether a receiver averages what its acceleration gains; not where that is in
             the response to the linearisation's force already, or a straight line.
+        goes_below: unknowns of every model that are it with the other sign, and may be below
+            their range beside it.
     """
 
     name: str = ""
     instead_of: str = ""
     is_averaged: ClassVar[bool] = True
+    goes_below: ClassVar[tuple[str, ...]] = ()
     unknowns: tuple[Unknown, ...] = ()
+
+    @property
+    def never_negative(self) -> tuple[str, ...]:
+        """Names of unknowns that cannot be negative, by a law of nature."""
+        return ()
 
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
         """True if the recording has the signals that the regressors need."""

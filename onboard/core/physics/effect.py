@@ -130,6 +130,8 @@ class Effect(Family):
             Unknowns that follow are *shapes*: how it acts and not how much.  They are estimated and
             charged for like the sizes, whose sigmas hold them that way, and are not reported.
         plausible: sizes beyond which the explanation is not believed, in the order of ``keys``.
+        positive: none of its sizes can be negative, by a law of nature: what surely has one is
+            something else, and is not said by this name.
         response: how it goes with one signal; None if with no single one.
         tilts_ekf: it changes the offset in flight, which an EKF takes for tilt at first.
         in_proportion: its regressors are those of the force that was measured without it.
@@ -165,6 +167,7 @@ class Effect(Family):
     room_for: ClassVar[tuple[str, ...]] = ()
     changes_force: ClassVar[bool] = False
     of_attitude: ClassVar[bool] = False
+    positive: ClassVar[bool] = False
     in_every_model: ClassVar[tuple[str, ...]] = ()
     least: ClassVar[float | None] = None
     of_flight: ClassVar[bool] = False
@@ -203,6 +206,12 @@ class Effect(Family):
     def take_shapes(self, names: Sequence[str], unit: str, sigma: float) -> None:
         """Take shapes after the sizes, of one unit and with one sigma of the prior about zero."""
         self.unknowns += tuple(Unknown(f"{self.name}_{n}", unit, 0.0, sigma) for n in names)
+
+    @property
+    def never_negative(self) -> tuple[str, ...]:
+        """Names of the sizes, if none of them can be negative."""
+        sizes = self.unknowns[: len(self.keys)]
+        return tuple(u.name for u in sizes) if self.positive else ()
 
     @property
     def shaped(self) -> bool:

@@ -36,7 +36,14 @@ from sitl.builtin.effects.attitude import (
     MountTilt,
 )
 from sitl.builtin.effects.base import Effect, Scene, Vector3
-from sitl.builtin.effects.receiver import ClockSkew, GpsFault, GpsLatency, GpsLeverArm, GpsSmoothing
+from sitl.builtin.effects.receiver import (
+    ClockSkew,
+    GpsFault,
+    GpsLatency,
+    GpsLeverArm,
+    GpsOvershoot,
+    GpsSmoothing,
+)
 from sitl.builtin.effects.vehicle import Gravity, RotorDrag
 
 ALL: tuple[type[Effect], ...] = tuple(
@@ -61,6 +68,7 @@ __all__ = [
     "GpsFault",
     "GpsLatency",
     "GpsLeverArm",
+    "GpsOvershoot",
     "GpsSmoothing",
     "Gravity",
     "HeadingByThrottle",

@@ -22,6 +22,7 @@ class AccelerometerHysteresis(ByAxis):
     """
 
     name: ClassVar[str] = "accelerometer_hysteresis"
+    positive: ClassVar[bool] = True
     units: ClassVar[Mapping[str, Sizes]] = {
         "copter": {"x": 0.05, "y": 0.05, "z": 0.05},
         "plane": {"x": 0.05, "y": 0.05, "z": 0.05},

@@ -32,6 +32,24 @@ class GpsSmoothing(Effect):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GpsOvershoot(Effect):
+    """Velocity comes out of a tracking loop, whose natural frequency is ``1 / sqrt(square)`` rad/s.
+
+    It is late by nothing while the vehicle accelerates steadily.
+    """
+
+    name: ClassVar[str] = "gps_overshoot"
+    units: ClassVar[Mapping[str, Sizes]] = {
+        "copter": {"square": 0.0025},
+        "plane": {"square": 0.0025},
+    }
+    most: ClassVar[float] = 0.0175
+    positive: ClassVar[bool] = True
+    square: float
+    damping: float = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GpsLeverArm(Effect):
     """Antenna from the IMU, body axes, m, which no parameter tells."""
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.candidates import Candidate, accepted, smallest
+from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible, smallest
 from onboard.core.diagnosis.effort import MOST_EFFECTS
 from onboard.core.diagnosis.hypotheses import choose, confounders_of
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.pool import Pool
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
@@ -226,6 +227,43 @@ def test_a_size_that_is_not_to_be_believed_is_not(clear):
     size = abs(after.theta[c.index[0]])
     assert accepted(fitter, before, after, Candidate("a", c.index, (1.01 * size,)))
     assert not accepted(fitter, before, after, Candidate("a", c.index, (0.99 * size,)))
+
+
+def of_sign(sign, **more):
+    """A problem whose effect "a" has a sign, its fits and the candidate."""
+    rng = np.random.default_rng(2)
+    theta = np.concatenate([SIX, np.zeros(sum(WIDTHS.values()))])
+    theta[6] = sign * 1.0
+    problem = drawn(rng, families(), theta)
+    c = replace(candidates(problem)[0], positive=True, **more)
+    fitter = problem.fitter()
+    return fitter, fitter.fit(range(6)), fitter.fit([*range(6), *c.index]), c
+
+
+def test_what_nature_does_not_allow_is_not_believed_and_has_to_be_clearly_more():
+    fitter, before, after, c = of_sign(-1.0)
+    assert not possible(fitter, after, c)
+    assert not believable(fitter, after, c)
+    assert c.merit(fitter, before, after) == c.score(fitter, before, after) - CLEARLY
+    either = replace(c, positive=False)
+    assert believable(fitter, after, either)
+    assert either.merit(fitter, before, after) == either.score(fitter, before, after)
+
+
+def test_the_sign_that_it_may_have_costs_nothing_nor_does_one_that_is_not_sure():
+    fitter, before, after, c = of_sign(1.0)
+    assert believable(fitter, after, c)
+    assert c.merit(fitter, before, after) == c.score(fitter, before, after)
+    fitter, _, after, c = of_sign(-0.02)
+    assert possible(fitter, after, c)
+
+
+def test_what_has_a_name_with_the_other_sign_is_not_taken_with_it():
+    fitter, before, after, c = of_sign(-1.0, mirrored=True)
+    assert not accepted(fitter, before, after, c)
+    assert accepted(fitter, before, after, replace(c, mirrored=False))
+    fitter, before, after, c = of_sign(1.0, mirrored=True)
+    assert accepted(fitter, before, after, c)
 
 
 def test_what_gains_in_one_part_of_the_flight_alone_does_not_hold():

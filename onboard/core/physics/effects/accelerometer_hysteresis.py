@@ -14,6 +14,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.model.quadrature import Signals
 from onboard.core.physics.effect import AXES, Bearing, Effect, Origin
+from onboard.core.physics.octaves import WEIGHTS, sigma_of_shapes
 
 PLAYS = (0.5, 1.0, 2.0)
 """Half-widths of the plays, m/s^2, an octave apart: what lies between two is much like both.  A
@@ -23,18 +24,6 @@ LARGEST = 1.0
 """Half the height of the largest loop that is believed, m/s^2 [assumed]."""
 SHAPES = ("narrow", "ends")
 """Names of the shapes: more of the narrow play than of the wide, more of both than in between."""
-WEIGHTS = np.array(
-    [
-        np.full(3, 1.0) / 3.0,
-        np.array([1.0, 0.0, -1.0]) / math.sqrt(2.0),
-        np.array([1.0, -2.0, 1.0]) / math.sqrt(6.0),
-    ]
-)
-"""(3, 3) weights of the plays by one unit of the half height and of each shape, which add nothing
-to the height and have nothing of each other."""
-SHAPE_SIGMA = LARGEST / math.sqrt(12.0)
-"""Prior of a shape, m/s^2: that of the largest loop if all ways to share it among the plays are
-equally likely [probability]."""
 MOST_TAKEN_BACK = 0.8
 """Share of a rise of the load that its branches may take back again: at one, the reading stands
 still while the load rises, and nothing can tell the load from it [physics]."""
@@ -55,7 +44,9 @@ class AccelerometerHysteresis(Effect):
     three play operators, one for each half-width of :data:`PLAYS`: a play has a follower that the
     load drags along once it is that far away from it, and which remembers its place from segment to
     segment.  The sum of the weights is half the height of the loop; how it is shared among the
-    plays is the loop's shape, an unknown too, so that the height's sigma holds it.
+    plays is the loop's shape, an unknown too, so that the height's sigma holds it.  A loop costs
+    energy each time that it is gone round (second law of thermodynamics), and so is run through one
+    way: the reading is behind, and never ahead.
     """
 
     effect = "accelerometer_hysteresis"
@@ -68,12 +59,14 @@ class AccelerometerHysteresis(Effect):
     cure = "ArduPilot has no parameter for it: replace the sensor"
     apart = "load and unload in turn: steep turns both ways, accelerate and brake, climb and dive"
     changes_force = True
+    positive = True
 
     def __init__(self, origin: Origin) -> None:
         """No reference is needed."""
         super().__init__(origin)
         self.take_axes("m/s^2", LARGEST)
-        self.take_shapes([f"{shape}_{a}" for shape in SHAPES for a in AXES], "m/s^2", SHAPE_SIGMA)
+        shapes = [f"{shape}_{a}" for shape in SHAPES for a in AXES]
+        self.take_shapes(shapes, "m/s^2", sigma_of_shapes(LARGEST))
         self.weights = np.zeros((3, len(PLAYS)))
 
     def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
