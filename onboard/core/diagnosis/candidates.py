@@ -29,7 +29,7 @@ class Candidate:
     ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
     the offsets at one moment; other accelerometers may have been ``witness`` of it.  ``room_for``
     are effects that it is when some of its unknowns are told by the others.  No size of what is
-    ``positive`` can be negative; what it is then is in every model if it is ``mirrored``.
+    ``positive`` can be negative; what it is then may be an unknown of every model (``mirrored``).
     """
 
     effect: str
@@ -41,7 +41,7 @@ class Candidate:
     witness: Witness | None = None
     room_for: tuple[str, ...] = ()
     positive: bool = False
-    mirrored: bool = False
+    mirrored: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> list[int]:
@@ -110,7 +110,7 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
         # What is learned over the whole flight lies in between, and nearer to both.
         return True
-    return _matters(fitter, before, after)
+    return _matters(fitter, before, after) or _missed(fitter, before, c)
 
 
 def believable(fitter: Fitter, after: Fit, c: Candidate) -> bool:
@@ -130,6 +130,19 @@ def possible(fitter: Fitter, after: Fit, c: Candidate) -> bool:
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     sigma = np.sqrt(np.diag(fitter.covariance(after))[c.sizes])
     return bool(np.all(value >= -BEYOND * sigma))
+
+
+def _missed(fitter: Fitter, before: Fit, c: Candidate) -> bool:
+    """Whether what it is with the other sign is surely less than nothing without it.
+
+    No such flight is explained, whatever that changes.
+    """
+    index = [fitter.model.index[name] for name in c.mirrored]
+    if not index:
+        return False
+    value = before.theta[index] - fitter.absent[index]
+    sigma = np.sqrt(np.diag(fitter.covariance(before))[index])
+    return bool(np.any(value < -BEYOND * sigma))
 
 
 def _matters(fitter: Fitter, before: Fit, after: Fit) -> bool:

@@ -205,5 +205,5 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         witness=family.witness if isinstance(family, BiasStep) else None,
         room_for=family.room_for,
         positive=family.positive,
-        mirrored=bool(family.goes_below),
+        mirrored=family.goes_below,
     )

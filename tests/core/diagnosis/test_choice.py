@@ -259,11 +259,28 @@ def test_the_sign_that_it_may_have_costs_nothing_nor_does_one_that_is_not_sure()
 
 
 def test_what_has_a_name_with_the_other_sign_is_not_taken_with_it():
-    fitter, before, after, c = of_sign(-1.0, mirrored=True)
+    fitter, before, after, c = of_sign(-1.0, mirrored=("b_0",))
     assert not accepted(fitter, before, after, c)
-    assert accepted(fitter, before, after, replace(c, mirrored=False))
-    fitter, before, after, c = of_sign(1.0, mirrored=True)
+    assert accepted(fitter, before, after, replace(c, mirrored=()))
+    fitter, before, after, c = of_sign(1.0, mirrored=("b_0",))
     assert accepted(fitter, before, after, c)
+
+
+@pytest.mark.parametrize(("below", "taken"), [(-1.0, True), (1.0, False)])
+def test_without_what_is_mirrored_that_is_not_less_than_nothing(below, taken):
+    """Sure, small, and changing none of the six: what is left out is told by another unknown."""
+    rng = np.random.default_rng(12)
+    theta = np.concatenate([SIX, np.zeros(sum(WIDTHS.values()))])
+    theta[6] = 0.15
+    theta[7] = below
+    problem = drawn(rng, families(), theta, blocks=10, rows=600)
+    fitter, c = problem.fitter(), candidates(problem)[0]
+    beside = [*range(6), *problem.columns("b")]
+    before, after = fitter.fit(beside), fitter.fit([*beside, *c.index])
+    assert c.score(fitter, before, after) > least()
+    assert not accepted(fitter, before, after, c)
+    mirrored = replace(c, positive=True, mirrored=("b_0",))
+    assert accepted(fitter, before, after, mirrored) is taken
 
 
 def test_what_gains_in_one_part_of_the_flight_alone_does_not_hold():
