@@ -19,8 +19,9 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
 from onboard.core.inputs.expected_force import expected, spectrum, white
+from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
-from onboard.core.inputs.spikes import spikes_of
+from onboard.core.inputs.spikes import Spikes, spikes_of
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.finding import Finding
@@ -61,7 +62,7 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     full = _felt(engine, testable, origin.t0, batches)
     spiked = None if rail is not None else spikes_of(batches)
     spikes: Finding | None = None
-    if spiked is not None and _better(engine, full, batches, spiked.batches) > CLEARLY:
+    if spiked is not None and _matter(spiked, batches, full, engine):
         without = _felt(engine, testable, origin.t0, spiked.batches)
         better = 2.0 * (without.log_likelihood - full.log_likelihood)
         if better > CLEARLY:
@@ -84,24 +85,24 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     return Cleared(full, testable, absent, rail, fault, spikes, clipped, sampled)
 
 
-def _better(
-    engine: Engine, full: Examination, as_read: Sequence[Batch], without: Sequence[Batch]
-) -> float:
-    """Twice the logarithm of how much likelier velocities are without some samples, at a glance.
+def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:
+    """Whether velocities seem to be likelier without some samples, at a glance.
 
-    Of the six and the receiver's delay alone, with the noise that was found, and nothing that
-    smooths: a span or an antenna may have been found for the sake of these very samples.
+    That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
+    that smooths: a span or an antenna may have been found for the sake of these very samples.
     """
+    if spikes.walk**2 < WALK_SHARE * full.noise.force_walk**2:
+        return False
     plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     told = []
-    for batches in (without, as_read):
+    for batches in (spikes.batches, as_read):
         t0 = full.point.skew_from
         made = Examination(
             engine, (), t0=t0, batches=batches, start=full, point=plain, traced=False
         )
         made.once()
         told.append(made.log_likelihood)
-    return 2.0 * (told[0] - told[1])
+    return 2.0 * (told[0] - told[1]) > CLEARLY
 
 
 def _felt(

@@ -170,5 +170,7 @@ SPREAD_SAMPLES: Final = 200
 NEAR_SAMPLES: Final = 11
 """Before and after a sample, over which it is seen that vibration has begun or ends: a median of so
 many is known to a third [probability]."""
+WALK_SHARE: Final = 0.1
+"""Of the variance by which the velocity is found to walk: what adds less is in the noise [use]."""
 LEAST_SPREAD_M_S2: Final = 0.01
 """A thousandth of g, which is what telemetry resolves [data sheet]."""

@@ -10,6 +10,7 @@ receiver's velocity says (:mod:`onboard.core.diagnosis.cleared`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,12 +39,14 @@ class Spikes:
         t: (s,) s on the boot clock, in order.
         size: (s,) m/s^2, of the axis on which it is furthest off.
         samples: how many samples the flight has.
+        walk: what they would make the velocity walk by if they were false, m/s/sqrt(s).
         batches: the flight, with what is between their neighbours in their place.
     """
 
     t: Array
     size: Array
     samples: int
+    walk: float
     batches: list[Batch]
 
 
@@ -51,11 +54,11 @@ def spikes_of(batches: Sequence[Batch]) -> Spikes | None:
     """Single samples far from their neighbours; None if there are none."""
     times: list[Array] = []
     sizes: list[Array] = []
-    count = 0
+    count, lasting = 0, 0.0
 
     def between(t: Array, raw: Array) -> Array:
-        nonlocal count
-        count += len(t)
+        nonlocal count, lasting
+        count, lasting = count + len(t), lasting + float(t[-1] - t[0])
         beside = _beside(raw)
         neighbours = beside.mean(axis=0)
         off = raw - np.clip(raw, beside[0], beside[1])
@@ -67,7 +70,12 @@ def spikes_of(batches: Sequence[Batch]) -> Spikes | None:
 
     made = with_samples(batches, between)
     t = np.concatenate(times) if times else np.zeros(0)
-    return Spikes(t, np.concatenate(sizes), count, made) if len(t) else None
+    if not len(t):
+        return None
+    size = np.concatenate(sizes)
+    # Each is a step of the velocity, of its size times the time that a sample stands for.
+    walk = math.sqrt(lasting * float(size @ size)) / count
+    return Spikes(t, size, count, walk, made)
 
 
 def _beside(raw: Array) -> Array:
