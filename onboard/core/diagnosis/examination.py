@@ -106,6 +106,26 @@ class Examination(Engine):
         self.tune()
         return self
 
+    def nuisances(self, found: Solution) -> Array:
+        """(m,) those of the flight if no effect is in it that trades with one of them.
+
+        The linearisation would follow such a trade to and fro from pass to pass.
+        """
+        where = self.model.slices
+        rivals = [
+            i
+            for f in self._own
+            if isinstance(f, Effect) and f.trades
+            for i in range(self.model.size)[where[f.name]]
+        ]
+        if not rivals:
+            return found.theta
+        C, theta = found.covariance, found.theta
+        absent: Array = theta - C[:, rivals] @ np.linalg.solve(
+            C[np.ix_(rivals, rivals)], theta[rivals]
+        )
+        return absent
+
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
         room = sum(len(batch.fixes) for batch in self.batches)
@@ -128,7 +148,7 @@ class Examination(Engine):
         for left in (2, 1, 0):
             self.once(held)
             self._seed = found = solve(self.blocks, self.model)
-            point = self.asked(found.theta)
+            point = self.asked(self.nuisances(found))
             settled = point.near(self.point, WORTH_A_PASS)
             if not left or (settled and not blind):
                 break

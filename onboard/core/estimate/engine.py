@@ -284,7 +284,7 @@ class Engine:
             idle = idle + 1 if search.settled and likely < highest + WORTH_A_SEARCH else 0
             if likely > highest:
                 highest, best = likely, (self.point, self.noise)
-            before, at = at, self.asked(self._seed.theta)
+            before, at = at, self.asked(self.nuisances(self._seed))
             self.noise = search.better(self.noise, likelihoods, made.trades, elsewhere=elsewhere)
             if at.near(before, STEADY) and search.settled:
                 best = at, self.noise
@@ -296,6 +296,10 @@ class Engine:
                 self._move(at, self.noise)
                 ready = Preparations()
         self._move(*best)
+
+    def nuisances(self, found: Solution) -> Array:
+        """(m,) of a solution, as the linearisation is to follow them."""
+        return found.theta
 
     def asked(self, theta: Array, model: Model | None = None) -> Linearisation:
         """The linearisation that a solution ``theta`` (m,) of a model, of its own, asks for."""

@@ -139,6 +139,7 @@ class Effect(Family):
             rest of it matters nothing.
         changes_force: what others in proportion to the force act on is without it.
         of_attitude: it is the recorded attitude that is wrong.
+        trades: it looks much like a nuisance of every model, and one grows with the other.
         in_every_model: its unknowns that are estimated anyway.
         least: size of a timing unknown from which it counts, s; None for what is no timing.
         of_flight: another flight of the vehicle has another size of it, or none.
@@ -169,6 +170,7 @@ class Effect(Family):
     of_attitude: ClassVar[bool] = False
     positive: ClassVar[bool] = False
     in_every_model: ClassVar[tuple[str, ...]] = ()
+    trades: ClassVar[bool] = False
     least: ClassVar[float | None] = None
     of_flight: ClassVar[bool] = False
     excluded: ClassVar[bool] = False

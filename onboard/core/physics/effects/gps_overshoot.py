@@ -47,6 +47,7 @@ class GpsOvershoot(Effect):
     apart = "accelerate and brake hard and often, quickly and slowly"
     positive = True
     goes_below = ("window_squared",)
+    trades = True
     keys = ("square",)
     plausible = (LARGEST,)
 
