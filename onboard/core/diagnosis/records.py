@@ -61,8 +61,9 @@ class Rung:
 class Mismatch:
     """The residual of the six numbers and timing thresholds alone, and after all effects.
 
-    Both are of the same ``fixes``, out of ``believed``: those that were to be used.  ``leaps`` is
-    at how many of them the recorded attitude had leapt against the gyroscope.
+    Both are of the same ``fixes``, out of ``believed``: those that were to be used, or contradict
+    each other.  ``leaps`` is at how many of them the recorded attitude had leapt against the
+    gyroscope.
     """
 
     detected: bool
