@@ -145,9 +145,8 @@ class Accelerometer:
 
 def context_names(imu: int) -> tuple[str, ...]:
     """Parameters that :func:`judge` likes to know besides the six; not every autopilot has them."""
-    group = f"INS_TCAL{imu}_ENABLE" if imu <= 3 else f"INS{imu}_TCAL_ENABLE"
-    caltemp = f"INS_ACC{imu}_CALTEMP" if imu <= 3 else f"INS{imu}_ACC_CALTEMP"
-    return (group, caltemp, ARMING_THRESHOLD_NAME)
+    names = parameter_names(imu)
+    return (f"{names.correction}ENABLE", names.reference, ARMING_THRESHOLD_NAME)
 
 
 def ekf_healthy(flags: int | None) -> bool:

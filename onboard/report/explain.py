@@ -54,8 +54,6 @@ def explain_html(
     Returns:
         One HTML document in UTF-8 without references to anything outside itself.
     """
-    unclear = {n for a in diagnosis.ambiguous for n in a.names}
-    refused = diagnosis.silent
     return render(
         TEMPLATE,
         base,
@@ -65,23 +63,16 @@ def explain_html(
         autopilot=words.autopilot_in_words(autopilot),
         duration=words.fixed(duration_s, 0),
         imu=diagnosis.imu,
-        verdict=diagnosis.verdict.value,
-        silent=refused,
-        split=bool(diagnosis.split),
-        headline=verdict.headline(diagnosis),
-        severity=verdict.severity(diagnosis),
-        dangers=verdict.dangers(diagnosis),
-        missing=verdict.missing(diagnosis),
-        sure=verdict.proof(diagnosis),
+        **_verdict(diagnosis),
         change=verdict.cures(diagnosis, advice),
         remarks=verdict.remarks(diagnosis),
-        to_fly=() if refused else verdict.to_fly(diagnosis),
+        to_fly=() if diagnosis.silent else verdict.to_fly(diagnosis),
         charts=residual_charts.of_flight(diagnosis, duration_s),
         shading=residual_charts.shading(diagnosis),
         fits=_fits(diagnosis),
         where=_places(diagnosis),
         regimes=_regimes(diagnosis),
-        effects=[_card(e, advice, ambiguous=e.name in unclear) for e in diagnosis.effects],
+        effects=_cards(diagnosis, advice),
         ladder=_ladder(diagnosis),
         six=_six(diagnosis),
         status=diagnosis.calibration.status.value,
@@ -90,7 +81,7 @@ def explain_html(
         parameters=() if advice is None else _parameters(diagnosis, advice),
         ambiguous=[([title_of(n) for n in a.names], a.tell_apart) for a in diagnosis.ambiguous],
         not_testable=[(title_of(n.name), n.why) for n in diagnosis.not_testable],
-        unseen=() if refused else _unseen(diagnosis),
+        unseen=() if diagnosis.silent else _unseen(diagnosis),
     )
 
 
@@ -210,6 +201,26 @@ def _where(w: Where) -> str:
     span = f"{words.fixed(w.start_s, 0)} to {words.fixed(w.end_s, 0)} s"
     axis = w.axis.replace("_", " ")
     return f"{span}: {w.regime}, mostly {axis}, {words.percent(w.share)} of the mismatch"
+
+
+def _verdict(diagnosis: Diagnosis) -> dict[str, Any]:
+    """What is said first."""
+    return {
+        "verdict": diagnosis.verdict.value,
+        "silent": diagnosis.silent,
+        "split": bool(diagnosis.split),
+        "headline": verdict.headline(diagnosis),
+        "severity": verdict.severity(diagnosis),
+        "dangers": verdict.dangers(diagnosis),
+        "missing": verdict.missing(diagnosis),
+        "sure": verdict.proof(diagnosis),
+    }
+
+
+def _cards(diagnosis: Diagnosis, advice: Advice | None) -> list[dict[str, Any]]:
+    """One for each effect that was found."""
+    unclear = {n for a in diagnosis.ambiguous for n in a.names}
+    return [_card(e, advice, ambiguous=e.name in unclear) for e in diagnosis.effects]
 
 
 def _card(e: Finding, advice: Advice | None, *, ambiguous: bool) -> dict[str, Any]:

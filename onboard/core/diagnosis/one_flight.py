@@ -98,10 +98,10 @@ def _said(engine: Engine, found: Solution) -> Normal:
     model, point = engine.model, engine.point
     times = [model.index[n] for n in TIMES if n in model.index]
     which = [*times, *range(*antenna_of(model).indices(model.size))]
+    of_square = TIMING_FLOOR_S * 2.0 * max(point.window, TIMING_FLOOR_S)
+    floors = {"window_squared": of_square, "clock_rate": 0.0}
     floor = np.full(len(which), ANTENNA_FLOOR_M)
-    floor[: len(times)] = TIMING_FLOOR_S
-    floor[1] *= 2.0 * max(point.window, TIMING_FLOOR_S)  # of a square
-    floor[3 : len(times)] = 0.0
+    floor[: len(times)] = [floors.get(n, TIMING_FLOOR_S) for n in TIMES if n in model.index]
     unit = model.prior_sigma[which]
     P = (found.covariance[np.ix_(which, which)] + np.diag(floor**2)) / np.outer(unit, unit)
     information = np.linalg.inv(P)

@@ -35,6 +35,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.estimate.shared_windows import SharedWindows
 from onboard.core.estimate.wandering import inflation as inflation_of
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.medians import NORMAL_MEDIAN
 
 ROUNDS = 4
 """The agreed force moves with the estimate: it stands still after two or three rounds [cost]."""
@@ -140,7 +141,7 @@ def relative_of(
         return None
     kept, place = windows, UNKNOWN_PLACE_M
     fit = _Fit(kept, before, prior_sigma, place)
-    spread = np.median(np.abs(fit.residual), axis=0) / 0.6745 + PAIR_NOISE_FLOOR
+    spread = np.median(np.abs(fit.residual), axis=0) / NORMAL_MEDIAN + PAIR_NOISE_FLOOR
     well = np.all(np.abs(fit.residual) < OUTLYING * spread, axis=1)
     if not np.all(well) and int(np.sum(well)) >= FEWEST_WINDOWS:
         kept = windows.where(well)

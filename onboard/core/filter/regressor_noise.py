@@ -12,6 +12,7 @@ import numpy as np
 
 from onboard.core.filter.limits import FEWEST_NOISE_MEANS, NOISE_MEAN_S
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.medians import NORMAL_MEDIAN
 
 
 def sample_noise_density(t: Array, raw: Array) -> Array:
@@ -35,6 +36,8 @@ def sample_noise_density(t: Array, raw: Array) -> Array:
         return np.zeros(3)
     blocks = raw[: count * size].reshape(count, size, 3).mean(axis=1)
     third = np.diff(blocks, n=3, axis=0)
-    sigma = np.median(np.abs(third - np.median(third, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
+    sigma = (
+        np.median(np.abs(third - np.median(third, axis=0)), axis=0) / NORMAL_MEDIAN / np.sqrt(20.0)
+    )
     out: Array = sigma**2 * size * step
     return out

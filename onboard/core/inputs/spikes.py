@@ -26,9 +26,7 @@ from onboard.core.inputs.limits import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
-
-NORMAL_MEDIAN = 0.6745
-"""Median size of what is normally distributed, in sigmas [probability]."""
+from onboard.core.maths.medians import NORMAL_MEDIAN
 
 
 @dataclass(frozen=True, slots=True)

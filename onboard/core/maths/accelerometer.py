@@ -23,12 +23,18 @@ AXES = ("X", "Y", "Z")
 
 @dataclass(frozen=True, slots=True)
 class ParameterNames:
-    """Names of the parameters of one accelerometer and of the gyroscope of the same number."""
+    """Names of the parameters of one accelerometer and of the gyroscope of the same number.
+
+    ``correction`` is what names of its correction for temperature begin with, ``reference`` the
+    temperature that it corrects towards.
+    """
 
     scale: tuple[str, str, str]
     offset: tuple[str, str, str]
     device_id: str
     gyro_id: str
+    correction: str
+    reference: str
 
     @property
     def six(self) -> tuple[str, ...]:
@@ -48,14 +54,18 @@ def parameter_names(imu: int) -> ParameterNames:
     if imu <= 3:
         n = "" if imu == 1 else str(imu)
         scale, offset, device = f"INS_ACC{n}SCAL_", f"INS_ACC{n}OFFS_", f"INS_ACC{n}_ID"
+        correction, reference = f"INS_TCAL{imu}_", f"INS_ACC{imu}_CALTEMP"
     else:
         scale, offset, device = f"INS{imu}_ACCSCAL_", f"INS{imu}_ACCOFFS_", f"INS{imu}_ACC_ID"
+        correction, reference = f"INS{imu}_TCAL_", f"INS{imu}_ACC_CALTEMP"
     x, y, z = AXES
     return ParameterNames(
         scale=(scale + x, scale + y, scale + z),
         offset=(offset + x, offset + y, offset + z),
         device_id=device,
         gyro_id=device.replace("ACC", "GYR"),
+        correction=correction,
+        reference=reference,
     )
 
 

@@ -25,6 +25,7 @@ from itertools import combinations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.medians import MEDIAN_SQUARE
 from onboard.core.vehicle.apart import Apart, apart_of
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import FALSE_ALARM, FEWEST_FLIGHTS
@@ -33,9 +34,6 @@ from onboard.core.vehicle.records import Aside, Compared, VehicleMatch
 from onboard.core.vehicle.said import NOTHING, Key, Said, said_of
 from onboard.core.vehicle.several import of_parts
 from onboard.core.vehicle.wind_record import wind_of
-
-MEDIAN_SQUARE = 0.455
-"""Of chi-square with one degree of freedom [probability]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,9 +58,9 @@ def meanings(values: Mapping[str, float]) -> dict[int, Meaning]:
 
 def corrections(values: Mapping[str, float], imu: int) -> dict[str, float]:
     """Parameters of an accelerometer's correction for temperature, as far as they are reported."""
-    group = f"INS_TCAL{imu}_" if imu <= 3 else f"INS{imu}_TCAL_"
-    reference = f"INS_ACC{imu}_CALTEMP" if imu <= 3 else f"INS{imu}_ACC_CALTEMP"
-    names = [n for n in values if n == reference or n.startswith((f"{group}ACC", f"{group}ENABLE"))]
+    its = parameter_names(imu)
+    begins = f"{its.correction}ACC", f"{its.correction}ENABLE"
+    names = [n for n in values if n == its.reference or n.startswith(begins)]
     return {name: values[name] for name in sorted(names)}
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
+from onboard.core.maths.medians import NORMAL_MEDIAN
 from onboard.core.model.quadrature import Signals
 from onboard.core.physics.effect import AXES, Bearing, Effect, Origin
 from onboard.core.physics.octaves import WEIGHTS, sigma_of_shapes
@@ -27,8 +28,6 @@ SHAPES = ("narrow", "ends")
 MOST_TAKEN_BACK = 0.8
 """Share of a rise of the load that its branches may take back again: at one, the reading stands
 still while the load rises, and nothing can tell the load from it [physics]."""
-NORMAL_MEDIAN = 0.6745
-"""Median size of what is normally distributed, in sigmas [probability]."""
 MOST_NOISE = 0.03 * PLAYS[0]
 """Noise of a reading that drags no follower about, m/s^2: more than that, and a follower rides on
 the peaks, its branch is too small, and the loop would be found too high by some per cent
