@@ -14,6 +14,7 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.excess import excess_in_words, spoils
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
+from onboard.core.diagnosis.flight_constants import inconstant
 from onboard.core.diagnosis.hypotheses import Choice, of_others
 from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
 from onboard.core.diagnosis.nuisance_effects import (
@@ -91,6 +92,7 @@ class Judge:
         )
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
         self.findings = Findings(self.final, evidence.choice, evidence.full.point)
+        self.inconstant = inconstant(self.final)
 
     def diagnosis(self) -> Diagnosis:
         """Everything that is said about the recording."""
@@ -123,6 +125,7 @@ class Judge:
             ambiguous=self._ambiguous(effects),
             not_testable=(*self.absent, *self._too_weak(unseen)),
             unseen=unseen,
+            inconstant=() if verdict is Verdict.INSUFFICIENT else self.inconstant,
             ladder=ladder,
             regimes=regime_residuals(
                 self.final.epochs,
@@ -187,6 +190,7 @@ class Judge:
                 f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
                 "the two is false. " + note
             )
+        note = " ".join([*(f"{c.words}; nothing of it is set." for c in self.inconstant), note])
         left = self.final.solution.contradicts
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
@@ -201,6 +205,8 @@ class Judge:
         if excess := excess_in_words(self.engine.noise):
             note = f"{excess} {note}"
         if spoils(self.engine.noise):
+            return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
+        if self.inconstant and not left:
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
         if effects:
             if left:

@@ -115,6 +115,14 @@ class Unused:
 
 
 @dataclass(frozen=True, slots=True)
+class Inconstant:
+    """What a flight is taken to have one of, and has not: the effect it is a size of, and words."""
+
+    effect: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
 class Unseen:
     """An effect that was looked for and not found, and how large it would have had to be.
 
@@ -188,6 +196,7 @@ class Diagnosis:
     plain: Plain | None = None
     unused: tuple[Unused, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+    inconstant: tuple[Inconstant, ...] = ()
     split: str = ""
 
     @property

@@ -1,0 +1,83 @@
+"""What a flight is taken to have one of, by name: latency, averaging, delay, place of the antenna.
+
+What differs in parts of it (:mod:`onboard.core.diagnosis.constancy`) is told with what it is in
+two of them: nothing that is set or switched for a whole flight may follow from a mean of these.
+"""
+
+from __future__ import annotations
+
+import math
+
+from onboard.core.diagnosis.constancy import Change, Constant, changes
+from onboard.core.diagnosis.final_model import FinalModel
+from onboard.core.diagnosis.limits import ANTENNA_FLOOR_M
+from onboard.core.diagnosis.nuisance_effects import nuisance_kinds
+from onboard.core.diagnosis.records import Inconstant
+from onboard.core.estimate.calibration_model import antenna_of
+from onboard.core.estimate.limits import TIMING_FLOOR_S
+from onboard.core.model.nuisances import ANTENNA_SIGMA
+from onboard.core.physics.effect import AXES
+from onboard.core.physics.effects.gps_latency import GpsLatency
+from onboard.core.physics.effects.gps_lever_arm import CENTIMETRES, SIDES, GpsLeverArm
+from onboard.core.physics.effects.gps_smoothing import GpsSmoothing
+from onboard.core.physics.effects.imu_delay import ImuDelay
+from onboard.core.physics.wording import fixed, places
+
+WHAT = {
+    GpsLatency.effect: "the latency of GPS",
+    GpsSmoothing.effect: "the receiver's averaging",
+    ImuDelay.effect: "the delay of the attitude",
+    GpsLeverArm.effect: "the place of the GPS antenna",
+}
+
+
+def inconstant(final: FinalModel) -> tuple[Inconstant, ...]:
+    """Constants that are not the same in parts of a flight, the most surprising first."""
+    engine = final.engine
+    found = changes(engine.all_blocks, engine.model, constants_of(final))
+    return tuple(Inconstant(c.constant.effect, _in_words(final, c)) for c in found)
+
+
+def constants_of(final: FinalModel) -> list[Constant]:
+    """Timing that is an effect from a size on, and the antenna's place."""
+    window = max(final.engine.point.window, TIMING_FLOOR_S)
+    out = []
+    for name, kind in nuisance_kinds().items():
+        if kind.least is None:
+            continue
+        floor, matters = TIMING_FLOOR_S, kind.least
+        if name == GpsSmoothing.effect:  # of which the square is the unknown
+            floor, matters = 2.0 * window * floor, matters**2
+        out.append(Constant(name, (final.index[kind.in_every_model[0]],), floor, matters))
+    place = tuple(range(final.engine.model.size)[antenna_of(final.engine.model)])
+    return [*out, Constant(GpsLeverArm.effect, place, ANTENNA_FLOOR_M, ANTENNA_SIGMA)]
+
+
+def _in_words(final: FinalModel, change: Change) -> str:
+    """``the latency of GPS is not the same in parts of the flight (100 ms until 120 s, ...)``."""
+    first, second, axis = change.apart
+    a, b = (_value(final, change, part, axis) for part in (first, second))
+    (start, end), (after, last) = (
+        [f"{t - final.origin.t0:.0f}" for t in change.spans[part]] for part in (first, second)
+    )
+    if len(change.spans) == 2:
+        said = f"{a} until {end} s, {b} after"
+    else:
+        said = f"{a} from {start} to {end} s, {b} from {after} to {last} s"
+    return f"{WHAT[change.constant.effect]} is not the same in parts of the flight ({said})"
+
+
+def _value(final: FinalModel, change: Change, part: int, axis: int) -> str:
+    """What a constant is in one part of the flight, with its unit."""
+    point, effect = final.engine.point, change.constant.effect
+    value, sigma = float(change.values[part, axis]), float(change.sigmas[part, axis])
+    if effect == GpsLeverArm.effect:
+        value += float(final.parameters.antenna[axis])
+        side = SIDES[AXES[axis]][value < 0.0]
+        return f"{fixed(abs(value), min(places(sigma), CENTIMETRES))} m {side}"
+    if effect == GpsSmoothing.effect:
+        value = math.sqrt(max(point.window**2 + value, 0.0))
+        sigma /= 2.0 * max(value, math.sqrt(sigma) / 2.0)  # at nothing, the root of the square's
+    else:
+        value += point.delay if effect == GpsLatency.effect else point.attitude_delay
+    return f"{fixed(1e3 * value, places(1e3 * sigma))} ms"
