@@ -120,8 +120,8 @@ def judged(diagnosis: Diagnosis) -> Answer:
             if found
             else "no known effect explains it"
         )
-        if diagnosis.inconstant:
-            missing = "; ".join(c.words for c in diagnosis.inconstant)
+        if changing := [c.words for c in diagnosis.inconstant if not c.modelled]:
+            missing = "; ".join(changing)
         return Answer(_withdrawn(diagnosis, missing), missing)
     bearings = {bearing_of(e.name) for e in suspects}
     if Bearing.NO_ONE_NUMBER in bearings:

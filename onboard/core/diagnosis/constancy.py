@@ -43,6 +43,15 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+class Growth:
+    """How a model lets a number grow: place of the rate, of it what is taken, since when (s)."""
+
+    index: int
+    taken: float
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
 class Constant:
     """What a model takes for one number.
 
@@ -51,12 +60,14 @@ class Constant:
         index: places of its unknowns.
         floor: sigma by which it may differ from part to part all the same, in their unit.
         matters: difference from which it is another one, in their unit.
+        growth: that of the model; None: it is a constant.
     """
 
     effect: str
     index: tuple[int, ...]
     floor: float
     matters: float
+    growth: Growth | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +190,12 @@ class Pieces:
         values = self.theta[own] + asked - back @ step
         return made, values, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
+    def held(self, index: int) -> Self:
+        """The same with an unknown that stays as it is."""
+        N, s = self.N.copy(), self.s.copy()
+        N[:, index], N[:, :, index], s[:, index] = 0.0, 0.0, 0.0
+        return replace(self, N=N, s=s)
+
     def gain(self, index: Sequence[int], floor: float, variance: float) -> tuple[float, int]:
         """What values of its own in each piece gain for a constant: chi-square and its freedom."""
         own, P = list(index), len(self.s)
@@ -233,5 +250,11 @@ def _tried(flight: Pieces, c: Constant, variance: float) -> Change:
         here = surprise(gain, unknowns, len(counts)) if unknowns else -inf
         if here > score:
             best, score = parts, here
+    grown = 0.0
+    if c.growth is not None:
+        middle = np.array(best.spans).mean(axis=1, keepdims=True) - c.growth.since
+        grown = (c.growth.taken + best.theta[c.growth.index]) * middle
+        best = best.held(c.growth.index)
     _, values, sigmas = best.freed(c.index)
+    values = values + grown
     return Change(c, score, best.spans, values, sigmas * sqrt(variance))

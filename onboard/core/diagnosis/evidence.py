@@ -206,7 +206,7 @@ class Judge:
             note = f"{excess} {note}"
         if spoils(self.engine.noise):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
-        if self.inconstant and not left:
+        if not left and any(not c.modelled for c in self.inconstant):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
         if effects:
             if left:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from onboard.core.diagnosis.constancy import Change, Constant, changes
+from onboard.core.diagnosis.constancy import Change, Constant, Growth, changes
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.limits import ANTENNA_FLOOR_M
 from onboard.core.diagnosis.nuisance_effects import nuisance_kinds
@@ -17,6 +17,7 @@ from onboard.core.estimate.calibration_model import antenna_of
 from onboard.core.estimate.limits import TIMING_FLOOR_S
 from onboard.core.model.nuisances import ANTENNA_SIGMA
 from onboard.core.physics.effect import AXES
+from onboard.core.physics.effects.clock_skew import ClockSkew
 from onboard.core.physics.effects.gps_latency import GpsLatency
 from onboard.core.physics.effects.gps_lever_arm import CENTIMETRES, SIDES, GpsLeverArm
 from onboard.core.physics.effects.gps_smoothing import GpsSmoothing
@@ -35,7 +36,9 @@ def inconstant(final: FinalModel) -> tuple[Inconstant, ...]:
     """Constants that are not the same in parts of a flight, the most surprising first."""
     engine = final.engine
     found = changes(engine.all_blocks, engine.model, constants_of(final))
-    return tuple(Inconstant(c.constant.effect, _in_words(final, c)) for c in found)
+    told = [Inconstant(c.constant.effect, _in_words(final, c)) for c in found]
+    grown = [] if any(c.effect == GpsLatency.effect for c in told) else _running_off(final)
+    return (*told, *grown)
 
 
 def constants_of(final: FinalModel) -> list[Constant]:
@@ -48,9 +51,32 @@ def constants_of(final: FinalModel) -> list[Constant]:
         floor, matters = TIMING_FLOOR_S, kind.least
         if name == GpsSmoothing.effect:  # of which the square is the unknown
             floor, matters = 2.0 * window * floor, matters**2
-        out.append(Constant(name, (final.index[kind.in_every_model[0]],), floor, matters))
+        growth = _growth(final) if name == GpsLatency.effect else None
+        index = (final.index[kind.in_every_model[0]],)
+        out.append(Constant(name, index, floor, matters, growth))
     place = tuple(range(final.engine.model.size)[antenna_of(final.engine.model)])
     return [*out, Constant(GpsLeverArm.effect, place, ANTENNA_FLOOR_M, ANTENNA_SIGMA)]
+
+
+def _growth(final: FinalModel) -> Growth | None:
+    """That of the latency, where clocks run at different rates."""
+    name, point = ClockSkew.unknowns[0].name, final.engine.point
+    return Growth(final.index[name], point.skew, point.skew_from) if name in final.index else None
+
+
+def _running_off(final: FinalModel) -> list[Inconstant]:
+    """The latency, where clocks that run at different rates make another one of it in flight."""
+    growth, theta, blocks = _growth(final), final.solution.theta, final.engine.all_blocks
+    if growth is None:
+        return []
+    late = final.engine.point.delay + float(theta[final.index["gps_delay"]])
+    rate = growth.taken + float(theta[growth.index])
+    first, last = (late + rate * (t - growth.since) for t in (blocks[0].start, blocks[-1].end))
+    if abs(last - first) < GpsLatency.least:
+        return []
+    what = f"{WHAT[GpsLatency.effect]} {'grows' if last > first else 'shrinks'}"
+    words = f"{what} from {1e3 * first:.0f} to {1e3 * last:.0f} ms over the flight"
+    return [Inconstant(GpsLatency.effect, words, modelled=True)]
 
 
 def _in_words(final: FinalModel, change: Change) -> str:

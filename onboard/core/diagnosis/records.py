@@ -116,10 +116,14 @@ class Unused:
 
 @dataclass(frozen=True, slots=True)
 class Inconstant:
-    """What a flight is taken to have one of, and has not: the effect it is a size of, and words."""
+    """What a flight is taken to have one of, and has not.
+
+    ``effect`` is what it is a size of; ``modelled`` where the model has how it changes.
+    """
 
     effect: str
     words: str
+    modelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
