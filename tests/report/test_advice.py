@@ -153,7 +153,7 @@ def test_what_is_not_the_same_all_flight_long_is_not_set_and_the_rest_is():
     )
     late = effect(confounders=())
     made = diagnosis(
-        effects=(late, antenna), inconstant=(Inconstant(late.name, words, modelled=True),)
+        effects=(late, antenna), inconstant=(Inconstant(late.name, words, contradicts=False),)
     )
     text = written(made)
     assert "GPS1_DELAY_MS" not in loaded(text)

@@ -12,11 +12,15 @@ the likelihood ratio, too).  With ``v`` the directions in which J is diagonal, `
     g = sum (v s)^2 / (e (V + F^2 e))
 
 is chi-square with as many degrees of freedom as there are directions.  F is what a constant may
-differ by from part to part all the same, V the variance of the noise over what the sums say.  What
-it is, blocks cannot be asked here: what they differ by is in question.  It is taken to be as much
-as the six may have before their flight contradicts itself
-(:data:`~onboard.core.estimate.limits.CONTRADICTION`), times what the residuals have where all
-constants are free in every block.  The best of all partitions counts, charged for their number.
+differ by from part to part all the same.  The best of all partitions counts, charged for their
+number.
+
+*Noise.*  V is its variance over what the sums say.  What it is along a constant, blocks cannot be
+asked: what they differ by is in question.  Two answers serve two ends.  A constant is *doubtful*,
+too much so to be set, where V is what the blocks' scatter has elsewhere, with all constants free in
+every block (the centre of :mod:`onboard.core.estimate.pool`).  The flight *contradicts* its model
+where V is as much as the six may have before they contradict themselves
+(:data:`~onboard.core.estimate.limits.CONTRADICTION`), for on real flights some directions have it.
 
 *One by one.*  A constant that changes bends what others seem to do.  So the most surprising one is
 told, and the others are asked again with it free in every block.
@@ -24,7 +28,7 @@ told, and the others are asked again with it free in every block.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Self
@@ -33,7 +37,8 @@ import numpy as np
 
 from onboard.core.diagnosis.effort import MOST_PARTS
 from onboard.core.diagnosis.score import least, surprise
-from onboard.core.estimate.limits import CONTRADICTION
+from onboard.core.estimate.limits import CONTRADICTION, FEWEST_BLOCKS
+from onboard.core.estimate.scatter import Scatter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, total
 from onboard.core.model.regressors import Model
@@ -80,6 +85,7 @@ class Change:
         spans: start and end of each of P parts, s on the boot clock.
         values: (P, k) what it is there.
         sigmas: (P, k) of these.
+        contradicts: also where the noise is as large as may be believed.
     """
 
     constant: Constant
@@ -87,6 +93,7 @@ class Change:
     spans: tuple[tuple[float, float], ...]
     values: Array
     sigmas: Array
+    contradicts: bool = True
 
     @property
     def apart(self) -> tuple[int, int, int]:
@@ -196,6 +203,17 @@ class Pieces:
         N[:, index], N[:, :, index], s[:, index] = 0.0, 0.0, 0.0
         return replace(self, N=N, s=s)
 
+    def scatter(self, least_variance: float) -> float:
+        """Variance over what the sums say of what the pieces differ by, no less than some."""
+        if len(self.s) < FEWEST_BLOCKS:
+            return least_variance
+        C = np.linalg.inv(self.N.sum(axis=0) + np.diag(self.prior))
+        return Scatter(self, self.s, C).pool(self.prior, least_variance).variance
+
+    def information(self) -> Iterator[tuple[slice, Array]]:
+        """Which pieces, and what they know: (P, m, m), as a scatter asks for it."""
+        yield slice(None), self.N
+
     def gain(self, index: Sequence[int], floor: float, variance: float) -> tuple[float, int]:
         """What values of its own in each piece gain for a constant: chi-square and its freedom."""
         own, P = list(index), len(self.s)
@@ -226,11 +244,16 @@ def changes(
     if len(flight.s) < 2:
         return ()
     loose = flight.freed([i for c in constants for i in c.index])[0]
-    variance = CONTRADICTION * max(1.0, loose.square / max(loose.rows, 1.0))
+    excess = max(1.0, loose.square / max(loose.rows, 1.0))
+    most = CONTRADICTION * excess
+    usual = min(loose.scatter(excess), most)
     out: list[Change] = []
     left, beside = list(constants), flight
     while left:
-        best = max((_tried(beside, c, variance) for c in left), key=lambda change: change.score)
+        tried = [_tried(beside, c, most) for c in left]
+        if max(change.score for change in tried) < least():
+            tried = [replace(_tried(beside, c, usual), contradicts=False) for c in left]
+        best = max(tried, key=lambda change: change.score)
         if best.score < least():
             break
         out.append(best)

@@ -26,6 +26,7 @@ from onboard.core.diagnosis.plain import plain_six
 from onboard.core.diagnosis.records import (
     Ambiguity,
     Diagnosis,
+    Inconstant,
     Mismatch,
     NotTestable,
     Rung,
@@ -92,7 +93,6 @@ class Judge:
         )
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
         self.findings = Findings(self.final, evidence.choice, evidence.full.point)
-        self.inconstant = inconstant(self.final)
 
     def diagnosis(self) -> Diagnosis:
         """Everything that is said about the recording."""
@@ -101,10 +101,13 @@ class Judge:
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
         effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
+        offered = {e.name for e in effects if e.parameters}
+        every = inconstant(self.final)
+        changing = tuple(c for c in every if c.contradicts or c.effect in offered)
         # What was clipped is left out of the fit, and was flown all the same.
         moving = self.engine.moving or self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after, effects, ladder)
-        verdict, note = self._verdict(effects, mismatch, moving=moving)
+        verdict, note = self._verdict(effects, mismatch, changing, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
         others = of_others(self.choice, self.final.origin.t0)
         c = self.calibration
@@ -125,7 +128,7 @@ class Judge:
             ambiguous=self._ambiguous(effects),
             not_testable=(*self.absent, *self._too_weak(unseen)),
             unseen=unseen,
-            inconstant=() if verdict is Verdict.INSUFFICIENT else self.inconstant,
+            inconstant=() if verdict is Verdict.INSUFFICIENT else changing,
             ladder=ladder,
             regimes=regime_residuals(
                 self.final.epochs,
@@ -173,7 +176,12 @@ class Judge:
         )
 
     def _verdict(
-        self, effects: list[Finding], mismatch: Mismatch, *, moving: bool
+        self,
+        effects: list[Finding],
+        mismatch: Mismatch,
+        changing: Sequence[Inconstant],
+        *,
+        moving: bool,
     ) -> tuple[Verdict, str]:
         note = self.calibration.note
         # What a hover shows it shows; that it shows nothing does not mean that nothing is there.
@@ -190,7 +198,7 @@ class Judge:
                 f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
                 "the two is false. " + note
             )
-        note = " ".join([*(f"{c.words}; nothing of it is set." for c in self.inconstant), note])
+        note = " ".join([*(f"{c.words}; nothing of it is set." for c in changing), note])
         left = self.final.solution.contradicts
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
@@ -206,7 +214,7 @@ class Judge:
             note = f"{excess} {note}"
         if spoils(self.engine.noise):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
-        if not left and any(not c.modelled for c in self.inconstant):
+        if not left and any(c.contradicts for c in changing):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
         if effects:
             if left:

@@ -36,7 +36,7 @@ def inconstant(final: FinalModel) -> tuple[Inconstant, ...]:
     """Constants that are not the same in parts of a flight, the most surprising first."""
     engine = final.engine
     found = changes(engine.all_blocks, engine.model, constants_of(final))
-    told = [Inconstant(c.constant.effect, _in_words(final, c)) for c in found]
+    told = [Inconstant(c.constant.effect, _in_words(final, c), c.contradicts) for c in found]
     grown = [] if any(c.effect == GpsLatency.effect for c in told) else _running_off(final)
     return (*told, *grown)
 
@@ -76,7 +76,7 @@ def _running_off(final: FinalModel) -> list[Inconstant]:
         return []
     what = f"{WHAT[GpsLatency.effect]} {'grows' if last > first else 'shrinks'}"
     words = f"{what} from {1e3 * first:.0f} to {1e3 * last:.0f} ms over the flight"
-    return [Inconstant(GpsLatency.effect, words, modelled=True)]
+    return [Inconstant(GpsLatency.effect, words, contradicts=False)]
 
 
 def _in_words(final: FinalModel, change: Change) -> str:
@@ -90,7 +90,8 @@ def _in_words(final: FinalModel, change: Change) -> str:
         said = f"{a} until {end} s, {b} after"
     else:
         said = f"{a} from {start} to {end} s, {b} from {after} to {last} s"
-    return f"{WHAT[change.constant.effect]} is not the same in parts of the flight ({said})"
+    surely = "is not" if change.contradicts else "may not be"
+    return f"{WHAT[change.constant.effect]} {surely} the same in parts of the flight ({said})"
 
 
 def _value(final: FinalModel, change: Change, part: int, axis: int) -> str:

@@ -118,12 +118,13 @@ class Unused:
 class Inconstant:
     """What a flight is taken to have one of, and has not.
 
-    ``effect`` is what it is a size of; ``modelled`` where the model has how it changes.
+    ``effect`` is what it is a size of.  ``contradicts`` if the flight contradicts its model by it:
+    not where the model has how it changes, nor where it is only doubtful that it is the same.
     """
 
     effect: str
     words: str
-    modelled: bool = False
+    contradicts: bool = True
 
 
 @dataclass(frozen=True, slots=True)

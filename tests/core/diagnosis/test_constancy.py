@@ -174,3 +174,9 @@ def test_one_that_steps_where_its_model_lets_it_grow_is_told_as_it_is():
 def test_one_block_says_nothing():
     made = flight(6, late=SHAPES["stepping"])
     assert changes(made.blocks[:1], made.model, asked(made)) == ()
+
+
+def test_between_the_noise_there_is_and_the_noise_there_may_be_it_is_doubtful():
+    """A larger change contradicts, and a smaller one is nothing."""
+    stepping = [flight(8, late=size * SHAPES["stepping"]) for size in (0.0, 0.6, 2.0)]
+    assert [[c.contradicts for c in told(made)] for made in stepping] == [[], [False], [True]]
