@@ -16,27 +16,25 @@ from onboard.core.diagnosis.records import Inconstant
 from onboard.core.estimate.calibration_model import antenna_of
 from onboard.core.estimate.limits import TIMING_FLOOR_S
 from onboard.core.model.nuisances import ANTENNA_SIGMA
+from onboard.core.physics.catalogue import kinds
 from onboard.core.physics.effect import AXES
 from onboard.core.physics.effects.clock_skew import ClockSkew
 from onboard.core.physics.effects.gps_latency import GpsLatency
 from onboard.core.physics.effects.gps_lever_arm import CENTIMETRES, SIDES, GpsLeverArm
 from onboard.core.physics.effects.gps_smoothing import GpsSmoothing
-from onboard.core.physics.effects.imu_delay import ImuDelay
 from onboard.core.physics.wording import fixed, places
-
-WHAT = {
-    GpsLatency.effect: "the latency of GPS",
-    GpsSmoothing.effect: "the receiver's averaging",
-    ImuDelay.effect: "the delay of the attitude",
-    GpsLeverArm.effect: "the place of the GPS antenna",
-}
 
 
 def inconstant(final: FinalModel) -> tuple[Inconstant, ...]:
     """Constants that are not the same in parts of a flight, the most surprising first."""
     engine = final.engine
     found = changes(engine.all_blocks, engine.model, constants_of(final))
-    told = [Inconstant(c.constant.effect, _in_words(final, c), c.contradicts) for c in found]
+    what = {kind.effect: kind.constant for kind in kinds()}
+    told = [
+        Inconstant(effect, _in_words(final, change, what[effect]), change.contradicts)
+        for change in found
+        for effect in (change.constant.effect,)
+    ]
     grown = [] if any(c.effect == GpsLatency.effect for c in told) else _running_off(final)
     return (*told, *grown)
 
@@ -46,7 +44,7 @@ def constants_of(final: FinalModel) -> list[Constant]:
     window = max(final.engine.point.window, TIMING_FLOOR_S)
     out = []
     for name, kind in nuisance_kinds().items():
-        if kind.least is None:
+        if kind.least is None or not kind.constant:
             continue
         floor, matters = TIMING_FLOOR_S, kind.least
         if name == GpsSmoothing.effect:  # of which the square is the unknown
@@ -74,12 +72,12 @@ def _running_off(final: FinalModel) -> list[Inconstant]:
     first, last = (late + rate * (t - growth.since) for t in (blocks[0].start, blocks[-1].end))
     if abs(last - first) < GpsLatency.least:
         return []
-    what = f"{WHAT[GpsLatency.effect]} {'grows' if last > first else 'shrinks'}"
+    what = f"{GpsLatency.constant} {'grows' if last > first else 'shrinks'}"
     words = f"{what} from {1e3 * first:.0f} to {1e3 * last:.0f} ms over the flight"
     return [Inconstant(GpsLatency.effect, words, contradicts=False)]
 
 
-def _in_words(final: FinalModel, change: Change) -> str:
+def _in_words(final: FinalModel, change: Change, what: str) -> str:
     """``the latency of GPS is not the same in parts of the flight (100 ms until 120 s, ...)``."""
     first, second, axis = change.apart
     a, b = (_value(final, change, part, axis) for part in (first, second))
@@ -91,7 +89,7 @@ def _in_words(final: FinalModel, change: Change) -> str:
     else:
         said = f"{a} from {start} to {end} s, {b} from {after} to {last} s"
     surely = "is not" if change.contradicts else "may not be"
-    return f"{WHAT[change.constant.effect]} {surely} the same in parts of the flight ({said})"
+    return f"{what} {surely} the same in parts of the flight ({said})"
 
 
 def _value(final: FinalModel, change: Change, part: int, axis: int) -> str:
