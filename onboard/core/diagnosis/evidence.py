@@ -101,9 +101,9 @@ class Judge:
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
         effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
-        offered = {e.name for e in effects if e.parameters}
         every = inconstant(self.final)
-        changing = tuple(c for c in every if c.contradicts or c.effect in offered)
+        # What contradicts the model bends what else there is to doubt.
+        changing = tuple(c for c in every if c.contradicts) or every
         # What was clipped is left out of the fit, and was flown all the same.
         moving = self.engine.moving or self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after, effects, ladder)
