@@ -162,6 +162,8 @@ def _against(
     The standard is that of the six: what is not the whole truth, could as well be something else,
     is read off from an accelerometer that is not known, or helps next to nothing, is not set.
     """
+    if contradicted := [c.words for c in diagnosis.inconstant if c.effect == effect.name]:
+        return contradicted[0]
     if diagnosis.verdict is not Verdict.EXPLAINED:
         return "what was found does not explain all of the residual"
     confounders = {r.name for r in effect.confounders if r.delta_bic < CLEARLY}

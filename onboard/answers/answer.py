@@ -120,6 +120,8 @@ def judged(diagnosis: Diagnosis) -> Answer:
             if found
             else "no known effect explains it"
         )
+        if changing := [c.words for c in diagnosis.inconstant if c.contradicts]:
+            missing = "; ".join(changing)
         return Answer(_withdrawn(diagnosis, missing), missing)
     bearings = {bearing_of(e.name) for e in suspects}
     if Bearing.NO_ONE_NUMBER in bearings:

@@ -110,6 +110,7 @@ def missing(diagnosis: Diagnosis) -> list[str]:
             ]
         return ["There is too little motion with trusted GPS to say what is missing."]
     said = [sized(e) + "." for e in diagnosis.effects]
+    said += [f"{capital(c.words)}." for c in diagnosis.inconstant]
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
         more = "what is left is more than noise"
         if diagnosis.mismatch.held_out_after <= NOISE:
@@ -245,7 +246,8 @@ def remarks(diagnosis: Diagnosis) -> list[str]:
     """What else there is to say: the other sentences of the note, and what was not used."""
     if diagnosis.split:  # which is the note
         return []
-    out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(SAID_ABOVE)]
+    above = (*SAID_ABOVE, *(capital(c.words) for c in diagnosis.inconstant))
+    out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(above)]
     return out + unused_in_words(diagnosis)
 
 

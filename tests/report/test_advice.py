@@ -9,8 +9,8 @@ import pytest
 
 from onboard.answers.advice import advise
 from onboard.answers.answer import judged
-from onboard.answers.verdict import cures
-from onboard.core.diagnosis.records import Ambiguity, Verdict
+from onboard.answers.verdict import cures, missing, remarks
+from onboard.core.diagnosis.records import Ambiguity, Inconstant, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Confounder, Quantity, ResponseCurve
 from onboard.report.parameters import parameter_text
@@ -141,6 +141,40 @@ def test_no_cure_is_set_while_something_else_is_missing(verdict):
     text = written(diagnosis(verdict=verdict, effects=(TILT,)))
     assert loaded(text) == {}
     assert "does not explain all" in comment(text, "AHRS_TRIM_X")
+
+
+def test_what_is_not_the_same_all_flight_long_is_not_set_and_the_rest_is():
+    words = "the latency of GPS grows from 110 to 210 ms over the flight"
+    antenna = effect(
+        "gps_lever_arm",
+        unknowns={"x": Quantity(0.4, 0.01, "m")},
+        parameters={"GPS1_POS_X": 0.4},
+        confounders=(),
+    )
+    late = effect(confounders=())
+    made = diagnosis(
+        effects=(late, antenna), inconstant=(Inconstant(late.name, words, contradicts=False),)
+    )
+    text = written(made)
+    assert "GPS1_DELAY_MS" not in loaded(text)
+    assert words in comment(text, "GPS1_DELAY_MS")
+    assert loaded(text)["GPS1_POS_X"] == pytest.approx(0.4)
+    constant = written(replace(made, inconstant=()))
+    assert loaded(constant)["GPS1_DELAY_MS"] == pytest.approx(210.0)
+
+
+def test_why_a_flight_whose_constants_change_calibrates_nothing_is_said_once():
+    words = "the latency of GPS is not the same in parts of the flight (80 ms until 9 s, 0 after)"
+    made = diagnosis(
+        verdict=Verdict.PARTLY_EXPLAINED,
+        inconstant=(Inconstant("gps_latency", words),),
+        note=f"{words}; nothing of it is set.",
+    )
+    given = judged(made)
+    assert given.missing == words
+    assert given.calibration.status is Status.INSUFFICIENT
+    told = [*missing(made), *remarks(made)]
+    assert sum(words[1:] in s for s in told) == 1
 
 
 def test_an_older_autopilot_gets_the_names_that_it_has():

@@ -28,3 +28,6 @@ FORGOTTEN_S: Final = 45.0
 """s of flight to either side of a jump that are gone through: a filter that GPS corrects has then
 forgotten nine tenths of what tells it (two simulated copters and planes: 0.95 to 1.00; 0.80 to 0.96
 after 35 s, for the likeliest gyroscope is quiet)."""
+MOST_PARTS: Final = 128
+"""Parts of a flight, at the most, in which its constants are asked to be the same: of 24 minutes
+every block."""

@@ -14,6 +14,7 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.excess import excess_in_words, spoils
 from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
+from onboard.core.diagnosis.flight_constants import inconstant
 from onboard.core.diagnosis.hypotheses import Choice, of_others
 from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
 from onboard.core.diagnosis.nuisance_effects import (
@@ -25,6 +26,7 @@ from onboard.core.diagnosis.plain import plain_six
 from onboard.core.diagnosis.records import (
     Ambiguity,
     Diagnosis,
+    Inconstant,
     Mismatch,
     NotTestable,
     Rung,
@@ -99,10 +101,13 @@ class Judge:
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
         effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
+        every = inconstant(self.final)
+        # What contradicts the model bends what else there is to doubt.
+        changing = tuple(c for c in every if c.contradicts) or every
         # What was clipped is left out of the fit, and was flown all the same.
         moving = self.engine.moving or self.calibrator.engine(self.imu).moving
         mismatch = self._mismatch(before, after, effects, ladder)
-        verdict, note = self._verdict(effects, mismatch, moving=moving)
+        verdict, note = self._verdict(effects, mismatch, changing, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
         others = of_others(self.choice, self.final.origin.t0)
         c = self.calibration
@@ -123,6 +128,7 @@ class Judge:
             ambiguous=self._ambiguous(effects),
             not_testable=(*self.absent, *self._too_weak(unseen)),
             unseen=unseen,
+            inconstant=() if verdict is Verdict.INSUFFICIENT else changing,
             ladder=ladder,
             regimes=regime_residuals(
                 self.final.epochs,
@@ -170,7 +176,12 @@ class Judge:
         )
 
     def _verdict(
-        self, effects: list[Finding], mismatch: Mismatch, *, moving: bool
+        self,
+        effects: list[Finding],
+        mismatch: Mismatch,
+        changing: Sequence[Inconstant],
+        *,
+        moving: bool,
     ) -> tuple[Verdict, str]:
         note = self.calibration.note
         # What a hover shows it shows; that it shows nothing does not mean that nothing is there.
@@ -187,6 +198,7 @@ class Judge:
                 f"{mismatch.fixes} fixes; where it does at more than half, nothing tells which of "
                 "the two is false. " + note
             )
+        note = " ".join([*(f"{c.words}; nothing of it is set." for c in changing), note])
         left = self.final.solution.contradicts
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
@@ -201,6 +213,8 @@ class Judge:
         if excess := excess_in_words(self.engine.noise):
             note = f"{excess} {note}"
         if spoils(self.engine.noise):
+            return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
+        if not left and any(c.contradicts for c in changing):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note
         if effects:
             if left:

@@ -115,6 +115,19 @@ class Unused:
 
 
 @dataclass(frozen=True, slots=True)
+class Inconstant:
+    """What a flight is taken to have one of, and has not.
+
+    ``effect`` is what it is a size of.  ``contradicts`` if the flight contradicts its model by it:
+    not where the model has how it changes, nor where it is only doubtful that it is the same.
+    """
+
+    effect: str
+    words: str
+    contradicts: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Unseen:
     """An effect that was looked for and not found, and how large it would have had to be.
 
@@ -188,6 +201,7 @@ class Diagnosis:
     plain: Plain | None = None
     unused: tuple[Unused, ...] = ()
     unseen: tuple[Unseen, ...] = ()
+    inconstant: tuple[Inconstant, ...] = ()
     split: str = ""
 
     @property

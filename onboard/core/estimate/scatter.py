@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -21,11 +22,19 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, whole
 
 
+class Informed(Protocol):
+    """Parts of a flight, some at a time."""
+
+    def information(self) -> Iterator[tuple[slice, Array]]:
+        """Which parts, and what they know: (b, n, n)."""
+        ...
+
+
 class Scatter:
     """Scores of the blocks of a flight beyond one fit, and what the sums expect of them."""
 
     def __init__(
-        self, blocks: Stacked, scores: Array, inverse: Array, index: list[int] | None = None
+        self, blocks: Informed, scores: Array, inverse: Array, index: list[int] | None = None
     ) -> None:
         """Take what the blocks say, and the fit.
 

@@ -142,6 +142,8 @@ class Effect(Family):
         trades: it looks much like a nuisance of every model, and one grows with the other.
         in_every_model: its unknowns that are estimated anyway.
         least: size of a timing unknown from which it counts, s; None for what is no timing.
+        constant: what it is a size of, in words, where that is one and the same all flight long;
+            empty where nothing is asked of that.
         of_flight: another flight of the vehicle has another size of it, or none.
         excluded: it is seen in the data themselves; what it spoils is left out of the fit.
         named: False for a description without a physical name.
@@ -172,6 +174,7 @@ class Effect(Family):
     in_every_model: ClassVar[tuple[str, ...]] = ()
     trades: ClassVar[bool] = False
     least: ClassVar[float | None] = None
+    constant: ClassVar[str] = ""
     of_flight: ClassVar[bool] = False
     excluded: ClassVar[bool] = False
     named: ClassVar[bool] = True

@@ -25,6 +25,7 @@ class GpsLatency(Effect):
     apart = "accelerate and brake hard, straight ahead"
     in_every_model: ClassVar[tuple[str, ...]] = ("gps_delay",)
     least: ClassVar[float] = 0.05
+    constant = "the latency of GPS"
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:

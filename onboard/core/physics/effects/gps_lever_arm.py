@@ -28,6 +28,7 @@ class GpsLeverArm(Effect):
     meaning = "`x`, `y`, `z`, m forward, right, down, on top of `GPS1_POS_*`"
     bearing = Bearing.BESIDE
     instead_of = "antenna_place"
+    constant = "the place of the GPS antenna"
     source = "rigid body: v_antenna = v + R (w x r)"
     cure = "measure the antenna's place and set GPSn_POS_* of its receiver"
     apart = "pitch, roll and yaw quickly while GPS is good"

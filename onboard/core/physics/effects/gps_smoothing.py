@@ -27,6 +27,7 @@ class GpsSmoothing(Effect):
     apart = "accelerate and brake hard and often; a lever arm needs turns instead"
     in_every_model: ClassVar[tuple[str, ...]] = ("window_squared", *SHAPES)
     least: ClassVar[float] = 0.15
+    constant = "the receiver's averaging"
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:

@@ -25,6 +25,7 @@ class ImuDelay(Effect):
     of_attitude = True
     in_every_model: ClassVar[tuple[str, ...]] = ("attitude_delay",)
     least: ClassVar[float] = 0.03
+    constant = "the delay of the attitude"
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
