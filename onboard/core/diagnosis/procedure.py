@@ -93,7 +93,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         ),
         origin,
         clear.absent,
-        tuple(e for e in (clear.rail, clear.fault, clear.spikes) if e is not None),
+        tuple(e for e in clear.seen if e is not None),
     )
 
 

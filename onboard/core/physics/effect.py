@@ -144,6 +144,7 @@ class Effect(Family):
         least: size of a timing unknown from which it counts, s; None for what is no timing.
         of_flight: another flight of the vehicle has another size of it, or none.
         excluded: it is seen in the data themselves; what it spoils is left out of the fit.
+        treated: what becomes of what is excluded, as part of a sentence.
         named: False for a description without a physical name.
         untestable: why no recording can show it; empty if one can.
         bent_by_clipping: why it cannot be asked for beside clipping; empty if it can.
@@ -174,6 +175,7 @@ class Effect(Family):
     least: ClassVar[float | None] = None
     of_flight: ClassVar[bool] = False
     excluded: ClassVar[bool] = False
+    treated: ClassVar[str] = "those samples were left out of the fit"
     named: ClassVar[bool] = True
     untestable: ClassVar[str] = ""
     bent_by_clipping: ClassVar[str] = ""

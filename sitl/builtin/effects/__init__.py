@@ -15,6 +15,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from sitl.builtin.effects.accelerometer import (
+    AccelerometerResolution,
     AccelerometerSpikes,
     AccelerometerTilt,
     BiasRamp,
@@ -57,6 +58,7 @@ ALL: tuple[type[Effect], ...] = tuple(
 
 __all__ = [
     "ALL",
+    "AccelerometerResolution",
     "AccelerometerSpikes",
     "AccelerometerTilt",
     "BiasRamp",

@@ -223,6 +223,22 @@ class Nameless(ByAxis):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AccelerometerResolution(Effect):
+    """Readings of whole steps, m/s^2, ``cut`` to them ``toward_zero``, ``down`` or ``nearest``."""
+
+    name: ClassVar[str] = "accelerometer_resolution"
+    step: float = 0.1
+    cut: str = "toward_zero"
+    imu: int = 0
+
+    def spoil(self, readings: Array, chance: np.random.Generator) -> Array:  # noqa: ARG002
+        """(n, 3) m/s^2, those that were handed out."""
+        whole = {"toward_zero": np.trunc, "down": np.floor, "nearest": np.rint}[self.cut]
+        out: Array = whole(readings / self.step) * self.step
+        return out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AccelerometerSpikes(Effect):
     """Single readings that a bus has spoiled: ``size`` m/s^2 off on every axis, either way."""
 
