@@ -105,8 +105,15 @@ def choose(
     choice = Choice(fitter, list(base), list(candidates), list(kept))
     while len(choice.chosen) < MOST_EFFECTS:
         step, wide = _with_best_jump(choice, choice.free)
-        offered = [c for c in choice.candidates if c not in choice.chosen]
+        # What others have seen of a jump is evidence once.
+        witnessed = any(c.witness is not None for c in choice.chosen)
+        offered = [
+            c
+            for c in choice.candidates
+            if c not in choice.chosen and not (witnessed and c.witness is not None)
+        ]
         offered += [step] if step is not None else []
+        offered = _likelier_jumps(wide, choice.free, offered)
         before = wide.fit(choice.free)
         best, most = None, least()
         for c in offered:
@@ -173,6 +180,27 @@ def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | 
     return step, stepped(fitter, boundary)
 
 
+def _likelier_jumps(
+    fitter: Fitter, beside: Sequence[int], offered: Sequence[Candidate]
+) -> list[Candidate]:
+    """Candidates without those jumps that are less likely than others at the same moment.
+
+    They have as many unknowns each, so their misfits are compared: scores of what is so large are
+    of the scatter along each one's own columns.  The rarer kind has to be clearly likelier.
+    """
+    rare = [c for c in offered if c.rare]
+    usual = [c for c in offered if c.jump and not c.rare]
+    if not rare or not usual:
+        return list(offered)
+    least_rare, least_usual = (
+        min(fitter.fit([*beside, *c.index], held_out=False).chi2 for c in some)
+        for some in (rare, usual)
+    )
+    clearly = least_usual - least_rare > CLEARLY * max(fitter.pool.variance, 1.0)
+    gone = usual if clearly else rare
+    return [c for c in offered if c not in gone]
+
+
 def _reconsider(choice: Choice) -> None:
     """Drop what is no longer needed, exchange what another one does clearly better."""
     fitter = choice.fitter
@@ -184,8 +212,9 @@ def _reconsider(choice: Choice) -> None:
             choice.chosen.remove(c)
             continue
         better, most = c, c.merit(fitter, before, with_it) + CLEARLY
-        for other in choice.candidates:
-            if other not in choice.chosen:
+        others = [o for o in choice.candidates if o not in choice.chosen]
+        for other in _likelier_jumps(fitter, rest, [c, *others]):
+            if other is not c:
                 after = fitter.fit([*rest, *other.index])
                 its = other.merit(fitter, before, after)
                 if its > most and accepted(fitter, before, after, other):

@@ -123,6 +123,20 @@ class BiasStep(ByAxis):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ScaleStep(ByAxis):
+    """``f_i += c_i f_i`` from ``time`` seconds after the start of the recording on."""
+
+    name: ClassVar[str] = "scale_step"
+    kind: ClassVar[str] = "offset in time"
+    time: float
+
+    def reads_too_much(self, scene: Scene) -> Array:
+        """(n, 3) m/s^2."""
+        out: Array = (scene.elapsed >= self.time)[:, None] * self.sizes * scene.f_b
+        return out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScaleNonlinearity(ByAxis):
     """``f_i += c_i f_i^2 / g``, c in 1/g."""
 
