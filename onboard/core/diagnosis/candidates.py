@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -46,6 +47,10 @@ class Candidate:
     room_for: tuple[str, ...] = ()
     positive: bool = False
     mirrored: tuple[str, ...] = ()
+
+    def new_beside(self, columns: Sequence[int]) -> bool:
+        """Whether none of its columns is among those: no simpler form of it is in."""
+        return not set(self.index) & set(columns)
 
     @property
     def sizes(self) -> list[int]:

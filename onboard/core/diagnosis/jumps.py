@@ -199,6 +199,18 @@ def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasSte
     return np.array(gain) / max(fitter.pool.variance, 1.0)
 
 
+def candidates_of(made: Examination, family: Effect) -> list[Candidate]:
+    """A family of an examination as candidates: simpler forms of it, and all of it."""
+    whole = candidate_of(made, family)
+    return [
+        *(
+            replace(whole, index=whole.index[: len(s.unknowns)], columns=s)
+            for s in family.simpler()
+        ),
+        whole,
+    ]
+
+
 def candidate_of(made: Examination, family: Effect) -> Candidate:
     """A family of an examination as a candidate."""
     jump, of_scale = family.onset is not None, isinstance(family, ScaleStep)

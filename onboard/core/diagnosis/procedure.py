@@ -21,6 +21,7 @@ from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
     candidate_of,
+    candidates_of,
     explains,
     halved,
     jump_near,
@@ -239,5 +240,5 @@ def _chosen(
     fitter = Fitter(full.all_blocks, full.model, full.absent)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    candidates = [candidate_of(full, c) for c in testable]
+    candidates = [c for family in testable for c in candidates_of(full, family)]
     return choose(fitter, base, candidates, [c for c in candidates if c.columns in kept])

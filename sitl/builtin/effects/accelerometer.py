@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from sitl.builtin import rotation
-from sitl.builtin.effects.base import Array, Effect, Scene, Sizes, turned
+from sitl.builtin.effects.base import Array, Effect, Scene, Sizes, Vector3, turned
 from sitl.builtin.trajectory import STANDARD_GRAVITY
 
 
@@ -74,7 +74,7 @@ class AccelerometerTilt(Effect):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemperatureDrift(ByAxis):
-    """``f += (x, y, z) (T - reference)``, m/s^2/K."""
+    """``f += (x, y, z) u + square u^2 + cube u^3``, ``u = T - reference``, m/s^2/K and so on."""
 
     name: ClassVar[str] = "temperature_drift"
     units: ClassVar[Mapping[str, Sizes]] = {
@@ -83,10 +83,14 @@ class TemperatureDrift(ByAxis):
     }
     kind: ClassVar[str] = "offset in time"
     reference: float = 35.0
+    square: Vector3 = (0.0, 0.0, 0.0)
+    cube: Vector3 = (0.0, 0.0, 0.0)
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.temperature - self.reference, self.sizes)
+        u = scene.temperature - self.reference
+        out: Array = np.outer(u, self.sizes) + np.outer(u**2, self.square)
+        return out + np.outer(u**3, self.cube)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
