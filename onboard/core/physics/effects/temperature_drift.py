@@ -147,6 +147,6 @@ class TemperatureDrift(Effect):
 
 def _straight(curve: ResponseCurve) -> bool:
     """Whether a straight line is the curve, by eye, on the axis on which it does most."""
-    y = max((np.nan_to_num(y) for y in curve.y.values()), key=np.ptp)
+    y = max(map(np.nan_to_num, curve.y.values()), key=np.ptp, default=np.zeros(len(curve.x)))
     line = np.polyval(np.polyfit(curve.x, y, 1), curve.x)
     return not np.max(np.abs(y - line)) > STRAIGHT * max(np.ptp(y), MATTERS)
