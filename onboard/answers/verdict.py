@@ -22,6 +22,7 @@ from onboard.core.physics.catalogue import (
     is_named,
     size_of,
     title_of,
+    treated_of,
 )
 from onboard.core.physics.finding import Finding
 from onboard.core.physics.wording import listed
@@ -299,7 +300,7 @@ def strength(delta_bic: float) -> str:
 def surely(effect: Finding, *, ambiguous: bool) -> str:
     """How sure one effect is, as a sentence."""
     if is_excluded(effect.name):
-        return "It is visible in the measurements; those samples were left out of the fit."
+        return f"It is visible in the measurements; {treated_of(effect.name)}."
     text = strength(effect.delta_bic).capitalize()
     before, after = effect.held_out_velocity_before, effect.held_out_velocity_after
     if math.isfinite(before) and math.isfinite(after) and before > 0.0:

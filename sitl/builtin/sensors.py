@@ -26,6 +26,8 @@ RESOLUTION = RANGE / 32768.0
 CRUISE_THROTTLE = 0.4
 VIBE_FLOOR_HZ = 5.0
 VIBE_LEVEL_HZ = 2.0
+SPOILING = (fx.AccelerometerResolution, fx.AccelerometerSpikes)
+"""Effects on what is handed out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +181,9 @@ def _limit(truth: Truth, index: int) -> float:
 
 
 def _spoiled(truth: Truth, index: int, readings: Array, chance: np.random.Generator) -> Array:
-    """(n, 3) what the bus makes of readings."""
+    """(n, 3) what bus and driver make of readings."""
     for effect in truth.effects:
-        if isinstance(effect, fx.AccelerometerSpikes) and _hits(effect.imu, index):
+        if isinstance(effect, SPOILING) and _hits(effect.imu, index):
             readings = effect.spoil(readings, chance)
     return readings
 

@@ -73,6 +73,9 @@ def expected(trajectory, effect):
             return np.outer(elapsed(trajectory), (effect.x, effect.y, effect.z))
         case fx.BiasStep():
             return np.outer(elapsed(trajectory) >= effect.time, (effect.x, effect.y, effect.z))
+        case fx.ScaleStep():
+            later = elapsed(trajectory) >= effect.time
+            return later[:, None] * np.array((effect.x, effect.y, effect.z)) * f
         case fx.ScaleNonlinearity():
             return np.array((effect.x, effect.y, effect.z)) * f**2 / G
         case fx.ThrottleCoupling():
@@ -91,6 +94,7 @@ def expected(trajectory, effect):
         fx.TemperatureDrift(x=0.03, y=-0.02, z=0.025),
         fx.BiasRamp(x=0.002, y=-0.001, z=0.003),
         fx.BiasStep(time=40.0, x=0.2, y=-0.1, z=0.3),
+        fx.ScaleStep(time=40.0, x=0.02, y=-0.01, z=0.03),
         fx.ScaleNonlinearity(x=0.01, y=-0.02, z=0.005),
         fx.ThrottleCoupling(x=0.3, y=-0.2, z=0.4),
         fx.LoadFlex(roll=0.01, pitch=-0.015),

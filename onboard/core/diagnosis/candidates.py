@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -27,8 +28,10 @@ class Candidate:
 
     ``index`` has the sizes first, as many as are ``plausible``; what follows are its shapes.
     ``places`` is at how many it was looked for (a jump's moments).  ``jump`` is True for a jump of
-    the offsets at one moment; other accelerometers may have been ``witness`` of it.  ``room_for``
-    are effects that it is when some of its unknowns are told by the others.  No size of what is
+    the offsets at one moment, or of the scales, that matters from ``worth`` on; other
+    accelerometers may have been ``witness`` of it.  ``room_for``
+    are effects that it is when some of its unknowns are told by the others.  Of two jumps the
+    ``rare`` one is taken where it is clearly likelier.  No size of what is
     ``positive`` can be negative; what it is then may be an unknown of every model (``mirrored``).
     """
 
@@ -38,10 +41,16 @@ class Candidate:
     columns: Effect | None = None
     places: float = 1.0
     jump: bool = False
+    worth: float = MATTERS_OFFSET
+    rare: bool = False
     witness: Witness | None = None
     room_for: tuple[str, ...] = ()
     positive: bool = False
     mirrored: tuple[str, ...] = ()
+
+    def new_beside(self, columns: Sequence[int]) -> bool:
+        """Whether none of its columns is among those: no simpler form of it is in."""
+        return not set(self.index) & set(columns)
 
     @property
     def sizes(self) -> list[int]:
@@ -107,7 +116,7 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     if not _small_enough(fitter, after, c) or (c.mirrored and not possible(fitter, after, c)):
         return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
-    if c.jump and np.max(np.abs(value)) > MATTERS_OFFSET:
+    if c.jump and np.max(np.abs(value)) > c.worth:
         # What is learned over the whole flight lies in between, and nearer to both.
         return True
     return _matters(fitter, before, after) or _missed(fitter, before, c)

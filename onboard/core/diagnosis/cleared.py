@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.coarse_readings import coarse_of
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
 from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
@@ -22,6 +23,7 @@ from onboard.core.inputs.expected_force import expected, spectrum, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
+from onboard.core.model.regressors import Family
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.finding import Finding
@@ -41,8 +43,14 @@ class Cleared:
     rail: Finding | None
     fault: Finding | None
     spikes: Finding | None
+    coarse: Finding | None
     clipped: bool
     sampled: Sequence[Batch]
+
+    @property
+    def seen(self) -> tuple[Finding | None, ...]:
+        """What is seen in the data themselves."""
+        return self.rail, self.fault, self.spikes, self.coarse
 
 
 def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin: Origin) -> Cleared:
@@ -59,11 +67,13 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
         testable = [f for f in testable if not f.bent_by_clipping]
     clipped = rail is not None and batches is flight
-    full = _felt(engine, testable, origin.t0, batches)
+    coarse = coarse_of(batches, calibrator.parameters.six(origin.imu))
+    carried: tuple[Family, ...] = () if coarse is None else (coarse.conversion,)
+    full = _felt(engine, testable, origin.t0, batches, carried)
     spiked = None if rail is not None else spikes_of(batches)
     spikes: Finding | None = None
     if spiked is not None and _matter(spiked, batches, full, engine):
-        without = _felt(engine, testable, origin.t0, spiked.batches)
+        without = _felt(engine, testable, origin.t0, spiked.batches, carried)
         better = 2.0 * (without.log_likelihood - full.log_likelihood)
         if better > CLEARLY:
             full, batches = without, spiked.batches
@@ -79,10 +89,11 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
         if refused is not None:
             fault, batches = None, full.batches
         full = Examination(
-            engine, testable, t0=origin.t0, batches=batches, refused=refused
+            engine, testable, t0=origin.t0, batches=batches, refused=refused, carried=carried
         ).with_noise()
     full.let_epochs_go()
-    return Cleared(full, testable, absent, rail, fault, spikes, clipped, sampled)
+    told = None if coarse is None else coarse.finding
+    return Cleared(full, testable, absent, rail, fault, spikes, told, clipped, sampled)
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:
@@ -106,7 +117,11 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
 
 
 def _felt(
-    engine: Engine, testable: Sequence[Effect], t0: float, batches: Sequence[Batch]
+    engine: Engine,
+    testable: Sequence[Effect],
+    t0: float,
+    batches: Sequence[Batch],
+    carried: Sequence[Family],
 ) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
@@ -114,12 +129,14 @@ def _felt(
     walks by, and the flight is taken as its velocity is likelier.
     """
     density = spectrum(batches)
-    sampled = Examination(engine, testable, t0=t0, batches=batches).with_noise()
+    sampled = Examination(engine, testable, t0=t0, batches=batches, carried=carried).with_noise()
     if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
         return sampled
     noise = np.minimum(white(density), sampled.noise.force_walk**2)
     expecting = expected(batches, density, noise)
-    felt = Examination(engine, testable, t0=t0, batches=expecting, start=sampled).with_noise()
+    felt = Examination(
+        engine, testable, t0=t0, batches=expecting, start=sampled, carried=carried
+    ).with_noise()
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 
 

@@ -269,7 +269,8 @@ class Judge:
 
     def _too_weak(self, unseen: Sequence[Unseen]) -> list[NotTestable]:
         """Effects that this flight could not have shown at any plausible size."""
-        plausible = {c.effect: c for c in self.choice.candidates if c.columns is not None}
+        offered = reversed(self.choice.candidates)  # simpler forms of an effect come first
+        plausible = {c.effect: c for c in offered if c.columns is not None}
         return [
             NotTestable(
                 u.name,

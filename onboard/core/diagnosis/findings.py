@@ -106,6 +106,10 @@ class Findings:
             confounders=self._confounders(f),
             formula=f.formula([quantities[k].value for k in f.keys]),
         )
+        if made.response_curve is not None and f.shaped:
+            C = final.solution.covariance[np.ix_(index, index)]
+            curve = f.bent(made.response_curve, final.solution.theta[index], C)
+            made = replace(made, response_curve=curve)
         if f.onset is None:
             return made
         span = ((f.onset - final.origin.t0, final.engine.blocks[-1].end - final.origin.t0),)

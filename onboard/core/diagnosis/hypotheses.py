@@ -14,7 +14,7 @@ from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
 from onboard.core.diagnosis.limits import CLEARLY
-from onboard.core.diagnosis.score import least
+from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.maths.arrays import Array
@@ -75,7 +75,7 @@ def confounders_of(
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
     own = target.score(fitter, before, with_it)
     nearest: dict[str, Confounder] = {}
-    for other in others:
+    for other in (o for o in others if o.new_beside(rest)):
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
         score = other.score(fitter, before, instead)
         if score < least() or not possible(fitter, instead, other):
@@ -105,8 +105,15 @@ def choose(
     choice = Choice(fitter, list(base), list(candidates), list(kept))
     while len(choice.chosen) < MOST_EFFECTS:
         step, wide = _with_best_jump(choice, choice.free)
-        offered = [c for c in choice.candidates if c not in choice.chosen]
+        # What others have seen of a jump is evidence once.
+        witnessed = any(c.witness is not None for c in choice.chosen)
+        offered = [
+            c
+            for c in choice.candidates
+            if c.new_beside(choice.free) and not (witnessed and c.witness is not None)
+        ]
         offered += [step] if step is not None else []
+        offered = _in_question(wide, choice.free, offered)
         before = wide.fit(choice.free)
         best, most = None, least()
         for c in offered:
@@ -144,7 +151,7 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     better = max(nuisances.score(fitter, before, with_it), least())
     taken: Candidate | None = None
     for other in choice.candidates:
-        if other in choice.chosen or other.effect == nuisances.effect:
+        if not other.new_beside(choice.free) or other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
         score = other.score(fitter, before, after)
@@ -173,6 +180,57 @@ def _with_best_jump(choice: Choice, beside: Sequence[int]) -> tuple[Candidate | 
     return step, stepped(fitter, boundary)
 
 
+def _in_question(
+    fitter: Fitter, beside: Sequence[int], offered: Sequence[Candidate]
+) -> list[Candidate]:
+    """Candidates that no likelier or simpler one stands for."""
+    return _no_needless_curves(fitter, beside, _likelier_jumps(fitter, beside, offered))
+
+
+def _no_needless_curves(
+    fitter: Fitter, beside: Sequence[int], offered: Sequence[Candidate]
+) -> list[Candidate]:
+    """Candidates without curves that explain no more than chance beyond what has fewer unknowns.
+
+    That may be a simpler form of theirs, or another change of the offset: while a sensor warms up,
+    whatever goes with time is some curve over its temperature.
+    """
+    simple = [c for c in offered if c.jump or (c.columns and c.columns.tilts_ekf)]
+    bent = [c for c in simple if any(set(o.index) < set(c.index) for o in simple)]
+    if not bent:
+        return list(offered)
+    chi2 = [fitter.fit([*beside, *c.index], held_out=False).chi2 for c in simple]
+    variance = max(fitter.pool.variance, 1.0)
+
+    def needed(c: Candidate) -> bool:
+        own = chi2[simple.index(c)]
+        more = [(x - own, len(c.index) - len(o.index)) for o, x in zip(simple, chi2, strict=True)]
+        return all(surprise(by, k, variance=variance) >= least() for by, k in more if k > 0)
+
+    return [c for c in offered if c not in bent or needed(c)]
+
+
+def _likelier_jumps(
+    fitter: Fitter, beside: Sequence[int], offered: Sequence[Candidate]
+) -> list[Candidate]:
+    """Candidates without those jumps that are less likely than others at the same moment.
+
+    They have as many unknowns each, so their misfits are compared: scores of what is so large are
+    of the scatter along each one's own columns.  The rarer kind has to be clearly likelier.
+    """
+    rare = [c for c in offered if c.rare]
+    usual = [c for c in offered if c.jump and not c.rare]
+    if not rare or not usual:
+        return list(offered)
+    least_rare, least_usual = (
+        min(fitter.fit([*beside, *c.index], held_out=False).chi2 for c in some)
+        for some in (rare, usual)
+    )
+    clearly = least_usual - least_rare > CLEARLY * max(fitter.pool.variance, 1.0)
+    gone = usual if clearly else rare
+    return [c for c in offered if c not in gone]
+
+
 def _reconsider(choice: Choice) -> None:
     """Drop what is no longer needed, exchange what another one does clearly better."""
     fitter = choice.fitter
@@ -184,8 +242,9 @@ def _reconsider(choice: Choice) -> None:
             choice.chosen.remove(c)
             continue
         better, most = c, c.merit(fitter, before, with_it) + CLEARLY
-        for other in choice.candidates:
-            if other not in choice.chosen:
+        others = [o for o in choice.candidates if o is not c and o.new_beside(rest)]
+        for other in _in_question(fitter, rest, [c, *others]):
+            if other is not c:
                 after = fitter.fit([*rest, *other.index])
                 its = other.merit(fitter, before, after)
                 if its > most and accepted(fitter, before, after, other):
@@ -206,7 +265,7 @@ def _simplify(choice: Choice) -> None:
         better: Candidate | None = None
         most = least()
         for other in choice.candidates:
-            if other in choice.chosen or other.effect not in c.room_for:
+            if not other.new_beside(rest) or other.effect not in c.room_for:
                 continue
             instead = fitter.fit([*rest, *other.index])
             score = other.score(fitter, before, instead)

@@ -17,7 +17,13 @@ from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
 from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, ONCE_MORE, SPACINGS_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SCAN_S
+from onboard.core.diagnosis.limits import (
+    CLEARLY,
+    CONTACT_S,
+    MATTERS_OFFSET,
+    MATTERS_SCALE,
+    SCAN_S,
+)
 from onboard.core.diagnosis.onsets import fitted, gains
 from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.diagnosis.shocks import Shock
@@ -26,6 +32,7 @@ from onboard.core.estimate.pool import Pool
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
+from onboard.core.physics.effects.scale_step import ScaleStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,9 +199,21 @@ def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasSte
     return np.array(gain) / max(fitter.pool.variance, 1.0)
 
 
+def candidates_of(made: Examination, family: Effect) -> list[Candidate]:
+    """A family of an examination as candidates: simpler forms of it, and all of it."""
+    whole = candidate_of(made, family)
+    return [
+        *(
+            replace(whole, index=whole.index[: len(s.unknowns)], columns=s)
+            for s in family.simpler()
+        ),
+        whole,
+    ]
+
+
 def candidate_of(made: Examination, family: Effect) -> Candidate:
     """A family of an examination as a candidate."""
-    jump = family.onset is not None
+    jump, of_scale = family.onset is not None, isinstance(family, ScaleStep)
     return Candidate(
         family.effect,
         tuple(made.indices(family)),
@@ -202,7 +221,9 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         family,
         places=made.trusted_s / SPACINGS_S[0] if jump else 1.0,
         jump=jump,
-        witness=family.witness if isinstance(family, BiasStep) else None,
+        worth=MATTERS_SCALE if of_scale else MATTERS_OFFSET,
+        rare=of_scale,
+        witness=family.witness if isinstance(family, BiasStep | ScaleStep) else None,
         room_for=family.room_for,
         positive=family.positive,
         mirrored=family.goes_below,

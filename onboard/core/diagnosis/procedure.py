@@ -21,6 +21,7 @@ from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
     candidate_of,
+    candidates_of,
     explains,
     halved,
     jump_near,
@@ -42,6 +43,7 @@ from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
+from onboard.core.physics.effects.scale_step import ScaleStep
 
 
 def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
@@ -93,7 +95,7 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         ),
         origin,
         clear.absent,
-        tuple(e for e in (clear.rail, clear.fault, clear.spikes) if e is not None),
+        tuple(e for e in clear.seen if e is not None),
     )
 
 
@@ -141,7 +143,7 @@ def _selected(full: Examination, asked: _Asked, origin: Origin) -> tuple[Examina
     if seen is not None:
         seen = placed(full, seen)
         wide, other = _beside(full, asked.testable, choice, seen)
-        if any(c.columns is seen for c in other.chosen):
+        if any(c.jump for c in other.chosen):
             return wide, other
         if _nobodys(wide, other, seen):
             undecided, full = seen, full.carrying(halved(seen))
@@ -194,8 +196,9 @@ def _with_jump(
 def _beside(
     full: Examination, testable: Sequence[Effect], choice: Choice, jump: BiasStep
 ) -> tuple[Examination, Choice]:
-    """Effects with a jump among those that are compared."""
-    everything = [*testable, jump]
+    """Effects with a jump of the offset, or of the scale, among those that are compared."""
+    scale = ScaleStep(jump.origin).at(jump.moment, jump.onset_sigma, jump.witness)
+    everything = [*testable, jump, scale]
     wide = Examination(full, everything, t0=full.point.skew_from, start=full).tuned()
     # Which change of the offset it is must not be decided by an attitude that it has tilted.
     kept = [c.columns for c in choice.chosen if c.columns and c.columns.of_attitude]
@@ -237,5 +240,5 @@ def _chosen(
     fitter = Fitter(full.all_blocks, full.model, full.absent)
     effects = set(full.indices_of(testable))
     base = [i for i in range(full.model.size) if i not in effects]
-    candidates = [candidate_of(full, c) for c in testable]
+    candidates = [c for family in testable for c in candidates_of(full, family)]
     return choose(fitter, base, candidates, [c for c in candidates if c.columns in kept])

@@ -31,7 +31,7 @@ def testable_of(
         if still:
             absent.append(NotTestable(effect.effect, f"{' and '.join(still)} did not change"))
             continue
-        present.append(effect)
+        present.append(effect.told_by(batches))
     return present, absent
 
 

@@ -75,7 +75,13 @@ def asked_of(choice: Choice) -> tuple[Asked, ...]:
         _asked(choice, c)
         for c in choice.candidates
         if c.columns is not None and not c.jump and not c.columns.of_flight
+        if not _has_simpler(choice, c)
     )
+
+
+def _has_simpler(choice: Choice, c: Candidate) -> bool:
+    """Whether it is asked in a simpler form: flights that show less of it have that, too."""
+    return any(o.effect == c.effect and len(o.index) < len(c.index) for o in choice.candidates)
 
 
 def _asked(choice: Choice, c: Candidate) -> Asked:

@@ -156,6 +156,8 @@ def _likely(
 ) -> Iterator[tuple[Candidate, float, Fit]]:
     """Candidates that could be there beside ``free``, their log odds, and the fits with them."""
     for c in some:
+        if not c.new_beside(free):
+            continue
         columns = [*free, *c.index]
         quick = fitter.fit(columns, held_out=False)
         if log_odds(c.score(fitter, before, quick)) < log(HARDLY):

@@ -85,6 +85,11 @@ def is_excluded(name: str) -> bool:
     return kind is not None and kind.excluded
 
 
+def treated_of(name: str) -> str:
+    """What becomes of what was seen in the data themselves, as part of a sentence."""
+    return (kind_of(name) or Effect).treated
+
+
 def size_of(found: Finding) -> str:
     """The size in a few words; empty where there is nothing finite to say."""
     if not math.isfinite(sum(q.value for q in found.unknowns.values())):

@@ -28,11 +28,12 @@ import numpy as np
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.result import Estimate
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family, Unknown
 from onboard.core.physics import danger
-from onboard.core.physics.finding import Finding, Quantity
+from onboard.core.physics.finding import Finding, Quantity, ResponseCurve
 from onboard.core.physics.response_curves import Response
 from onboard.core.physics.wording import each
 
@@ -146,6 +147,7 @@ class Effect(Family):
             empty where nothing is asked of that.
         of_flight: another flight of the vehicle has another size of it, or none.
         excluded: it is seen in the data themselves; what it spoils is left out of the fit.
+        treated: what becomes of what is excluded, as part of a sentence.
         named: False for a description without a physical name.
         untestable: why no recording can show it; empty if one can.
         bent_by_clipping: why it cannot be asked for beside clipping; empty if it can.
@@ -177,6 +179,7 @@ class Effect(Family):
     constant: ClassVar[str] = ""
     of_flight: ClassVar[bool] = False
     excluded: ClassVar[bool] = False
+    treated: ClassVar[str] = "those samples were left out of the fit"
     named: ClassVar[bool] = True
     untestable: ClassVar[str] = ""
     bent_by_clipping: ClassVar[str] = ""
@@ -233,6 +236,24 @@ class Effect(Family):
             beside: others that change the force, with theirs.
         """
         return self
+
+    def told_by(self, batches: Sequence[Batch]) -> Self:  # noqa: ARG002
+        """The effect with as much of its law as these batches of flight can show."""
+        return self
+
+    def simpler(self) -> tuple[Self, ...]:
+        """Itself with its first unknowns only: hypotheses of their own, simplest first."""
+        return ()
+
+    def bent(self, line: ResponseCurve, theta: Array, covariance: Array) -> ResponseCurve:  # noqa: ARG002
+        """The response with its shapes: ``line`` has the sizes alone.
+
+        Args:
+            line: the curve by the sizes.
+            theta: (k,) its unknowns.
+            covariance: (k, k) of them.
+        """
+        return line
 
     def formula(self, sizes: Sequence[float]) -> str:  # noqa: ARG002 - only nameless ones have one
         """What is written where there is no name; empty otherwise."""

@@ -15,6 +15,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from sitl.builtin.effects.accelerometer import (
+    AccelerometerResolution,
     AccelerometerSpikes,
     AccelerometerTilt,
     BiasRamp,
@@ -24,6 +25,7 @@ from sitl.builtin.effects.accelerometer import (
     Nameless,
     Saturation,
     ScaleNonlinearity,
+    ScaleStep,
     TemperatureDrift,
     ThrottleCoupling,
     VibrationRectification,
@@ -57,6 +59,7 @@ ALL: tuple[type[Effect], ...] = tuple(
 
 __all__ = [
     "ALL",
+    "AccelerometerResolution",
     "AccelerometerSpikes",
     "AccelerometerTilt",
     "BiasRamp",
@@ -80,6 +83,7 @@ __all__ = [
     "RotorDrag",
     "Saturation",
     "ScaleNonlinearity",
+    "ScaleStep",
     "Scene",
     "TemperatureDrift",
     "ThrottleCoupling",

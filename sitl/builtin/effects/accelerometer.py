@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from sitl.builtin import rotation
-from sitl.builtin.effects.base import Array, Effect, Scene, Sizes, turned
+from sitl.builtin.effects.base import Array, Effect, Scene, Sizes, Vector3, turned
 from sitl.builtin.trajectory import STANDARD_GRAVITY
 
 
@@ -74,7 +74,7 @@ class AccelerometerTilt(Effect):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemperatureDrift(ByAxis):
-    """``f += (x, y, z) (T - reference)``, m/s^2/K."""
+    """``f += (x, y, z) u + square u^2 + cube u^3``, ``u = T - reference``, m/s^2/K and so on."""
 
     name: ClassVar[str] = "temperature_drift"
     units: ClassVar[Mapping[str, Sizes]] = {
@@ -83,10 +83,14 @@ class TemperatureDrift(ByAxis):
     }
     kind: ClassVar[str] = "offset in time"
     reference: float = 35.0
+    square: Vector3 = (0.0, 0.0, 0.0)
+    cube: Vector3 = (0.0, 0.0, 0.0)
 
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
-        return np.outer(scene.temperature - self.reference, self.sizes)
+        u = scene.temperature - self.reference
+        out: Array = np.outer(u, self.sizes) + np.outer(u**2, self.square)
+        return out + np.outer(u**3, self.cube)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +124,20 @@ class BiasStep(ByAxis):
     def reads_too_much(self, scene: Scene) -> Array:
         """(n, 3) m/s^2."""
         return np.outer(scene.elapsed >= self.time, self.sizes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScaleStep(ByAxis):
+    """``f_i += c_i f_i`` from ``time`` seconds after the start of the recording on."""
+
+    name: ClassVar[str] = "scale_step"
+    kind: ClassVar[str] = "offset in time"
+    time: float
+
+    def reads_too_much(self, scene: Scene) -> Array:
+        """(n, 3) m/s^2."""
+        out: Array = (scene.elapsed >= self.time)[:, None] * self.sizes * scene.f_b
+        return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,6 +238,22 @@ class Nameless(ByAxis):
             "climb_rate": -scene.trajectory.v_n[:, 2],
         }
         return np.outer(signals[self.term], self.sizes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccelerometerResolution(Effect):
+    """Readings of whole steps, m/s^2, ``cut`` to them ``toward_zero``, ``down`` or ``nearest``."""
+
+    name: ClassVar[str] = "accelerometer_resolution"
+    step: float = 0.1
+    cut: str = "toward_zero"
+    imu: int = 0
+
+    def spoil(self, readings: Array, chance: np.random.Generator) -> Array:  # noqa: ARG002
+        """(n, 3) m/s^2, those that were handed out."""
+        whole = {"toward_zero": np.trunc, "down": np.floor, "nearest": np.rint}[self.cut]
+        out: Array = whole(readings / self.step) * self.step
+        return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,6 +16,7 @@ from onboard.core.physics.catalogue import catalogue, kinds, phrase_of, size_of,
 from onboard.core.physics.effect import STATEMENTS, Bearing, Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.empirical import Empirical
+from onboard.core.physics.effects.scale_step import ScaleStep
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.errors import OnboardError
 from sitl.builtin.effects import ALL
@@ -28,8 +29,8 @@ every = pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.effect)
 def placed(kind):
     """The effect as a candidate: a jump has its moment, a formula its signal."""
     effect = kind(ORIGIN)
-    if isinstance(effect, BiasStep):
-        return effect.at(40.0)
+    if isinstance(effect, BiasStep | ScaleStep):
+        return effect.at(40.0, sigma=0.5)
     if isinstance(effect, Empirical):
         return effect.of("one", "1", lambda nodes: np.ones(nodes.t.shape))
     return effect
@@ -38,7 +39,7 @@ def placed(kind):
 def finding(kind, value, unit="m/s^2"):
     keys = placed(kind).keys or ("x",)
     size = {key: Quantity(value, 0.01 * abs(value), unit) for key in keys}
-    if kind is BiasStep:
+    if kind in {BiasStep, ScaleStep}:
         size["time"] = Quantity(40.0, 0.5, "s")
     return Finding(kind.effect, size, 0.5, -100.0, 2.0, 1.0, {}, kind.cure)
 
@@ -93,7 +94,7 @@ def test_its_unknowns_have_names_units_bounds_and_priors(kind):
     assert set(kind.needs) <= set(SLOW_SIGNALS)
 
 
-@pytest.mark.parametrize("kind", [BiasStep, Empirical])
+@pytest.mark.parametrize("kind", [BiasStep, ScaleStep, Empirical])
 def test_what_has_no_moment_and_no_formula_yet_is_in_no_model(kind):
     with pytest.raises(OnboardError, match=kind.effect):
         Model([kind(ORIGIN)])
