@@ -14,7 +14,7 @@ from onboard.core.diagnosis.effort import FORGOTTEN_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.diagnosis.shocks import Shock
-from onboard.core.diagnosis.stepped import known_without, places_of
+from onboard.core.diagnosis.stepped import places_of
 from onboard.core.estimate.engine import Engine
 from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.sums import NormalSums
@@ -63,8 +63,7 @@ def fitted(
             late.append(block)
         else:
             made.batches.append(batch)
-    # Gates and attitude follow what is known without the jumps: no epoch solves for all of them.
-    made.once(known_without(full, made.model))
+    made.once()
     sums = [total(made.blocks)] if made.blocks else []
     for blocks, after in ((early, False), (late, True)):
         if blocks:
