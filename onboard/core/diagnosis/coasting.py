@@ -27,6 +27,7 @@ from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELO
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import EpochTrace, Traces
+from onboard.core.filter.uncertainty import Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.maths.arrays import Array
@@ -61,13 +62,15 @@ class AskingFilter(WhiteningFilter):
         super().__init__(unknowns, (levels,), uses)
         self.asked: list[Asked] = []
 
-    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> WhitenedInnovations | None:
+    def update(
+        self, epoch: Epoch, theta: Array, uncertainty: Uncertainty
+    ) -> WhitenedInnovations | None:
         """As ever; a fix that is not to be believed is compared before."""
-        expected = None if epoch.trusted else self.expected_velocity(epoch, theta, covariance)
+        expected = None if epoch.trusted else self.expected_velocity(epoch, theta, uncertainty)
         if expected is not None:
             innovation, spread = expected
             self.asked.append(Asked(epoch.t, innovation[:2], spread[:2, :2]))
-        return super().update(epoch, theta, covariance)
+        return super().update(epoch, theta, uncertainty)
 
 
 def contradictions(

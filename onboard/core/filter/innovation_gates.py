@@ -30,6 +30,7 @@ from onboard.core.filter.limits import (
     TAIL,
 )
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.uncertainty import Uncertainty
 from onboard.core.maths.arrays import Array
 
 GATES = (
@@ -38,27 +39,27 @@ GATES = (
 )
 
 
-def _nis(r: Array, h: Array, C: Array) -> float:
+def _nis(r: Array, h: Array, C: Uncertainty) -> float:
     """Normalised innovation squared of whitened ``r`` (n,), the estimate's uncertainty included."""
-    return float(r @ np.linalg.solve(np.eye(len(r)) + h @ C @ h.T, r))
+    return float(r @ np.linalg.solve(np.eye(len(r)) + C.along(h), r))
 
 
-def _nis_of_any_receiver(E: Array, theta: Array, C: Array, whitener: Array) -> float:
+def _nis_of_any_receiver(E: Array, theta: Array, C: Uncertainty, whitener: Array) -> float:
     """The same of velocities (n), for a receiver that errs as much as a good one may.
 
     Args:
         E: (n, m + 1) innovations and their regressors, not whitened.
         theta: (m,) estimate.
-        C: (m, m) covariance of it.
+        C: how well it is known.
         whitener: (n, n) of them.
     """
     r, D = E[:, 0] - E[:, 1:] @ theta, E[:, 1:]
     root = np.linalg.inv(whitener)
-    S = root @ root.T + D @ C @ D.T + RECEIVER_M_S**2 * np.eye(len(r))
+    S = root @ root.T + C.along(D) + RECEIVER_M_S**2 * np.eye(len(r))
     return float(r @ np.linalg.solve(S, r))
 
 
-def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float]:
+def tails(kinds: str, innovations: Array, h: Array, C: Uncertainty) -> dict[str, float]:
     """By what factor the variance of a kind of measurement is larger than it is taken for.
 
     Args:
@@ -66,7 +67,7 @@ def tails(kinds: str, innovations: Array, h: Array, C: Array) -> dict[str, float
             :mod:`~onboard.core.filter.readings`.
         innovations: (r,) whitened, at the estimate.
         h: (r, m) their regressors.
-        C: (m, m) covariance of the estimate.
+        C: how well the estimate is known.
 
     Returns:
         By kind, what is in the tail of its distribution (:data:`~onboard.core.filter.limits.TAIL`).
@@ -131,7 +132,7 @@ class InnovationGates:
         y: Array,
         h: Array,
         theta: Array,
-        C: Array,
+        C: Uncertainty,
         whitener: Array,
         *,
         velocity: str | None = None,
@@ -146,7 +147,7 @@ class InnovationGates:
             y: (r,) whitened innovations at ``theta = 0``.
             h: (r, m) their regressors.
             theta: (m,) estimate.
-            C: (m, m) covariance of it.
+            C: how well it is known.
             whitener: (r, r) what innovations are multiplied by to be white.
             velocity: which gate refuses it, where that is known, empty for none; None: judge it.
 

@@ -15,6 +15,7 @@ from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
+from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -66,7 +67,9 @@ class Pass:
         self._information = np.diag(1.0 / model.prior_sigma**2)
         self._prior_b = self._information @ model.prior
         self.theta = model.prior.copy() if theta is None else theta
-        self.covariance = np.diag(model.prior_sigma**2) if covariance is None else covariance
+        self.uncertainty: Uncertainty = Covariance(
+            np.diag(model.prior_sigma**2) if covariance is None else covariance
+        )
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
         self.trades = np.zeros((len(bank), len(bank)))
@@ -97,7 +100,7 @@ class Pass:
 
     def hold(self, theta: Array, covariance: Array) -> None:
         """Gates and feedback follow this estimate (m,), (m, m) until :meth:`release`."""
-        self.theta, self.covariance, self._held = theta, covariance, True
+        self.theta, self.uncertainty, self._held = theta, Covariance(covariance), True
 
     def release(self) -> None:
         """From now on gates and feedback follow the pass's own sums."""
@@ -201,7 +204,7 @@ class Pass:
         """Take what an epoch measured, whatever it is."""
         if self.uses.recorded_attitude:
             self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
-        made = self.filter.update(epoch, self.theta, self.covariance)
+        made = self.filter.update(epoch, self.theta, self.uncertainty)
         result.epochs += 1
         if made is None:
             return
@@ -270,8 +273,9 @@ class Pass:
         if self._held or self._since_solve < self._due(self._epochs):
             return
         self._since_solve = 0
-        self.covariance = np.linalg.inv(self.sums.N[0] + block.N[0] + self._information)
-        self.theta = self.covariance @ (self.sums.b[0] + block.b[0] + self._prior_b)
+        known = self.sums.N[0] + block.N[0] + self._information
+        self.theta = np.linalg.solve(known, self.sums.b[0] + block.b[0] + self._prior_b)
+        self.uncertainty = Information(known)
 
     def _state(self, made: WhitenedInnovations) -> EpochState:
         innovation = np.full(3, np.nan)

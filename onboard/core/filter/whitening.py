@@ -45,6 +45,7 @@ from onboard.core.filter.readings import kinds_of, reading
 from onboard.core.filter.refused import Refused
 from onboard.core.filter.smooth_error import moved
 from onboard.core.filter.state import ATT, BIAS, CH, MEASURED, PSI, RATE, STATES, H, V
+from onboard.core.filter.uncertainty import Uncertainty
 from onboard.core.filter.variances import Variances
 from onboard.core.filter.whitened import nothing, whitened
 from onboard.core.maths.arrays import Array
@@ -203,13 +204,15 @@ class WhiteningFilter:
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
         self.t += T
 
-    def update(self, epoch: Epoch, theta: Array, covariance: Array) -> WhitenedInnovations | None:
+    def update(
+        self, epoch: Epoch, theta: Array, uncertainty: Uncertainty
+    ) -> WhitenedInnovations | None:
         """Take an epoch's measurements, without those that a gate refuses.
 
         Args:
             epoch: the measurements.
             theta: (m,) current estimate, for gates and for the attitude's correction.
-            covariance: (m, m) of it.
+            uncertainty: how well it is known.
 
         Returns:
             None if there was nothing to take and nothing to refuse.
@@ -234,11 +237,11 @@ class WhiteningFilter:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                 known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
                 refusal = self.gates.judge(
-                    epoch.t, kinds, made.E, y, h, theta, covariance, made.whitener, velocity=known
+                    epoch.t, kinds, made.E, y, h, theta, uncertainty, made.whitener, velocity=known
                 )
             if refusal is None:
                 if self.gates is not None:
-                    wider = tails(kinds, y - h @ theta, h, covariance)
+                    wider = tails(kinds, y - h @ theta, h, uncertainty)
                     refused += [_SET_ANEW[k] for k, x in wider.items() if x > ANEW.get(k, np.inf)]
                     made = self._widened(made, z, kinds, white, wider)
                 self._take(made, kinds, theta)
@@ -304,14 +307,14 @@ class WhiteningFilter:
         return out
 
     def expected_velocity(
-        self, epoch: Epoch, theta: Array, covariance: Array
+        self, epoch: Epoch, theta: Array, uncertainty: Uncertainty
     ) -> tuple[Array, Array] | None:
         """Compare an epoch's velocity with dead reckoning, without taking it.
 
         Args:
             epoch: the measurement, to be believed or not.
             theta: (m,) current estimate.
-            covariance: (m, m) of it.
+            uncertainty: how well it is known.
 
         Returns:
             Innovation (v,), NED, m/s, and its covariance (v, v), all uncertainty included; None
@@ -327,7 +330,7 @@ class WhiteningFilter:
         noise = np.diag(white[0, read.first])
         S = noise - PH[:, read.first] - PH[:, read.second]
         D = E[:, 1:]
-        return E[:, 0] - D @ theta, S + D @ covariance @ D.T
+        return E[:, 0] - D @ theta, S + uncertainty.along(D)
 
     def _measured(self, epoch: Epoch, theta: Array) -> Array:
         turned = _NOT_TURNED

@@ -18,6 +18,7 @@ from onboard.core.filter.limits import (
     TAIL,
 )
 from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.uncertainty import Covariance
 from onboard.core.maths.chi_square import survival
 
 LEVELS = NoiseLevels(velocity=0.1, velocity_colour=0.05)
@@ -29,7 +30,7 @@ def judged(gates, t, kinds, y, h=None, C=None, sigma=10.0):
     h = np.zeros((len(y), 2)) if h is None else h
     E = sigma * np.column_stack([y, h])
     C = np.zeros((2, 2)) if C is None else C
-    return gates.judge(t, kinds, E, y, h, NONE, C, np.eye(len(y)) / sigma)
+    return gates.judge(t, kinds, E, y, h, NONE, Covariance(C), np.eye(len(y)) / sigma)
 
 
 @pytest.mark.parametrize(("kinds", "name"), [("vvv", "velocity"), ("h", "height")])
@@ -68,7 +69,8 @@ def test_a_velocity_is_a_fault_only_if_no_good_receiver_errs_so(sigma, uncertain
         y = np.array([0.6, -0.8, 0.0]) * off / sigma
         E = sigma * np.column_stack([y, h])
         gates = InnovationGates(LEVELS)
-        assert gates.judge(0.0, "vvv", E, y, h, np.zeros(3), C, np.eye(3) / sigma) == refused
+        verdict = gates.judge(0.0, "vvv", E, y, h, np.zeros(3), Covariance(C), np.eye(3) / sigma)
+        assert verdict == refused
 
 
 def test_the_limits_have_the_probabilities_that_are_claimed():
@@ -88,7 +90,7 @@ def test_an_uncertain_estimate_widens_the_gate():
 
 
 def test_what_is_in_the_tail_is_brought_to_its_edge():
-    h, C = np.zeros((7, 2)), np.zeros((2, 2))
+    h, C = np.zeros((7, 2)), Covariance(np.zeros((2, 2)))
     y = np.array([0.0, 6.0, 0.0, 5.0, 3.0, 4.0, 9.0])
     wider = tails("vvvhtty", y, h, C)
     # So much more variance makes the normalised square that of the edge.
@@ -99,7 +101,7 @@ def test_what_is_in_the_tail_is_brought_to_its_edge():
         "y": pytest.approx(81.0 / TAIL[1]),
     }
     assert tails("vvvhtty", 0.2 * y, h, C) == {}
-    assert tails("h", y[3:4], np.eye(1, 2), 10.0 * np.eye(2)) == {}
+    assert tails("h", y[3:4], np.eye(1, 2), Covariance(10.0 * np.eye(2))) == {}
 
 
 def test_the_first_impossible_kind_is_named():

@@ -6,6 +6,7 @@ import pytest
 from onboard.core.filter.innovation_gates import GATE_VELOCITY, InnovationGates
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.refused import Refused
+from onboard.core.filter.uncertainty import Covariance
 from onboard.core.model.linearisation import Linearisation
 
 
@@ -24,7 +25,8 @@ def judged(y, velocity):
     made = InnovationGates(NoiseLevels())
     E, h = np.column_stack([y, np.zeros(3)]), np.zeros((3, 1))
     none = np.zeros(1)
-    return made.judge(0.0, "vvv", E, y, h, none, np.zeros((1, 1)), np.eye(3), velocity=velocity)
+    known = Covariance(np.zeros((1, 1)))
+    return made.judge(0.0, "vvv", E, y, h, none, known, np.eye(3), velocity=velocity)
 
 
 def test_what_is_known_is_not_judged():

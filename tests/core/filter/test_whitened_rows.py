@@ -9,6 +9,7 @@ from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S
 from onboard.core.filter.noise import ESTIMATED, NoiseLevels
 from onboard.core.filter.passes import Pass
+from onboard.core.filter.uncertainty import Covariance
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.compiling import prefer_compiled
@@ -237,7 +238,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], np.zeros((3, 1)))
         step = steps(np.array([T]), *(x[None] for x in integrals))[0]
         filter_.predict(step, theta, 0.0)
-        made = filter_.update(epoch((k + 1) * T), theta, np.zeros((1, 1)))
+        made = filter_.update(epoch((k + 1) * T), theta, Covariance(np.zeros((1, 1))))
         out.append(made.y[0] - made.h[0] @ theta)
     return np.array(out)
 
