@@ -39,6 +39,7 @@ from onboard.push.entries import (
     ReadBack,
     Recovery,
     Refused,
+    Replaced,
     Result,
     Undoing,
     Watched,
@@ -49,6 +50,8 @@ LARGEST = 64_000_000
 """bytes; compaction keeps the file near a megabyte."""
 LONGEST_LINE = 1_000_000
 """bytes; the longest entry has a few thousand."""
+_REMARKS = Watched | Found | Refused | Replaced
+"""Entries that neither begin a transaction nor move it."""
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -142,7 +145,7 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
-        if self._size > self._limit and isinstance(entry, Closed | Watched | Found | Refused):
+        if self._size > self._limit and isinstance(entry, Closed | _REMARKS):
             self._compact()
 
     def recover(self) -> tuple[Recovery, ...]:
@@ -192,6 +195,14 @@ class Journal:
                 written = [*(p for p in written if p.purpose is Purpose.PUSH), planned]
         return written
 
+    def last_pushed(self, imu: int) -> Planned | None:
+        """The last push that was completed, also where it was rolled back since."""
+        return next((p for p in self._written(imu) if p.purpose is Purpose.PUSH), None)
+
+    def replaced(self) -> frozenset[str]:
+        """Transactions whose values are others now, by somebody else's doing."""
+        return frozenset(e.transaction for _, e in self._lines if isinstance(e, Replaced))
+
     def refusals(self) -> dict[int, str]:
         """Accelerometers that are held back until a person approves, and why."""
         last = {e.imu: e.sentence for _, e in self._lines if isinstance(e, Refused)}
@@ -216,7 +227,7 @@ class Journal:
         for _, entry in self._lines:
             if isinstance(entry, Closed):
                 order.pop(entry.transaction, None)
-            elif not isinstance(entry, Watched | Found | Refused):
+            elif not isinstance(entry, _REMARKS):
                 order.setdefault(entry.transaction)
         return list(order)
 

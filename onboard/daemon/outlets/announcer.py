@@ -60,6 +60,8 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "push_interrupted": Line(ERROR, "{imu} write interrupted", "push {imu}"),
         "push_other_vehicle": Line(ERROR, "open write is of another vehicle", "push {imu}"),
         "push_not_stored": Line(WARNING, "{imu} written values are gone, undoing", "push {imu}"),
+        "push_gone": Line(WARNING, "{imu} old values are there again", "push {imu}"),
+        "push_mixed": Line(WARNING, "{imu} old and new values mixed", "push {imu}"),
         "push_resumed": Line(WARNING, "{imu} interrupted write taken up", "push {imu}"),
         "push_kept": Line(INFO, "new calibration flew well"),
         "push_worse": Line(WARNING, "new calibration flew worse, going back"),

@@ -14,6 +14,7 @@ import msgspec
 
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
+from onboard.daemon.pushing.aftercare import ASKED
 from onboard.daemon.pushing.duties import Duties
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals, named
@@ -34,7 +35,7 @@ from onboard.mavlink.autopilot import (
 from onboard.mavlink.decode import is_armed, is_autopilot
 from onboard.mavlink.dialect import Message
 from onboard.push.course import TransactionSettings
-from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
+from onboard.push.entries import INTERRUPTED, Planned, Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.policy import VehicleCondition
 from onboard.push.signals import (
@@ -74,6 +75,7 @@ class Pusher:
         self._in_flight_since: float | None = None
         self._report = VehicleReport()
         self._condition = VehicleCondition()
+        self._parameters: Mapping[str, float] = {}
         self._duties = Duties(ledger, proposals, witness, notices)
         self._closing = False
         self.idle = self._writer.idle
@@ -98,6 +100,9 @@ class Pusher:
 
     def start(self, system: int, component: int, now: float) -> None:  # noqa: ARG002 - the participants' signature
         """An autopilot is there (again): open transactions may be taken up, pushes have to show."""
+        if self._writer.target != (system, component):
+            self._parameters = {}
+            self._duties.aftercare.another()
         self._writer.target = (system, component)
         self._ledger.system_id = system
         self._duties.begin()
@@ -121,8 +126,10 @@ class Pusher:
         """What happens to the autopilot in the middle of a transaction."""
         match event:
             case AutopilotRebooted():
+                self._duties.aftercare.rebooted(self._parameters, busy=self.busy)
                 self._ended(self._writer.tell(Rebooted(), now), now)
             case AutopilotSilent() | AutopilotFound():
+                self._duties.aftercare.silent()
                 self._ended(self._writer.tell(LinkLost(), now), now)
             case RivalHeard(armed=True):
                 self._heard_armed(True, now)  # noqa: FBT003 - of whomever: it may be the real one
@@ -156,8 +163,10 @@ class Pusher:
         """
         self._condition = condition
         self._flight = learned.flight
+        self._parameters = parameters
         if board != self._ledger.board:
             self._ledger.board = board
+            self._duties.aftercare.another()
             self._read_ledger()
         report = VehicleReport.of(condition)
         if report != self._report:
@@ -175,7 +184,8 @@ class Pusher:
         )
         if self.busy or self._closing or self._proposals.forbidden:
             return
-        self._duties.audit(parameters, parameters.keys() if confirmed is None else confirmed)
+        if self._duties.look(parameters, parameters.keys() if confirmed is None else confirmed):
+            self._read_ledger()
         self._start_what_is_due(now)
 
     def judge(self, verdicts: Sequence[Watched]) -> None:
@@ -195,7 +205,8 @@ class Pusher:
         Raises:
             RefusedError: there is no push in force, or now is not the moment.
         """
-        in_force = self._ledger.all_in_force()
+        in_force, mixed = self._in_force(), self._duties.aftercare.mixed
+        in_force |= {imu: pushed for imu in mixed if (pushed := self._ledger.last_pushed(imu))}
         chosen = [imu for imu in imus or in_force if imu in in_force]
         if not chosen:
             raise RefusedError("no push is in force that could be rolled back")
@@ -210,7 +221,10 @@ class Pusher:
             raise RefusedError(against)
         imu = chosen[0]
         self._proposals.refuse(imu, "a person rolled the last push back")
-        self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
+        if imu in mixed:
+            self._resume(mixed[imu], now)
+        else:
+            self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
     def view(self) -> PushView:
@@ -222,7 +236,13 @@ class Pusher:
             transaction=self._writer.transaction,
             last=self.last_outcome,
             judged=tuple(self._witness.judged.values()),
+            in_force=self._in_force(),
+            lost=self._duties.aftercare.lost.keys(),
+            mixed=self._duties.aftercare.mixed.keys(),
         )
+
+    def _in_force(self) -> dict[int, Planned]:
+        return self._ledger.all_in_force(self._parameters, self._proposals.writing)
 
     def stop(self, sentence: str, now: float) -> None:
         """Have a transaction under way undone."""
@@ -284,9 +304,10 @@ class Pusher:
         if self._writer.target is None:
             return
         self._counts["resumed"] += 1
-        what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
-        text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
-        self._notices.post("push_resumed", text, warning=True)
+        if recovery.sentence == INTERRUPTED:  # of all others it was said before
+            what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
+            text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
+            self._notices.post("push_resumed", text, warning=True)
         self._in_flight_since = None
         self._run(
             PushTransaction.resume(
@@ -309,13 +330,14 @@ class Pusher:
         self._proposals.writing = None
         self.last_outcome = outcome
         self._counts[f"outcome_{outcome.result.value}"] += 1
+        asked = outcome.result is Result.ROLLED_BACK and outcome.sentence.startswith(ASKED)
+        kind = f"{outcome.purpose.value}_{outcome.result.value}"
+        well = asked or outcome.result is Result.COMPLETED
         self._notices.post(
-            f"{outcome.purpose.value}_{outcome.result.value}",
-            told(outcome),
-            warning=outcome.result is not Result.COMPLETED,
+            "roll_back_completed" if asked else kind, told(outcome), warning=not well
         )
         imu = outcome.plan.imu
-        if outcome.result is Result.COMPLETED:
+        if well:
             self._proposals.succeeded(imu, [outcome.values[n] for n in outcome.plan.names])
         else:
             changed = outcome.reason is Reason.CHANGED_BY_OTHER
