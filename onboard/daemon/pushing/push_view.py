@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.proposals import Proposals, approvable
+from onboard.daemon.pushing.people import approvable
+from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
 from onboard.daemon.view.state import WAITING
 from onboard.daemon.view.written import written_view

@@ -17,7 +17,8 @@ from onboard.daemon.learning.learner import Learned
 from onboard.daemon.pushing.aftercare import ASKED
 from onboard.daemon.pushing.duties import Duties
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.proposals import Proposals, named
+from onboard.daemon.pushing.people import named
+from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.push_view import push_view, told
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.pushing.writer import Writer
@@ -220,7 +221,6 @@ class Pusher:
         if against:
             raise RefusedError(against)
         imu = chosen[0]
-        self._proposals.refuse(imu, "a person rolled the last push back")
         if imu in mixed:
             self._resume(mixed[imu], now)
         else:
@@ -308,6 +308,9 @@ class Pusher:
             what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
             text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
             self._notices.post("push_resumed", text, warning=True)
+        elif recovery.sentence == ASKED:
+            text = f"IMU {recovery.plan.imu}: roll-back begins"
+            self._notices.post("roll_back_begins", text)
         self._in_flight_since = None
         self._run(
             PushTransaction.resume(
@@ -339,6 +342,9 @@ class Pusher:
         imu = outcome.plan.imu
         if well:
             self._proposals.succeeded(imu, [outcome.values[n] for n in outcome.plan.names])
+            back = asked or outcome.purpose is Purpose.ROLL_BACK
+            if back and imu not in self._ledger.condemned:  # of those it was said why
+                self._proposals.refuse(imu, "a person rolled the last push back")
         else:
             changed = outcome.reason is Reason.CHANGED_BY_OTHER
             self._proposals.failed(imu, now, changed_by_other=changed)
