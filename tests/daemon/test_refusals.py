@@ -133,3 +133,32 @@ async def test_a_roll_back_that_comes_to_nothing_refuses_nothing(document, daemo
         assert both(service) == set()
         assert "refused" not in held_back(service)
         assert service.parts.journal.refusals() == {}
+
+
+async def test_of_a_silent_autopilot_nothing_is_rolled_back(document, daemon, port, caplog):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED)
+            await until(lambda: both(service) == {1})
+            await until(lambda: service.snapshot().push.state == "idle")
+            vehicle.stop_talking()
+            await until(lambda: service.snapshot().link.state == "silent")
+            for _ in range(2):
+                with pytest.raises(RefusedError, match="the autopilot is silent"):
+                    await service.rollback((1,))
+            assert service.snapshot().push.active_imu is None
+        assert "left open" not in caplog.text
+
+
+async def test_on_stop_only_what_was_written_is_said_to_be_left_open(
+    document, daemon, port, caplog, monkeypatch
+):
+    monkeypatch.setattr("onboard.daemon.process.limits.FINISH_PUSH_S", 0.05)
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED)
+            await until(lambda: both(service) == {1})
+            vehicle.stop_talking()
+            vehicle.parameters.clear()  # it answers nothing
+            await service.rollback((1,))
+        assert "left open" not in caplog.text

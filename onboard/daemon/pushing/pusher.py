@@ -78,7 +78,7 @@ class Pusher:
         self._condition = VehicleCondition()
         self._parameters: Mapping[str, float] = {}
         self._duties = Duties(ledger, proposals, witness, notices)
-        self._closing = False
+        self._closing = self._silent = False
         self.idle = self._writer.idle
         self._read_ledger()
 
@@ -105,6 +105,7 @@ class Pusher:
             self._parameters = {}
             self._duties.aftercare.another()
         self._writer.target = (system, component)
+        self._condition, self._silent = VehicleCondition(), False
         self._ledger.system_id = system
         self._duties.begin()
         self._read_ledger()
@@ -130,6 +131,7 @@ class Pusher:
                 self._duties.aftercare.rebooted(self._parameters, busy=self.busy)
                 self._ended(self._writer.tell(Rebooted(), now), now)
             case AutopilotSilent() | AutopilotFound():
+                self._silent = isinstance(event, AutopilotSilent)
                 self._duties.aftercare.silent()
                 self._ended(self._writer.tell(LinkLost(), now), now)
             case RivalHeard(armed=True):
@@ -215,6 +217,8 @@ class Pusher:
             raise RefusedError(f"pushes of {named(chosen)} are in force: one at a time")
         if self._writer.target is None or self._proposals.forbidden:
             raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
+        if self._silent:
+            raise RefusedError("the autopilot is silent: nothing can be rolled back now")
         if self.busy or self._duties.unfinished:
             raise RefusedError("another transaction is under way")
         against = self._duties.against(self._condition)
