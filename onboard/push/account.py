@@ -105,6 +105,8 @@ def _next(watched: Watched | None, *, in_force: bool) -> str:
         return "Nothing: somebody has changed the parameters since."
     if not in_force:
         return "Nothing: other values are in force since, or it was rolled back."
+    if verdict is Verdict.DOUBTED and watched is not None:
+        return f"Fly again, the next flight is asked anew. The values are {watched.sentence}."
     if verdict is Verdict.KEPT and watched is not None:
         return f"Nothing: the next flight confirms the new values ({watched.sentence})."
     return "Fly again, anything, for two minutes or more: that flight checks the new values."

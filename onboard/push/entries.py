@@ -42,9 +42,10 @@ class Purpose(Enum):
 
 
 class Verdict(Enum):
-    """What the flight after a push said."""
+    """What the flight after a push said; after ``DOUBTED`` the next one is asked, too."""
 
     KEPT = "kept"
+    DOUBTED = "doubted"
     WORSE = "worse"
     SUPERSEDED = "superseded"
 

@@ -64,6 +64,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "push_mixed": Line(WARNING, "{imu} old and new values mixed", "push {imu}"),
         "push_resumed": Line(WARNING, "{imu} interrupted write taken up", "push {imu}"),
         "push_kept": Line(INFO, "new calibration flew well"),
+        "push_doubted": Line(WARNING, "calibration does not fit this flight"),
         "push_worse": Line(WARNING, "new calibration flew worse, going back"),
         "roll_back_begins": Line(NOTICE, "{imu} rolling back", "push {imu}"),
         "roll_back_completed": Line(NOTICE, "{imu} rolled back", "push {imu}"),

@@ -64,7 +64,8 @@ class Duties:
         if not busy:
             self._ledger.read_open()
         for imu, planned, verdict in self._ledger.judged():
-            if planned is not None and verdict is None:
+            doubted = verdict is not None and verdict.verdict is Verdict.DOUBTED
+            if planned is not None and (verdict is None or doubted):
                 self._witness.watch(planned, in_flight_since=in_flight_since)
                 continue
             self._witness.drop(imu)
@@ -79,7 +80,7 @@ class Duties:
             self._notices.post(
                 f"push_{verdict.verdict.value}",
                 f"the flight after the push: {verdict.sentence}",
-                warning=verdict.verdict is Verdict.WORSE,
+                warning=verdict.verdict in {Verdict.WORSE, Verdict.DOUBTED},
             )
         return bool(verdicts)
 
