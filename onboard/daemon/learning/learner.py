@@ -135,7 +135,7 @@ class Learner:
         """
         before, self._identity = self._identity, there
         self._examiner.autopilot, self._examiner.board = there.autopilot, there.board
-        same = before is not None and bool(there.board) and there == before
+        same = before is not None and there.surely(before)
         # Of another board, for all that is known, nothing holds any more.
         values = carried(self._calibrator.parameters) if same or before is None else {}
         values |= {parameter.name: parameter.value for parameter in told if matters(parameter.name)}
@@ -146,7 +146,7 @@ class Learner:
         if maybe:
             self._end_in_the_air()
             self._kept.wait_beside(calibrator)
-        if before != there:
+        if before != there and not same:
             if before is not None:
                 self._shelve(before)
             loaded = self._take_from_shelf(calibrator)
