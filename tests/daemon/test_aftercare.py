@@ -124,7 +124,11 @@ def test_what_cannot_be_told_apart_is_asked(bench, how):
     assert bench.care.lost == {}
     assert bench.care.mixed[1].transaction == "a"
     bench.look(MIXED)
-    assert len(bench.notices.kept) == 1
+    bench.silence()
+    bench.reboot()
+    bench.look(MIXED)
+    assert len(bench.notices.kept) == 1, "it is told once"
+    assert 1 in bench.care.mixed
     bench.look(WANTED)
     assert bench.care.mixed == {}
     assert bench.ours

@@ -209,7 +209,7 @@ class Aftercare:
     def _ask(self, imu: int) -> None:
         """Old and new values: lost, or somebody's will."""
         pushed = self._ledger.last_pushed(imu)
-        if pushed is None:
+        if pushed is None or imu in self._mixed:  # that was said
             return
         self._mixed[imu] = Recovery(
             pushed.transaction,
