@@ -199,7 +199,9 @@ class Examiner:
         if alone.missing or alone.diagnosis.verdict is Verdict.INSUFFICIENT:
             return given, -math.inf
         by = math.hypot(*(jump.unknowns[axis].value for axis in "xyz"))
-        frozen.changed[imu] = f"it has changed by {by:.2g} m/s² between two flights, on the ground"
+        frozen.changed[imu] = (
+            f"it has changed by {by:.2g} m/s² between two flights, on the ground: see to its mount"
+        )
         return alone, since
 
     def _document(self, flight: Calibrator, found: Diagnosis, since: float) -> msgspec.Struct:

@@ -289,7 +289,7 @@ class Learner:
         self._calibrator.begin_anew(imu)
         self._calibrated.pop(imu, None)
         self._stale = self._urgent = True
-        self._tell("begun_anew", f"IMU {imu}: learning anew, {why}")
+        self._tell("begun_anew", f"IMU {imu}: learning anew, {why}", warning=True)
 
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what was said; a flight that says nothing takes nothing away."""
