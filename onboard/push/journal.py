@@ -42,6 +42,7 @@ from onboard.push.entries import (
     Replaced,
     Result,
     Undoing,
+    Verdict,
     Watched,
 )
 
@@ -84,6 +85,8 @@ class Journal:
         self._limit = limit_bytes
         self._keep = keep
         self._lines: list[tuple[float, Entry]] = []
+        self._last: dict[int, list[Planned]] = {}
+        self._others: frozenset[str] | None = None
         self._encoder = msgspec.json.Encoder()
         self._decoder = msgspec.json.Decoder(Entry)
         self.damaged = 0
@@ -145,6 +148,7 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
+        self._changed()
         if self._size > self._limit and isinstance(entry, Closed | _REMARKS):
             self._compact()
 
@@ -173,6 +177,16 @@ class Journal:
         return written[-1] if written else None
 
     def _written(self, imu: int) -> list[Planned]:
+        """:meth:`_gathered`, which is asked for every second, from the lines as they are."""
+        if imu not in self._last:
+            self._last[imu] = self._gathered(imu)
+        return self._last[imu]
+
+    def _changed(self) -> None:
+        self._last.clear()
+        self._others = None
+
+    def _gathered(self, imu: int) -> list[Planned]:
         """The last push that was completed, and the way back from it if there was one.
 
         Of either nothing is left once it has come to another end: an audit found that it did not
@@ -200,8 +214,15 @@ class Journal:
         return next((p for p in self._written(imu) if p.purpose is Purpose.PUSH), None)
 
     def replaced(self) -> frozenset[str]:
-        """Transactions whose values are others now, by somebody else's doing."""
-        return frozenset(e.transaction for _, e in self._lines if isinstance(e, Replaced))
+        """Transactions whose values are others now, as was seen or as a flight has told."""
+        if self._others is None:
+            self._others = frozenset(
+                e.transaction
+                for _, e in self._lines
+                if isinstance(e, Replaced)
+                or (isinstance(e, Watched) and e.verdict is Verdict.SUPERSEDED)
+            )
+        return self._others
 
     def refusals(self) -> dict[int, str]:
         """Accelerometers that are held back until a person approves, and why."""
@@ -342,6 +363,7 @@ class Journal:
             return
         os.close(self._fd)
         self._fd, self._size, self._lines, self.damaged = fd, len(data), lines, 0
+        self._changed()
         self._torn = False
         with contextlib.suppress(OSError):  # either file is whole, whichever survives
             _sync_directory(self._path.parent)

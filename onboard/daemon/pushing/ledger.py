@@ -89,11 +89,7 @@ class Ledger:
 
         It is not any more once somebody else has set values, as was seen or a flight has told.
         """
-        theirs = self._journal.replaced() | {
-            e.transaction
-            for _, e in self.entries
-            if isinstance(e, Watched) and e.verdict is Verdict.SUPERSEDED
-        }
+        theirs = self._journal.replaced()
         written = {imu: self._here(self._journal.last_written(imu)) for imu in IMUS}
         return {
             imu: planned
