@@ -18,6 +18,7 @@ and a wrong heading are in every model: they are worth knowing and forbid nothin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -89,19 +90,22 @@ class FlightAnswer:
     why: str = ""
 
 
-def answer(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Answer:
+def answer(
+    calibrator: Calibrator, imu: int, *, latest: bool = False, since: float = -math.inf
+) -> Answer:
     """Diagnose a flight and say what may be believed.
 
     Args:
         calibrator: has the flight; it stays as it is.
         imu: which accelerometer.
         latest: only what is kept since the boot clock last began.
+        since: with ``latest``: only what was flown from this time of that clock on, s.
 
     Raises:
         KeyError: that accelerometer has not been seen, or no flight of it was processed.
         ArithmeticError, LookupError, ValueError: numbers that no model fits.
     """
-    return judged(diagnose(calibrator, imu, latest=latest))
+    return judged(diagnose(calibrator, imu, latest=latest, since=since))
 
 
 def judged(diagnosis: Diagnosis) -> Answer:

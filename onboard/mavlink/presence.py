@@ -110,6 +110,14 @@ class Presence:
             for claim in self._claims
         )
 
+    def others(self, now: float) -> tuple[int, ...]:
+        """System ids of other autopilots that were heard these seconds."""
+        pinned = self._pinned
+        if pinned is None:
+            return ()
+        live = (claim for claim in self._claims if now - claim.heard <= limits.TWIN_S)
+        return tuple(sorted({claim.source[0] for claim in live} - {pinned.source[0]}))
+
     def hear(
         self, source: Source, way: Way, message: Message | None, boot: float | None, now: float
     ) -> Heard:

@@ -13,6 +13,10 @@ from onboard.push.plan import Change, PushPlan
 
 FREE_S = 10
 """s without GPS over which a velocity residual grows: that of the estimates' residuals."""
+MIXED = (
+    "Look at the values: some are those from before, lost or set by somebody. "
+    "A roll-back puts the others back, too."
+)
 AXES = {"X": "x", "Y": "y", "Z": "z"}
 
 
@@ -26,19 +30,22 @@ class Account:
     next: str
 
 
-def account(plan: PushPlan, watched: Watched | None, *, in_force: bool) -> Account:
+def account(
+    plan: PushPlan, watched: Watched | None, *, in_force: bool, mixed: bool = False
+) -> Account:
     """Of a push that was completed.
 
     Args:
         plan: what was written, and what that was expected to bring.
         watched: what the flight after it said; None if there was none.
-        in_force: nothing has been written since, and it was not taken back.
+        in_force: it is the last one, and its values are there.
+        mixed: the autopilot has some of these values, and some of those from before.
     """
     return Account(
         wrong=_wrong(plan.changes),
         written=_written(plan.changes),
         improved=_improved(plan, watched),
-        next=_next(watched, in_force=in_force),
+        next=MIXED if mixed else _next(watched, in_force=in_force),
     )
 
 
@@ -97,7 +104,9 @@ def _next(watched: Watched | None, *, in_force: bool) -> str:
     if verdict is Verdict.SUPERSEDED:
         return "Nothing: somebody has changed the parameters since."
     if not in_force:
-        return "Nothing: other values have been written since, or it was rolled back."
+        return "Nothing: other values are in force since, or it was rolled back."
+    if verdict is Verdict.DOUBTED and watched is not None:
+        return f"Fly again, the next flight is asked anew. The values are {watched.sentence}."
     if verdict is Verdict.KEPT and watched is not None:
         return f"Nothing: the next flight confirms the new values ({watched.sentence})."
     return "Fly again, anything, for two minutes or more: that flight checks the new values."

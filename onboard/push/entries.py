@@ -15,6 +15,9 @@ from msgspec import Struct
 
 from onboard.push.plan import PushPlan
 
+INTERRUPTED = "the transaction had been interrupted"
+NOT_STORED = "the autopilot had not stored it"
+
 
 class Result(Enum):
     """How a transaction ended.
@@ -39,9 +42,10 @@ class Purpose(Enum):
 
 
 class Verdict(Enum):
-    """What the flight after a push said."""
+    """What the flight after a push said; after ``DOUBTED`` the next one is asked, too."""
 
     KEPT = "kept"
+    DOUBTED = "doubted"
     WORSE = "worse"
     SUPERSEDED = "superseded"
 
@@ -148,7 +152,19 @@ class Refused(Struct, frozen=True, tag="refused"):
     sentence: str
 
 
-Entry: TypeAlias = Planned | Writing | ReadBack | Undoing | Closed | Watched | Found | Refused
+class Replaced(Struct, frozen=True, tag="replaced"):
+    """The values that a completed transaction had left are others now, and not by our doing.
+
+    From then on nobody looks whether they last: they are somebody else's.
+    """
+
+    transaction: str
+    sentence: str
+
+
+Entry: TypeAlias = (
+    Planned | Writing | ReadBack | Undoing | Closed | Watched | Found | Refused | Replaced
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +172,7 @@ class Recovery:
     """An open transaction as the journal knows it.
 
     ``undo``: a roll-back had begun and is to be carried on.  ``confirmed``: names that were
-    read back with their wanted value and announced as stored.
+    read back with their wanted value and announced as stored.  ``sentence``: why it is taken up.
     """
 
     transaction: str
@@ -164,6 +180,7 @@ class Recovery:
     purpose: Purpose
     undo: bool
     confirmed: frozenset[str]
+    sentence: str = INTERRUPTED
 
     @property
     def all_confirmed(self) -> bool:
@@ -171,23 +188,57 @@ class Recovery:
         return all(c.name in self.confirmed for c in self.plan.changes if c.differs)
 
 
+class Remains(Enum):
+    """What is left of the six values that a transaction has written.
+
+    ``WHOLE``: all.  ``MIXED``: some, the others are those of before.  ``GONE``: all are those of
+    before.  ``OTHERS``: somebody has set values that are neither.
+    """
+
+    WHOLE = "whole"
+    MIXED = "mixed"
+    GONE = "gone"
+    OTHERS = "others"
+
+
+def remains(plan: PushPlan, values: Mapping[str, float]) -> Remains | None:
+    """What is left of a plan that was written; None where not all six values are known.
+
+    Args:
+        plan: what was written.
+        values: the autopilot's parameters by name.
+    """
+    if not all(name in values for name in plan.names):
+        return None
+    if any(values[c.name] not in {c.before, c.wanted} for c in plan.changes):
+        return Remains.OTHERS
+    there = {values[c.name] == c.wanted for c in plan.changes if c.differs}
+    if False not in there:
+        return Remains.WHOLE
+    return Remains.MIXED if True in there else Remains.GONE
+
+
 def audit(completed: Planned, values: Mapping[str, float]) -> Recovery | None:
-    """What a completed push, or roll-back, needs after a reboot of the autopilot, None if nothing.
+    """What a completed push, or roll-back, needs that a boot of the autopilot has lost, or None.
 
     That a value is *stored* cannot be proved over MAVLink: the announcement "stored" and a
-    (duplicated, late) answer to a read look alike.  So after each boot compare: where any of
+    (duplicated, late) answer to a read look alike.  So after a boot compare: where any of
     the six came back old, the push is to be undone, as a transaction that had been
     interrupted (which only writes it down where all six are old).  Where somebody else has
-    set values meanwhile, nothing is touched.
+    set values meanwhile, nothing is touched.  Whether it was the boot that brought the old ones
+    back is for the caller to know.
 
     Args:
         completed: what was written last (:meth:`onboard.push.journal.Journal.last_written`).
         values: the autopilot's parameters by name, read after the boot.
     """
-    changes = [c for c in completed.plan.changes if c.differs]
-    known = all(values.get(c.name) in {c.before, c.wanted} for c in changes)
-    if not known or all(values.get(c.name) == c.wanted for c in changes):
+    if remains(completed.plan, values) not in {Remains.MIXED, Remains.GONE}:
         return None
     return Recovery(
-        completed.transaction, completed.plan, completed.purpose, undo=True, confirmed=frozenset()
+        completed.transaction,
+        completed.plan,
+        completed.purpose,
+        undo=True,
+        confirmed=frozenset(),
+        sentence=NOT_STORED,
     )

@@ -39,8 +39,10 @@ from onboard.push.entries import (
     ReadBack,
     Recovery,
     Refused,
+    Replaced,
     Result,
     Undoing,
+    Verdict,
     Watched,
 )
 
@@ -49,6 +51,8 @@ LARGEST = 64_000_000
 """bytes; compaction keeps the file near a megabyte."""
 LONGEST_LINE = 1_000_000
 """bytes; the longest entry has a few thousand."""
+_REMARKS = Watched | Found | Refused | Replaced
+"""Entries that neither begin a transaction nor move it."""
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -81,6 +85,8 @@ class Journal:
         self._limit = limit_bytes
         self._keep = keep
         self._lines: list[tuple[float, Entry]] = []
+        self._last: dict[int, list[Planned]] = {}
+        self._others: frozenset[str] | None = None
         self._encoder = msgspec.json.Encoder()
         self._decoder = msgspec.json.Decoder(Entry)
         self.damaged = 0
@@ -142,7 +148,8 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
-        if self._size > self._limit and isinstance(entry, Closed | Watched | Found | Refused):
+        self._changed()
+        if self._size > self._limit and isinstance(entry, Closed | _REMARKS):
             self._compact()
 
     def recover(self) -> tuple[Recovery, ...]:
@@ -170,6 +177,16 @@ class Journal:
         return written[-1] if written else None
 
     def _written(self, imu: int) -> list[Planned]:
+        """:meth:`_gathered`, which is asked for every second, from the lines as they are."""
+        if imu not in self._last:
+            self._last[imu] = self._gathered(imu)
+        return self._last[imu]
+
+    def _changed(self) -> None:
+        self._last.clear()
+        self._others = None
+
+    def _gathered(self, imu: int) -> list[Planned]:
         """The last push that was completed, and the way back from it if there was one.
 
         Of either nothing is left once it has come to another end: an audit found that it did not
@@ -191,6 +208,21 @@ class Journal:
             else:
                 written = [*(p for p in written if p.purpose is Purpose.PUSH), planned]
         return written
+
+    def last_pushed(self, imu: int) -> Planned | None:
+        """The last push that was completed, also where it was rolled back since."""
+        return next((p for p in self._written(imu) if p.purpose is Purpose.PUSH), None)
+
+    def replaced(self) -> frozenset[str]:
+        """Transactions whose values are others now, as was seen or as a flight has told."""
+        if self._others is None:
+            self._others = frozenset(
+                e.transaction
+                for _, e in self._lines
+                if isinstance(e, Replaced)
+                or (isinstance(e, Watched) and e.verdict is Verdict.SUPERSEDED)
+            )
+        return self._others
 
     def refusals(self) -> dict[int, str]:
         """Accelerometers that are held back until a person approves, and why."""
@@ -216,7 +248,7 @@ class Journal:
         for _, entry in self._lines:
             if isinstance(entry, Closed):
                 order.pop(entry.transaction, None)
-            elif not isinstance(entry, Watched | Found | Refused):
+            elif not isinstance(entry, _REMARKS):
                 order.setdefault(entry.transaction)
         return list(order)
 
@@ -331,6 +363,7 @@ class Journal:
             return
         os.close(self._fd)
         self._fd, self._size, self._lines, self.damaged = fd, len(data), lines, 0
+        self._changed()
         self._torn = False
         with contextlib.suppress(OSError):  # either file is whole, whichever survives
             _sync_directory(self._path.parent)

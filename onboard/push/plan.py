@@ -51,10 +51,14 @@ class Vehicle:
     board: str = ""
 
     def same_airframe(self, system_id: int, board: str = "") -> bool:
-        """Whether a link to this system and board can be this vehicle."""
-        if self.system_id != system_id:
-            return False
-        return not (self.board and board) or self.board == board
+        """Whether a link to this system and board can be this vehicle.
+
+        Where both tell the board it is that, whatever system id somebody has given it; else the
+        system id decides.
+        """
+        if self.board and board:
+            return self.board == board
+        return self.system_id == system_id
 
 
 @dataclass(frozen=True, slots=True)

@@ -195,7 +195,7 @@ class PushTransaction:
         elif self._recovery is None:
             heard = course.go(Trigger.PUSH, now)
         else:
-            course.note(Reason.RESTARTED, "the transaction had been interrupted")
+            course.note(Reason.RESTARTED, self._recovery.sentence)
             heard = course.go(Trigger.RESUME, now)
         self._answers.hear(heard, now)
         return course.flush()

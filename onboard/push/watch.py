@@ -13,6 +13,13 @@ enough to judge.  Two questions are asked:
 The second compares like with like and therefore overrules the first where it is clear
 (``evidence``): a rough flight is no reason to go back to values that would have been worse.
 
+Values that are better than the old ones need not be right: the sensor may have changed since they
+were learned.  So a push that is not taken back is held to what it had promised.  The flight does
+not fit it (*doubted*; it is kept, and the next flight judges anew) if the residual is larger than
+the one promised, by more than the same margin, **and** the flight's own six are off those written
+by more than the uncertainties of both leave room for, past the 0.999 quantile of chi-square.  The
+first alone may be the weather, the second alone may not matter.
+
 A push made in flight is also watched for EKF health during its first half minute.
 """
 
@@ -24,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.estimate.result import Calibration
+from onboard.core.maths.chi_square import CHI_SQUARE_999
 from onboard.push import limits
 from onboard.push.entries import Planned, Verdict, Watched
 from onboard.push.plan import PushPlan
@@ -97,6 +105,10 @@ class PushWatch:
             return None
         if worse and (preferred is None or preferred < clear):
             return self._say(Verdict.WORSE, worse)
+        doubt = self._doubt(flown)
+        if doubt:
+            sentence = f"kept, but this flight does not fit what was written: {doubt}"
+            return self._say(Verdict.DOUBTED, sentence)
         if worse:
             sentence = f"{worse}, but the old values would have done worse still on this flight"
             return self._say(Verdict.KEPT, sentence)
@@ -118,6 +130,23 @@ class PushWatch:
                 return f"the velocity residual grew from {before:.3g} to {after:.3g} m/s"
             return ""
         return None
+
+    def _doubt(self, flown: Calibration) -> str:
+        """A sentence if the flight is not what the push had promised, else empty."""
+        baseline = self._pushed.plan.baseline
+        told = (
+            ("held-out", baseline.held_out_after, flown.held_out_before, ""),
+            ("velocity", baseline.velocity_rms_after, flown.velocity_rms_before, " m/s"),
+        )
+        off = departure(self._pushed.plan, flown)
+        if off is None or off <= CHI_SQUARE_999[6]:
+            return ""
+        for what, promised, after, unit in told:
+            if promised is not None and np.isfinite(after):
+                if after <= (1.0 + self._settings.margin) * promised:
+                    return ""
+                return f"the {what} residual is {after:.3g}{unit}, {promised:.3g} was promised"
+        return ""
 
     def _say(self, verdict: Verdict, sentence: str) -> Watched:
         """The verdict, with the residuals of the flight that gave it, if one did."""
@@ -143,15 +172,35 @@ def preference(old: Array, new: Array, flown: Calibration) -> float | None:
         new: (6,) others; positive speaks for them.
         flown: what the flight says by itself.
     """
+    P, x = flown.with_its_gyroscope, np.array(flown.scale + flown.offset)
+    far, near = _distance(old - x, P), _distance(new - x, P)
+    return None if far is None or near is None else far - near
+
+
+def departure(plan: PushPlan, flown: Calibration) -> float | None:
+    """How far a flight's own six are off those of a plan: chi-square of six numbers; None: unknown.
+
+    In the units of both uncertainties: the flight's, and by how much another flight like the one
+    that taught the plan would want each number otherwise.
+
+    Args:
+        plan: what was written.
+        flown: what the flight says by itself.
+    """
     P = flown.with_its_gyroscope
+    if P.shape != (6, 6):
+        return None
+    sigma = np.array([change.sigma for change in plan.changes])
     x = np.array(flown.scale + flown.offset)
-    if P.shape != (6, 6) or not np.all(np.isfinite(P)) or not np.all(np.isfinite(x)):
+    return _distance(x - plan.six_wanted().as_vector(), P + np.diag(sigma**2))
+
+
+def _distance(apart: Array, P: Array) -> float | None:
+    """``apart^T P^-1 apart``, None where either is not known."""
+    if P.shape != (6, 6) or not np.all(np.isfinite(P)) or not np.all(np.isfinite(apart)):
         return None
     unit = np.sqrt(np.maximum(np.diag(P), 1e-30))
     correlation = P / np.outer(unit, unit)
     if np.linalg.eigvalsh(correlation)[0] <= 0.0:
         return None
-    far, near = (old - x) / unit, (new - x) / unit
-    return float(
-        far @ np.linalg.solve(correlation, far) - near @ np.linalg.solve(correlation, near)
-    )
+    return float((apart / unit) @ np.linalg.solve(correlation, apart / unit))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from onboard.daemon.pushing.proposals import Proposal, Proposals, approvable
+from onboard.daemon.pushing.people import approvable, told
+from onboard.daemon.pushing.proposals import Proposal, Proposals
 from onboard.daemon.pushing.push_view import proposal_views
 from onboard.errors import RefusedError
 from onboard.push.plan import propose
@@ -44,3 +45,22 @@ def test_nothing_to_change_is_not_approved_as_about_to_be_written(despite):
     assert not proposal_views(proposals)[0].approvable
     with pytest.raises(RefusedError, match=r"^nothing waits for approval$"):
         proposals.approve((1,), despite_diagnosis=despite)
+
+
+@pytest.mark.parametrize("reason", ["refused", "unconfirmed"])
+@pytest.mark.parametrize(
+    "beside",
+    [(), ("armed",), ("no_improvement",), ("out_of_bounds",), ("physics_missing",), ("not_sure",)],
+)
+def test_a_command_that_is_named_is_taken(reason, beside):
+    proposals = Proposals(PolicySettings(), approval=False)
+    held = told(1, dict.fromkeys((reason, *beside), "because"))
+    proposals.current = {1: Proposal(propose(calibration(), parameters(), system_id=1), held)}
+    despite = "--despite-diagnosis" in held[reason]
+    named = "onboard approve 1" in held[reason]
+    assert named == (not {"no_improvement", "out_of_bounds"} & set(beside))
+    if named:
+        assert "IMU 1 approved" in proposals.approve((1,), despite_diagnosis=despite)
+    else:
+        with pytest.raises(RefusedError):
+            proposals.approve((1,), despite_diagnosis=True)

@@ -1,10 +1,14 @@
 """A flight is frozen when it ends, and none of its accelerometers is judged before all are."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from onboard.answers.answer import Answer, diagnosed
+from onboard.core.diagnosis.cleared import since_reboot
+from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
@@ -178,3 +182,62 @@ def test_the_stand_is_not_in_the_frozen_flight(flight, tmp_path, seen):
     one.examine()
     flown = [s.t for s in flight if isinstance(s, ImuSample)]
     assert seen[0][2] < max(flown) - 10.0, "the recording goes on after the landing"
+
+
+class Jumped:
+    """A diagnosis in which the offset has jumped at a moment of its flight."""
+
+    def __init__(self, flight, imu, at):
+        self.imu, self.calibration = imu, calibrated(flight, imu)
+        self.verdict = Verdict.CLEAN if at is None else Verdict.EXPLAINED
+        unknowns = {"time": SimpleNamespace(value=at)} | dict.fromkeys(
+            "xyz", SimpleNamespace(value=0.5)
+        )
+        self.effects = () if at is None else (SimpleNamespace(name="bias_step", unknowns=unknowns),)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("into_second", "jumps_again", "between"),
+    [(-30.0, False, True), (0.2, False, True), (0.2, True, False), (30.0, False, False)],
+)
+def test_what_has_changed_on_the_ground_has_not_jumped_in_flight(
+    flight, tmp_path, monkeypatch, into_second, jumps_again, between
+):
+    """The last flight is then diagnosed by itself, and what was learned before is forgotten."""
+    asked = []
+
+    def found(its, imu, *, latest, since=-math.inf):
+        batches = since_reboot(its.engine(imu).batches, since)
+        asked.append((imu, since, batches[0].fixes.t[0]))
+        second = [b for b in since_reboot(its.engine(imu).batches) if b.fixes.t[0] > 150.0]
+        if imu == 2 or not second:
+            return Answer(Jumped(its, imu, None))
+        if since > 0.0:
+            return Answer(
+                Jumped(its, imu, 20.0 if jumps_again else None), "jump" if jumps_again else ""
+            )
+        at = second[0].fixes.t[0] + into_second - batches[0].segment.t[0]
+        return Answer(Jumped(its, imu, at), "jump")
+
+    monkeypatch.setattr(examiner_module, "answer", found)
+    monkeypatch.setattr(examiner_module, "diagnosed", lambda given, _: diagnosed(given, {}))
+    monkeypatch.setattr(examiner_module.Examiner, "_document", lambda *_: {})
+    one = learner(tmp_path)
+    one.learn(flight, judging=())
+    judge(one)
+    assert {its.imu for its in one._kept} == {1, 2}
+    asked.clear()
+    later = [replace(s, t=s.t + 150.0) if s.t is not None else s for s in flight]
+    one.learn(later, judging=())
+    learned = judge(one)
+    first = learned.flight.diagnosed[1]
+    assert bool(first.missing) is not between
+    assert {its.imu for its in one._kept} == {2}, "sums of two sensors are not kept"
+    assert one._calibrator.imus == (2,), "nor gone on with"
+    told = [news.text for news in learned.news if news.kind == "begun_anew"]
+    assert ["between two flights" in text for text in told] == [between]
+    if between:
+        (again,) = [(since, start) for imu, since, start in asked if since > 0.0]
+        assert again[0] == again[1] > 150.0
+        assert "changed on the ground" in first.calibration.note

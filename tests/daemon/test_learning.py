@@ -25,7 +25,7 @@ async def test_a_restart_goes_on_from_the_saved_sums(document, daemon, port):
 
 async def test_damaged_sums_are_told_and_not_used(document, daemon, port, tmp_path):
     vehicle = Vehicle(port)
-    file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
+    file = tmp_path / "state" / f"sums-board-{vehicle.board}.bin"
     file.parent.mkdir()
     file.write_bytes(b"not sums")
     async with daemon(document) as service, vehicle:
@@ -85,7 +85,7 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
 async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):
     document["estimator"] = {"save_every_s": 0.01}
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
+        file = tmp_path / "state" / f"sums-board-{vehicle.board}.bin"
         await until(file.exists)
         before = service.handover._learner._calibrator
         await service.reset(())
@@ -99,7 +99,7 @@ async def test_what_the_disk_does_not_forget_is_said_and_nothing_else_is_kept(
     document["push"]["approval"] = True
     document["estimator"] = {"save_every_s": 0.01}
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        file = tmp_path / "state" / f"sums-1-{vehicle.board}.bin"
+        file = tmp_path / "state" / f"sums-board-{vehicle.board}.bin"
         await until(file.exists)
         convinced(service, WANTED)
         await until(lambda: "approval" in held_back(service))

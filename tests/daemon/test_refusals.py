@@ -104,3 +104,61 @@ async def test_tightening_by_parameter_holds_and_the_same_again_is_no_news(docum
             assert "not written, for the push policy is 'never'" in said
             await asyncio.sleep(5.0)
             assert vehicle.sets == []
+
+
+async def test_what_somebody_has_set_since_is_not_offered_for_a_roll_back(document, daemon, port):
+    """Values put where they were pushed are again what a roll-back takes back."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        await until(lambda: both(service) == {1})
+        pushed_x = vehicle.parameters["INS_ACCOFFS_X"]
+        vehicle.set_by_other("INS_ACCOFFS_X", 0.25)
+        await until(lambda: both(service) == set())
+        assert not service.snapshot().push.written[0].in_force
+        with pytest.raises(RefusedError, match="no push is in force"):
+            await service.rollback((1,))
+        assert "refused" not in held_back(service)
+        vehicle.set_by_other("INS_ACCOFFS_X", pushed_x)
+        await until(lambda: both(service) == {1})
+        assert service.snapshot().push.written[0].in_force
+
+
+async def test_a_roll_back_that_comes_to_nothing_refuses_nothing(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        await until(lambda: both(service) == {1})
+        vehicle.parameters["INS_ACCOFFS_X"] = 0.25  # nobody has heard of it
+        await service.rollback((1,))
+        await until(lambda: "aborted" in service.snapshot().push.last_outcome)
+        assert both(service) == set()
+        assert "refused" not in held_back(service)
+        assert service.parts.journal.refusals() == {}
+
+
+async def test_of_a_silent_autopilot_nothing_is_rolled_back(document, daemon, port, caplog):
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED)
+            await until(lambda: both(service) == {1})
+            await until(lambda: service.snapshot().push.state == "idle")
+            vehicle.stop_talking()
+            await until(lambda: service.snapshot().link.state == "silent")
+            for _ in range(2):
+                with pytest.raises(RefusedError, match="the autopilot is silent"):
+                    await service.rollback((1,))
+            assert service.snapshot().push.active_imu is None
+        assert "left open" not in caplog.text
+
+
+async def test_on_stop_only_what_was_written_is_said_to_be_left_open(
+    document, daemon, port, caplog, monkeypatch
+):
+    monkeypatch.setattr("onboard.daemon.process.limits.FINISH_PUSH_S", 0.05)
+    async with Vehicle(port) as vehicle:
+        async with daemon(document) as service:
+            convinced(service, WANTED)
+            await until(lambda: both(service) == {1})
+            vehicle.stop_talking()
+            vehicle.parameters.clear()  # it answers nothing
+            await service.rollback((1,))
+        assert "left open" not in caplog.text

@@ -105,3 +105,34 @@ def test_of_boards_that_have_flown_the_oldest_gives_way(tmp_path):
         os.utime(store.path(1, f"{number:04x}"), (number, number))
     gone = [n for n in range(limits.BOARDS_KEPT + 2) if store.load(1, f"{n:04x}") is None]
     assert gone == [0, 1]
+
+
+def as_named_before(directory, system, board, sums, mtime):
+    """A file whose name has the system id in it, too."""
+    store = Store(directory)
+    store.save(system, sums, version="1", saved_at=1.0, board=board)
+    older = directory / f"sums-{system}-{board}.bin"
+    store.path(system, board).replace(older)
+    os.utime(older, (mtime, mtime))
+
+
+def test_a_board_is_itself_under_any_system_id(tmp_path):
+    store = Store(tmp_path)
+    store.save(1, SUMS, version="1", saved_at=1.0, board="0a0b")
+    assert store.load(7, "0a0b").sums == SUMS
+    assert store.load(7) is None
+
+
+@pytest.mark.parametrize(("system", "expected"), [(1, b"one"), (2, b"two"), (7, b"two")])
+def test_files_with_older_names_are_found(tmp_path, system, expected):
+    """Its own system's before others', then the newest; and they are forgotten, too."""
+    as_named_before(tmp_path, 1, "0a0b", b"one", 100.0)
+    as_named_before(tmp_path, 2, "0a0b", b"two", 200.0)
+    as_named_before(tmp_path, 3, "ff0a0b", b"of another board", 300.0)
+    store = Store(tmp_path)
+    assert store.load(system, "0a0b").sums == expected
+    store.save(system, b"new", version="1", saved_at=1.0, board="0a0b")
+    assert store.load(5, "0a0b").sums == b"new"
+    store.forget(system, "0a0b")
+    assert store.load(system, "0a0b") is None
+    assert store.load(3, "ff0a0b").sums == b"of another board"

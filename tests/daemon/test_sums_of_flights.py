@@ -155,3 +155,21 @@ def test_sums_of_another_version_can_still_be_looked_at(tmp_path, first):
     again.save(2.0)
     (aside,) = tmp_path.glob("*.refused")
     assert msgspec.msgpack.decode(aside.read_bytes())["sums"] == older
+
+
+def test_a_sensor_that_has_changed_between_two_flights_of_one_boot_has_not_jumped_in_flight(
+    tmp_path, first
+):
+    """What the last flight shows is what counts, and nothing is said to be missing."""
+    made = learner(tmp_path, first)
+    assert fly(made, first).flight.current
+    later = [replace(s, t=s.t + 400.0) if s.t is not None else s for s in flown(SHAKEN, 2)]
+    learned = fly(made, later)
+    found = learned.flight.diagnosed[1]
+    assert (found.missing, "bias_step" in found.effects) == ("", False)
+    assert learned.flight.current
+    assert found.calibration.offset[2] == pytest.approx(0.6, abs=0.1)
+    assert np.max(np.abs(off(found.calibration, SHAKEN))) < 3.5
+    assert any("between two flights" in news.text for news in learned.news)
+    made.save(1.0)
+    assert on_disk(tmp_path) == []

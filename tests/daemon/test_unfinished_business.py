@@ -122,7 +122,9 @@ async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, dae
         vehicle.parameters["INS_ACCSCAL_Y"] = before[1]  # was not stored
         vehicle.reboot()
         await until(lambda: notices(service, "push_not_stored"))
-        await until(lambda: service.snapshot().push.can_roll_back == ())
+        assert service.snapshot().push.state != "idle"
+        await until(lambda: service.snapshot().push.state == "idle")
+        assert service.snapshot().push.can_roll_back == ()
         assert in_force(vehicle) == before
         kinds = [line.kind for line in service.snapshot().journal]
         assert kinds[-1] == "closed"
@@ -158,6 +160,12 @@ async def test_of_values_found_worse_a_way_back_that_was_lost_is_gone_again(docu
         vehicle.parameters["INS_ACCSCAL_Y"] = values[1]  # was not stored
         vehicle.reboot()
         await until(lambda: notices(service, "roll_back_not_stored"))
+        await until(lambda: in_force(vehicle) == before)
+        await until(lambda: service.snapshot().push.state == "idle")
+        vehicle.boot_ms += 60_000.0  # it runs for a minute
+        await ticks(service, 40)
+        vehicle.parameters.update(zip(SIX, values, strict=True))  # nothing of it was
+        vehicle.reboot()
         await until(lambda: len(notices(service, "roll_back_completed")) == 2)
         assert in_force(vehicle) == before
 
@@ -172,9 +180,95 @@ async def test_a_reboot_while_the_daemon_was_off_is_audited_at_its_start(documen
             vehicle.parameters[name] = value
         vehicle.sets.clear()
         async with daemon(document) as again:
-            await until(lambda: notices(again, "push_not_stored"))
+            await until(lambda: notices(again, "push_gone"))
             await until(lambda: again.snapshot().push.can_roll_back == ())
             assert vehicle.sets == [], "all six are old already: it only has to be written down"
+            assert again.snapshot().push.last_outcome is None
+            assert not notices(again, "push_resumed")
+
+
+@pytest.mark.parametrize("push", [{}, {"policy": "never"}, {"approval": True}])
+@pytest.mark.parametrize("then", ["silence", "reboot", "restart"])
+async def test_what_somebody_has_set_before_our_eyes_stays_whatever_comes(
+    document, daemon, port, then, push
+):
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            await pushed(service, vehicle)
+            await service.reject((1,))
+        document["push"] |= push
+        async with daemon(document) as service:
+            await until(lambda: notices(service, "push_stored"))
+            for name, value in zip(SIX[:3], before[:3], strict=True):
+                vehicle.set_by_other(name, value)
+            await until(lambda: notices(service, "push_replaced"))
+            mixed = in_force(vehicle)
+            vehicle.sets.clear()
+            if then == "silence":
+                vehicle.stop_talking()
+                await until(lambda: service.snapshot().link.state == "silent")
+                vehicle._task = asyncio.create_task(vehicle._stream())
+            elif then == "reboot":
+                vehicle.reboot()
+            if then != "restart":
+                await until(lambda: not service.handover.identified)
+                await until(lambda: service.parts.parameters.complete)
+                await ticks(service, 200)
+        async with daemon(document) as again:
+            await until(lambda: again.parts.parameters.complete)
+            await ticks(again, 200)
+            assert not notices(again, "push_mixed")
+        assert vehicle.sets == []
+        assert in_force(vehicle) == mixed
+        said = {*service.snapshot().notices, *again.snapshot().notices}
+        assert not [n.text for n in said if "taken back" in n.text or "interrupted" in n.text]
+
+
+@pytest.mark.parametrize("policy", ["landed", "never"])
+async def test_what_nobody_has_seen_come_is_asked_and_put_back_when_a_person_says_so(
+    document, daemon, port, policy
+):
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            await pushed(service, vehicle)
+        vehicle.parameters["INS_ACCSCAL_Y"] = before[1]  # lost, or set: nobody was there
+        vehicle.sets.clear()
+        document["push"]["policy"] = policy
+        async with daemon(document) as again:
+            await until(lambda: notices(again, "push_mixed"))
+            await ticks(again, 200)
+            assert vehicle.sets == []
+            push = again.snapshot().push
+            assert (push.state, push.can_roll_back) == ("idle", (1,))
+            assert not push.written[0].in_force
+            assert "some are those from before" in push.written[0].account.next
+            assert await again.rollback((1,)) == "rolling back IMU 1"
+            await until(lambda: again.snapshot().push.can_roll_back == ())
+            assert in_force(vehicle) == before
+            assert "a person had it put back" in again.snapshot().push.last_outcome
+            await until(lambda: "refused" in held_back(again))
+            assert "failed_before" not in held_back(again)
+
+
+async def test_with_a_person_to_be_asked_even_what_a_reboot_has_lost_is_asked(
+    document, daemon, port
+):
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        async with daemon(document) as service:
+            await pushed(service, vehicle)
+        document["push"]["approval"] = True
+        async with daemon(document) as again:
+            await until(lambda: notices(again, "push_stored"))
+            vehicle.sets.clear()
+            vehicle.parameters["INS_ACCSCAL_Y"] = before[1]
+            vehicle.reboot()
+            await until(lambda: notices(again, "push_mixed"))
+            await ticks(again, 100)
+            assert vehicle.sets == []
+            assert again.snapshot().push.can_roll_back == (1,)
 
 
 async def test_what_somebody_has_set_since_is_not_touched_by_an_audit(document, daemon, port):

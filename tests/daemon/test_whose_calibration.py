@@ -3,6 +3,8 @@
 Device identifiers are no help: they are the same on every board of one model.
 """
 
+import asyncio
+
 import pytest
 
 from onboard.push.entries import Planned
@@ -222,3 +224,42 @@ async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
         examined.clear()
         await until(lambda: examined)
         assert not service.handover.identified
+
+
+@pytest.mark.parametrize("board", ["0a0b0c" + 30 * "0", ""])
+async def test_a_board_with_another_system_id_is_known_again_if_it_says_which_it_is(
+    document, daemon, port, board
+):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.board = board
+        before = in_force(vehicle)
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        await until(lambda: service.snapshot().push.state == "idle")
+        vehicle.stop_talking()
+        async with Vehicle(port, system=7, parameters=vehicle.parameters) as renamed:
+            renamed.board = board
+            await until(lambda: service.snapshot().link.state == "silent")
+            (warning,) = service.snapshot().link.warnings
+            assert "system 1 is silent, but system 7 speaks" in warning
+            said = service.parts.notices
+            await until(lambda: warning in [n.text for n in said.kept])
+            await asyncio.sleep(1.0)
+            assert [n.text for n in said.kept].count(warning) == 1, "it is told once"
+    async with (
+        daemon(document) as again,
+        Vehicle(port, system=7, parameters=vehicle.parameters) as renamed,
+    ):
+        renamed.board = board
+        await settled(again, 80)
+        assert again.snapshot().link.system_id == 7
+        assert again.snapshot().link.warnings == ()
+        if not board:
+            assert again.snapshot().push.can_roll_back == ()
+            assert again.snapshot().push.proposals == ()
+            return
+        assert again.snapshot().push.can_roll_back == (1,)
+        assert again.snapshot().push.proposals
+        await again.rollback((1,))
+        await until(lambda: again.snapshot().push.can_roll_back == ())
+        assert in_force(renamed) == before

@@ -67,3 +67,11 @@ def test_each_end_has_its_own_next_step():
     for (verdict, in_force), begins in ends.items():
         seen = None if verdict is None else watched(verdict)
         assert account(plan(), seen, in_force=in_force).next.startswith(begins)
+
+
+def test_what_a_flight_doubts_is_not_said_to_be_confirmed():
+    said = Watched("t", Verdict.DOUBTED, "kept, but this flight does not fit what was written: so")
+    told = account(plan(), said, in_force=True)
+    assert "confirms" not in told.next
+    assert told.next.startswith("Fly again")
+    assert "does not fit" in told.next

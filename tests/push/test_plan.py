@@ -179,7 +179,11 @@ def test_same_airframe():
     assert vehicle.same_airframe(1)
     assert vehicle.same_airframe(1, "cafe")
     assert not vehicle.same_airframe(1, "beef")
-    assert not vehicle.same_airframe(2, "cafe")
+    assert vehicle.same_airframe(2, "cafe"), "it says which board it is, whatever its system id"
+    assert not vehicle.same_airframe(2)
+    silent = Vehicle(1, 3e6)
+    assert silent.same_airframe(1, "cafe")
+    assert not silent.same_airframe(2, "cafe")
 
 
 def test_six_parameters_of_a_plan():

@@ -42,7 +42,7 @@ def test_better_is_kept():
     assert verdict() is Verdict.KEPT
 
 
-@pytest.mark.parametrize(("residual", "expected"), [(2.2, Verdict.KEPT), (2.4, Verdict.WORSE)])
+@pytest.mark.parametrize(("residual", "expected"), [(2.2, Verdict.DOUBTED), (2.4, Verdict.WORSE)])
 def test_limit_is_the_residual_before_the_push_and_a_tenth(residual, expected):
     between = {
         "scale": tuple((np.array(SCALE) + 1.0) / 2),
@@ -70,6 +70,52 @@ def test_rough_flight_alone_is_no_reason_to_go_back():
     said = PushWatch(PUSHED).judge(flown(held_out_before=5.0, **truth_is(old=False)))
     assert said.verdict is Verdict.KEPT
     assert "5" in said.sentence
+
+
+def jumped(x_offset, **changes):
+    """A flight of a sensor whose x offset has changed since the push."""
+    six = PUSHED.plan.six_wanted()
+    offset = (six.offset[0] + x_offset, *six.offset[1:])
+    return flown(scale=six.scale, offset=offset, held_out_before=1.9, **changes)
+
+
+def test_a_flight_that_is_not_what_was_promised_is_no_confirmation():
+    said = PushWatch(PUSHED).judge(jumped(0.1))
+    assert said.verdict is Verdict.DOUBTED
+    assert said.sentence.startswith("kept, but this flight does not fit what was written: ")
+    assert "1.9, 1.05 was promised" in said.sentence
+    assert said.held_out == 1.9
+
+
+def test_what_both_uncertainties_leave_room_for_is_no_doubt():
+    """By the 0.999 quantile: of flights that differ by chance one in a thousand is doubted."""
+    both = np.sqrt(PUSHED.plan.changes[3].sigma ** 2 + calibration().with_its_gyroscope[3, 3])
+    for sigmas, expected in ((4.7, Verdict.KEPT), (4.8, Verdict.DOUBTED)):  # 22.46 = 4.74**2
+        assert PushWatch(PUSHED).judge(jumped(sigmas * both)).verdict is expected
+
+
+def test_flights_that_differ_by_chance_are_doubted_as_seldom_as_is_said():
+    rng = np.random.default_rng(3)
+    P = calibration().with_its_gyroscope
+    sigma = np.array([c.sigma for c in PUSHED.plan.changes])
+    L = np.linalg.cholesky(P + np.diag(sigma**2))
+    wanted = PUSHED.plan.six_wanted().as_vector()
+    doubted = 0
+    for _ in range(2000):
+        x = wanted + L @ rng.normal(size=6)
+        cal = flown(scale=tuple(x[:3]), offset=tuple(x[3:]), held_out_before=1.9)
+        doubted += PushWatch(PUSHED).judge(cal).verdict is Verdict.DOUBTED
+    assert doubted <= 8  # 2 are expected; more than 8 in one of 4000 draws
+
+
+@pytest.mark.parametrize("change", [{"held_out_before": 1.1}, {"covariance": ((np.nan,) * 6,) * 6}])
+def test_without_a_larger_residual_or_without_sigmas_nothing_is_doubted(change):
+    cal = replace(jumped(0.1), **change)
+    assert PushWatch(PUSHED).judge(cal).verdict is Verdict.KEPT
+
+
+def test_old_values_that_fit_better_still_take_it_back():
+    assert verdict(held_out_before=1.9, **truth_is(old=True)) is Verdict.WORSE
 
 
 def test_difference_of_the_residual_sums_is_that_of_the_linear_model():

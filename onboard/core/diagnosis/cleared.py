@@ -140,10 +140,10 @@ def _felt(
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 
 
-def since_reboot(batches: Sequence[Batch]) -> list[Batch]:
-    """The batches at the end whose clock is one and the same."""
+def since_reboot(batches: Sequence[Batch], since: float = -np.inf) -> list[Batch]:
+    """The batches at the end whose clock is one and the same, of them those from ``since`` (s)."""
     first = 0
     for i in range(1, len(batches)):
         if batches[i].fixes.t[0] < batches[i - 1].fixes.t[0]:
             first = i
-    return list(batches[first:])
+    return [batch for batch in batches[first:] if batch.fixes.t[0] >= since]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import inf, log
 
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
 from onboard.core.diagnosis.companions import Companion, Companions
@@ -46,12 +46,16 @@ from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.scale_step import ScaleStep
 
 
-def diagnose(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Diagnosis:
+def diagnose(
+    calibrator: Calibrator, imu: int, *, latest: bool = False, since: float = -inf
+) -> Diagnosis:
     """Diagnose one accelerometer's recording: what :func:`examine` has found, as a record."""
-    return examine(calibrator, imu, latest=latest).diagnosis()
+    return examine(calibrator, imu, latest=latest, since=since).diagnosis()
 
 
-def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
+def examine(
+    calibrator: Calibrator, imu: int, *, latest: bool = False, since: float = -inf
+) -> Judge:
     """Find the model of one accelerometer's recording; the calibrator is left as it is.
 
     Args:
@@ -59,15 +63,16 @@ def examine(calibrator: Calibrator, imu: int, *, latest: bool = False) -> Judge:
         imu: which accelerometer.
         latest: look only at what is kept since the boot clock last began; times are then since
             the first sample that is kept.
+        since: with ``latest``: only what was flown from this time of that clock on, s.
 
     Raises:
         KeyError: that accelerometer has not been seen.
     """
     engine = calibrator.engine(imu)
-    flight = since_reboot(engine.batches) if latest else list(engine.batches)
+    flight = since_reboot(engine.batches, since) if latest else list(engine.batches)
     origin = _origin(calibrator, imu, flight if latest else ())
     clear = cleared(calibrator, engine, flight, origin)
-    companions = _companions(calibrator, imu, clear, latest=latest)
+    companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
     if full is not clear.full:
         clear.full.let_sums_go()
@@ -111,7 +116,9 @@ def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin
     )
 
 
-def _companions(calibrator: Calibrator, imu: int, clear: Cleared, *, latest: bool) -> Companions:
+def _companions(
+    calibrator: Calibrator, imu: int, clear: Cleared, *, latest: bool, since: float
+) -> Companions:
     """All accelerometers of the vehicle; of this one what is examined.
 
     Where the clock began anew within the flight, none: a moment of it is no one moment.
@@ -121,7 +128,8 @@ def _companions(calibrator: Calibrator, imu: int, clear: Cleared, *, latest: boo
     prior = clear.full.model.prior_sigma[:6]
     everyone = {}
     for other, batches in calibrator.flown.items():
-        own = clear.sampled if other == imu else since_reboot(batches) if latest else batches
+        theirs = since_reboot(batches, since) if latest else batches
+        own = clear.sampled if other == imu else theirs
         before = calibrator.parameters.six(other).as_linear()
         everyone[other] = Companion(own, before, prior)
     return Companions(everyone)

@@ -6,31 +6,38 @@ link is taken in between.  The flight is frozen when it ends, so that all of its
 judged on the same samples however long that takes, and what was found is handed out only when all
 of them are.  Where small steps may be written in flight it is made in flight, too, as seldom as the
 budget asks.
+
+Flights of one boot are learned together.  An accelerometer that was changed between two of them, on
+the ground, looks like one whose offset has jumped: if it jumped about when nobody flew, what was
+flown since is diagnosed by itself, and if nothing is missing in that, it is what counts.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import uuid
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import msgspec
 import numpy as np
 
-from onboard.answers.answer import answer, diagnosed
+from onboard.answers.answer import Answer, answer, diagnosed
 from onboard.answers.explain_document import explain_document
 from onboard.answers.knowledge import determined
 from onboard.core.diagnosis.cleared import since_reboot
-from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
 from onboard.core.maths.chi_square import CHI_SQUARE_999
+from onboard.core.physics.finding import Finding
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.meaning import Meaning, corrections, in_force, meanings
@@ -39,6 +46,9 @@ from onboard.push.entries import Support
 from onboard.push.watch import preference
 
 logger = logging.getLogger(__name__)
+
+BIAS_STEP = "bias_step"
+"""The effect whose moment decides whether it happened in flight."""
 
 
 @dataclass(slots=True)
@@ -49,16 +59,22 @@ class Frozen:
     support: Support
     waiting: list[int]
     at_takeoff: dict[int, Meaning]
+    landings: tuple[float, ...] = ()
     current: bool = True
+    changed: dict[int, str] = field(default_factory=dict)
     imus: dict[int, Judged] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """A flight that was judged, and the sums that it ended with, of every accelerometer."""
+    """A flight that was judged, and the sums that it ended with, of every accelerometer.
+
+    ``changed``: accelerometers that are others since one of its landings, and by what that shows.
+    """
 
     flight: JudgedFlight
     sums: tuple[SavedEngine, ...]
+    changed: Mapping[int, str]
 
 
 class Examiner:
@@ -78,6 +94,7 @@ class Examiner:
         self._frozen: Frozen | None = None
         self._judged_s = 0.0
         self._at_takeoff: dict[int, Meaning] = {}
+        self._landings: list[float] = []
         self._not_before = -np.inf
 
     def took_off(self, parameters: ParametersInForce) -> None:
@@ -89,8 +106,17 @@ class Examiner:
         """Accelerometers of the flight under examination: none is judged before all are."""
         return () if self._frozen is None else tuple(self._frozen.flight.imus)
 
-    def landed(self, flight: Calibrator) -> None:
-        """A flight has ended; nothing is to be said of being armed without having flown."""
+    def landed(self, flight: Calibrator, at: float | None = None) -> None:
+        """A flight has ended; nothing is to be said of being armed without having flown.
+
+        Args:
+            flight: what was flown, of all flights since the clock began.
+            at: when it was disarmed, boot clock, s; None: the clock begins anew.
+        """
+        if at is None:
+            self._landings.clear()
+        else:
+            self._landings.append(at)
         if flight.flown_s > self._judged_s:
             self._freeze(flight)
             self._judged_s = flight.flown_s
@@ -103,12 +129,14 @@ class Examiner:
     def begin_anew(self, flight: Calibrator) -> None:
         """What was learned is of another board, or was reset: nothing of it is judged."""
         self._frozen = None
+        self._landings.clear()
         self._judged_s = flight.flown_s
 
     def go_on_with(self, flight: Calibrator) -> None:
         """What is learned from here on may be of another board: what is under examination, too."""
         if self._frozen is not None:
             self._frozen.current = False
+        self._landings.clear()
         self._judged_s = flight.flown_s
 
     def examine_next(self) -> Examined | None:
@@ -124,13 +152,15 @@ class Examiner:
             return None
         self._frozen = None
         flight = JudgedFlight(frozen.support, frozen.imus, frozen.current)
-        return Examined(flight, tuple(frozen.flight.sums))
+        return Examined(flight, tuple(frozen.flight.sums), frozen.changed)
 
     def _freeze(self, flight: Calibrator) -> None:
         trusted_s = flight.flown_s - self._judged_s
         support = Support(uuid.uuid4().hex, self._wall_clock(), self.board, trusted_s)
         frozen = flight.frozen()
-        self._frozen = Frozen(frozen, support, list(frozen.imus), dict(self._at_takeoff))
+        self._frozen = Frozen(
+            frozen, support, list(frozen.imus), dict(self._at_takeoff), tuple(self._landings)
+        )
 
     def _examine(self, frozen: Frozen, imu: int) -> None:
         flight = frozen.flight
@@ -143,18 +173,39 @@ class Examiner:
             self.counters["diagnosis_of_unknown"] += 1
             return
         try:
-            given = answer(flight, imu, latest=True)
-            document = msgspec.to_builtins(self._document(flight, given.diagnosis))
+            given, since = self._answer(frozen, imu)
+            document = msgspec.to_builtins(self._document(flight, given.diagnosis, since))
             found = diagnosed(given, document)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers no model fits
             self.counters["diagnosis_failed"] += 1
             logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
             return
+        if imu in frozen.changed:
+            found = replace(found, calibration=_alone(found.calibration))
+        else:
+            found = with_earlier(flight, found)
         corrected = before.corrections or corrections(values, imu)
-        frozen.imus[imu] = Judged(device_id, six, with_earlier(flight, found), corrected)
+        frozen.imus[imu] = Judged(device_id, six, found, corrected)
 
-    def _document(self, flight: Calibrator, found: Diagnosis) -> msgspec.Struct:
-        batches = since_reboot(flight.engine(found.imu).batches)
+    def _answer(self, frozen: Frozen, imu: int) -> tuple[Answer, float]:
+        """What is found of one accelerometer, and from when on the flight is that it is about."""
+        given, flight = answer(frozen.flight, imu, latest=True), frozen.flight
+        jump = next((e for e in given.diagnosis.effects if e.name == BIAS_STEP), None)
+        batches = since_reboot(flight.engine(imu).batches)
+        since = None if jump is None else changed_on_the_ground(jump, batches, frozen.landings)
+        if jump is None or since is None:
+            return given, -math.inf
+        alone = answer(flight, imu, latest=True, since=since)
+        if alone.missing or alone.diagnosis.verdict is Verdict.INSUFFICIENT:
+            return given, -math.inf
+        by = math.hypot(*(jump.unknowns[axis].value for axis in "xyz"))
+        frozen.changed[imu] = (
+            f"it has changed by {by:.2g} m/s² between two flights, on the ground: see to its mount"
+        )
+        return alone, since
+
+    def _document(self, flight: Calibrator, found: Diagnosis, since: float) -> msgspec.Struct:
+        batches = since_reboot(flight.engine(found.imu).batches, since)
         return explain_document(
             found,
             files=(),
@@ -165,6 +216,31 @@ class Examiner:
                 "gps": sum(len(c.fixes) for c in batches),
             },
         )
+
+
+def changed_on_the_ground(
+    jump: Finding, batches: Sequence[Batch], landings: Sequence[float]
+) -> float | None:
+    """When the flight began before which the offset jumped, s; None if it did so in the air.
+
+    Args:
+        jump: its time is since the first sample of the flight.
+        batches: the flight.
+        landings: when the vehicle was disarmed, s.
+    """
+    at = float(batches[0].segment.t[0]) + jump.unknowns["time"].value
+    for landed in landings:
+        before = [float(b.fixes.t[-1]) for b in batches if b.fixes.t[0] < landed]
+        after = [float(b.fixes.t[0]) for b in batches if b.fixes.t[0] >= landed]
+        edge = limits.GROUND_EDGE_S
+        if before and after and before[-1] - edge <= at <= after[0] + edge:
+            return after[0]
+    return None
+
+
+def _alone(c: Calibration) -> Calibration:
+    note = f"of what was flown since the accelerometer was changed on the ground. {c.note}"
+    return replace(c, note=note.rstrip())
 
 
 def with_earlier(flight: Calibrator, found: Diagnosed) -> Diagnosed:

@@ -135,7 +135,7 @@ class Learner:
         """
         before, self._identity = self._identity, there
         self._examiner.autopilot, self._examiner.board = there.autopilot, there.board
-        same = before is not None and bool(there.board) and there == before
+        same = before is not None and there.surely(before)
         # Of another board, for all that is known, nothing holds any more.
         values = carried(self._calibrator.parameters) if same or before is None else {}
         values |= {parameter.name: parameter.value for parameter in told if matters(parameter.name)}
@@ -146,7 +146,7 @@ class Learner:
         if maybe:
             self._end_in_the_air()
             self._kept.wait_beside(calibrator)
-        if before != there:
+        if before != there and not same:
             if before is not None:
                 self._shelve(before)
             loaded = self._take_from_shelf(calibrator)
@@ -276,19 +276,20 @@ class Learner:
     def _keep(self, examined: Examined) -> None:
         """Keep sums of what nothing was missing in, and nothing false."""
         for imu, found in examined.flight.diagnosed.items():
-            if found.missing:
+            changed = examined.changed.get(imu)
+            if found.missing or changed:
                 self._kept.forget(imu)
-            elif found.left_out:
-                # What was left out of the diagnosis is in the sums; those before are as they were.
-                self._begin_anew(imu, "something false was in the flight")
-            else:
+            elif not found.left_out:
                 self._kept.take(imu, examined.sums)
+            if changed or (found.left_out and not found.missing):
+                # What was left out of the diagnosis is in the sums; those before are as they were.
+                self._begin_anew(imu, changed or "something false was in the flight")
 
     def _begin_anew(self, imu: int, why: str) -> None:
         self._calibrator.begin_anew(imu)
         self._calibrated.pop(imu, None)
         self._stale = self._urgent = True
-        self._tell("begun_anew", f"IMU {imu}: learning anew, {why}")
+        self._tell("begun_anew", f"IMU {imu}: learning anew, {why}", warning=True)
 
     def _judged(self, flight: JudgedFlight) -> None:
         """Take what was said; a flight that says nothing takes nothing away."""
@@ -375,14 +376,13 @@ class Learner:
                 self._counters["event_Advanced"] += 1
             case _:
                 if isinstance(event, FlightEnded):
-                    self._in_air = False
-                    self._examiner.landed(self._calibrator)
+                    self._in_air, self._urgent = False, True
+                    self._examiner.landed(self._calibrator, event.t)
                 if isinstance(event, Restarted):
                     self._end_in_the_air()
                     self._calibrator.begin_flight(name_of_a_flight())
                     self._kept.wait_beside(self._calibrator)
                     self._opening.restarted()
-                self._urgent |= isinstance(event, FlightEnded)
                 self._counters[f"event_{type(event).__name__}"] += 1
 
     def _end_in_the_air(self) -> None:

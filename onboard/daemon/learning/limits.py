@@ -30,6 +30,10 @@ FILTER_SILENT_S: Final = 5.0
 """s of an open window without a report of the autopilot's filter: it sends none.  Two a second are
 asked for, and a slow link brings one in two seconds [data]."""
 
+GROUND_EDGE_S: Final = 10.0
+"""s; an offset that jumped so near to the time on the ground may have done so there: the length of
+a batch [tuned: what was flown since has to be without a jump of its own]."""
+
 # How often is computed
 
 SOLVING_SHARE: Final = 0.0015

@@ -76,9 +76,4 @@ class Shelf:
             StateError: the disk keeps it.
         """
         for board in dict.fromkeys((whose.board, "")):
-            path = self._store.path(whose.system_id, board)
-            try:
-                path.unlink(missing_ok=True)
-            except OSError as error:
-                why = f"{path}: {error.strerror}: it is there again at the next start"
-                raise StateError(why) from None
+            self._store.forget(whose.system_id, board)

@@ -2,7 +2,7 @@
 
 With them goes what was found of the last flight: the flight itself is not kept.
 
-One file per board of a vehicle (system id and the unique id that the board tells, if it does),
+One file per board (by the unique id that it tells, or, of those that tell none, by system id),
 replaced whole: temporary file, fsync, rename, fsync of the directory.  A bounded number of them: a
 board is easily made up, and the disk is the journal's too.  A file that is damaged or of
 another version is set aside with the reason, never half used.  Whether sums are of the sensors that
@@ -57,7 +57,36 @@ class Store:
         """File of one board; ``board`` is its unique id in hex, empty if it tells none."""
         if not re.fullmatch("[0-9a-f]*", board):
             raise ValueError(f"{board!r} is no board's id")
-        return self.directory / f"sums-{system_id}{f'-{board}' if board else ''}.bin"
+        return self.directory / f"sums-{f'board-{board}' if board else system_id}.bin"
+
+    def forget(self, system_id: int, board: str = "") -> None:
+        """Delete what was saved for this board, under older names, too.
+
+        Raises:
+            StateError: the disk keeps it.
+        """
+        for path in (self.path(system_id, board), *self._older(system_id, board)):
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                why = f"{path}: {error.strerror}: it is there again at the next start"
+                raise StateError(why) from None
+
+    def _older(self, system_id: int, board: str) -> list[Path]:
+        """Files of this board that have a system id in their names, too: that one's, the newest."""
+        if not board:
+            return []
+        found = [path for path in self.directory.glob(f"sums-*-{board}.bin") if path.is_file()]
+        ours = self.directory / f"sums-{system_id}-{board}.bin"
+        found = [path for path in found if path != self.path(system_id, board)]
+        return sorted(found, key=lambda path: (path != ours, -path.stat().st_mtime))
+
+    def _rename(self, system_id: int, board: str) -> None:
+        """Give this board's file, which may have an older name, its own."""
+        path = self.path(system_id, board)
+        older = self._older(system_id, board)
+        if older and not path.exists():
+            older[0].replace(path)
 
     def load(self, system_id: int, board: str = "") -> Saved | None:
         """What was saved for this board, None if nothing was.
@@ -67,6 +96,7 @@ class Store:
         """
         path = self.path(system_id, board)
         try:
+            self._rename(system_id, board)
             if path.stat().st_size > LARGEST:
                 aside = self.set_aside(system_id, board)
                 raise StateError(f"{path}: larger than sums can be, set aside as {aside}")

@@ -218,7 +218,8 @@ class Service:
             async with asyncio.timeout(limits.FINISH_PUSH_S):
                 await self.parts.pusher.idle.wait()
         except TimeoutError:
-            logger.warning("a push is left open; it is finished or undone after the next start")
+            if self.parts.journal.recover():  # else nothing of it was written
+                logger.warning("a push is left open; it is finished or undone after the next start")
 
     async def _let_go(self) -> None:
         """Whatever way it ended: no port, file or lock stays behind."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from onboard.daemon.process import limits
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.view.notices import Notices
+from onboard.mavlink.autopilot import AutopilotState
 from onboard.mavlink.link import Link
 from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
@@ -60,6 +61,8 @@ class Vigilance:
         rivals = self._link.presence.rivals(now)
         if rivals:
             yield "rivals", f"{rivals} more on the link speak as the vehicle; they are not believed"
+        if text := self._another_speaks(now):
+            yield "another_speaks", text
         if self._observed.contradicted(now):
             yield (
                 "heartbeats_contradict",
@@ -76,6 +79,16 @@ class Vigilance:
                 "samples with one time stamp say different things: both are dropped",
             )
         yield from self._clocks()
+
+    def _another_speaks(self, now: float) -> str:
+        others, autopilot = self._link.presence.others(now), self._link.autopilot
+        if not others or autopilot is None or self._link.state is not AutopilotState.SILENT:
+            return ""
+        whose = ", ".join(map(str, others))
+        return (
+            f"system {autopilot.system} is silent, but system {whose} speaks: another vehicle, or "
+            "this one with another id; a restart of the service takes it up"
+        )
 
     def _clocks(self) -> Iterator[tuple[str, str]]:
         signing = self._signing

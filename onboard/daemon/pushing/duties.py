@@ -6,11 +6,12 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+from onboard.daemon.pushing.aftercare import Aftercare
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.view.notices import Notices
-from onboard.push.entries import Planned, Purpose, Recovery, Result, Verdict, Watched
+from onboard.push.entries import Planned, Recovery, Result, Verdict, Watched
 from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import Outcome, Reason
 
@@ -30,24 +31,28 @@ class Duties:
     ) -> None:
         self.not_before: dict[str, float] = {}
         """End of the pause of an open transaction, by its identifier."""
+        self.aftercare = Aftercare(ledger, notices)
         self._ledger = ledger
         self._proposals = proposals
         self._witness = witness
         self._notices = notices
-        self._to_audit = False
 
     @property
     def unfinished(self) -> bool:
-        """Whether transactions are open that have to be taken up.
+        """Whether transactions are open, or did not last, that have to be taken up.
 
         One that turned out to be of another vehicle waits for that one, and nothing waits for it.
         """
+        return self._open or bool(self.aftercare.lost)
+
+    @property
+    def _open(self) -> bool:
         return any(self.not_before.get(r.transaction) != math.inf for r in self._ledger.open)
 
     def begin(self) -> None:
         """An autopilot is there (again): pauses are over, and pushes have to show."""
         self.not_before.clear()
-        self._to_audit = True
+        self.aftercare.begin()
 
     def read(self, *, busy: bool, in_flight_since: float | None) -> None:
         """What the journal asks for: to be resumed, a verdict, or the way back.
@@ -59,11 +64,12 @@ class Duties:
         if not busy:
             self._ledger.read_open()
         for imu, planned, verdict in self._ledger.judged():
-            if planned is not None and verdict is None:
+            doubted = verdict is not None and verdict.verdict is Verdict.DOUBTED
+            if planned is not None and (verdict is None or doubted):
                 self._witness.watch(planned, in_flight_since=in_flight_since)
                 continue
             self._witness.drop(imu)
-            if verdict is not None and verdict.verdict is Verdict.WORSE:
+            if verdict is not None and imu in self._ledger.condemned:
                 self._proposals.refuse(imu, f"after the last push {verdict.sentence}")
 
     def judge(self, verdicts: Sequence[Watched]) -> bool:
@@ -74,34 +80,25 @@ class Duties:
             self._notices.post(
                 f"push_{verdict.verdict.value}",
                 f"the flight after the push: {verdict.sentence}",
-                warning=verdict.verdict is Verdict.WORSE,
+                warning=verdict.verdict in {Verdict.WORSE, Verdict.DOUBTED},
             )
         return bool(verdicts)
 
-    def audit(self, values: Mapping[str, float], confirmed: Collection[str]) -> None:
-        """Once after each start of the autopilot: whether what was written is still there.
+    def look(self, values: Mapping[str, float], confirmed: Collection[str]) -> bool:
+        """See whether what was written is still there; whether anything was written down of it.
 
-        Of a way back that is gone the push is in force again: if a flight found it worse, it is
-        taken back anew, else a person may.
+        What is open is still on its way.
 
         Args:
             values: the autopilot's parameters by name.
             confirmed: names whose values were read since it was there again.
         """
-        if not self._to_audit or self.unfinished:
-            return
-        self._to_audit = False
-        for planned, recovery in self._ledger.audited(values, confirmed):
-            imu, pushed = planned.plan.imu, planned.purpose is Purpose.PUSH
-            if recovery is not None and pushed:
-                text = f"IMU {imu}: values that were written are gone: the push is taken back"
-                self._notices.post("push_not_stored", text, warning=True)
-            elif recovery is not None:
-                text = f"IMU {imu}: values that were rolled back are there again"
-                self._notices.post("roll_back_not_stored", text, warning=True)
-            elif pushed:
-                text = f"IMU {imu}: the autopilot has the values of the last push"
-                self._notices.post("push_stored", text)
+        if self._open:
+            return False
+        unasked = self._proposals.settings.mode is not Mode.NEVER and not self._proposals.approval
+        known = len(self._ledger.entries)
+        self.aftercare.look(values, confirmed, unasked=unasked)
+        return len(self._ledger.entries) != known
 
     def against(self, condition: VehicleCondition) -> str:
         """Objections to the way back at this moment; the policy 'never' is none."""
@@ -114,7 +111,8 @@ class Duties:
             if now >= self.not_before.get(recovery.transaction, now):
                 self._ledger.open.remove(recovery)
                 return recovery
-        return None
+        lost = self.aftercare.lost
+        return lost.pop(next(iter(lost))) if lost else None
 
     def take_back(self, now: float) -> Planned | None:
         """The first push that a flight found worse, unless it was tried in vain just now."""
@@ -135,8 +133,8 @@ class Duties:
             other = outcome.result is Result.OTHER_VEHICLE
             pause_ends = self._proposals.standing(imu).not_before
             self.not_before[outcome.transaction] = math.inf if other else pause_ends
-        if outcome.reason is Reason.RESTARTED:
-            self._to_audit = True  # one audit may have found more than one accelerometer
+        if outcome.result is Result.COMPLETED:
+            self.aftercare.wrote(imu, outcome.transaction)
         condemned = self._ledger.condemned.get(imu)
         if condemned is not None and outcome.reason is Reason.CHANGED_BY_OTHER:
             sentence = "not taken back: somebody has changed the parameters since"

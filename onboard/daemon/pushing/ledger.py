@@ -10,10 +10,19 @@ from __future__ import annotations
 import logging
 import uuid
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from onboard.errors import StateError
-from onboard.push.entries import Entry, Planned, Recovery, Refused, Verdict, Watched, audit
+from onboard.push.entries import (
+    Entry,
+    Planned,
+    Recovery,
+    Refused,
+    Remains,
+    Verdict,
+    Watched,
+    remains,
+)
 from onboard.push.journal import Journal
 from onboard.push.signals import JournalFailed, JournalWritten
 
@@ -65,7 +74,7 @@ class Ledger:
         return self._journal.refusals()
 
     def in_force(self, imu: int) -> Planned | None:
-        """The push that is in force on the board that is there, as far as it tells which it is."""
+        """The push that the journal has as in force on the board that is there."""
         return self._here(self._journal.last_completed(imu))
 
     def _here(self, planned: Planned | None) -> Planned | None:
@@ -75,9 +84,44 @@ class Ledger:
         here = planned.plan.vehicle.same_airframe(self.system_id, self.board)
         return planned if here else None
 
-    def all_in_force(self) -> dict[int, Planned]:
-        """:meth:`in_force` of every accelerometer that has one."""
-        return {imu: planned for imu in IMUS if (planned := self.in_force(imu)) is not None}
+    def left(self) -> dict[int, Planned]:
+        """What was written last to each accelerometer, a push or the way back, and is still ours.
+
+        It is not any more once somebody else has set values, as was seen or a flight has told.
+        """
+        theirs = self._journal.replaced()
+        written = {imu: self._here(self._journal.last_written(imu)) for imu in IMUS}
+        return {
+            imu: planned
+            for imu, planned in written.items()
+            if planned is not None and planned.transaction not in theirs
+        }
+
+    def last_pushed(self, imu: int) -> Planned | None:
+        """The last push that was completed on the board that is there, rolled back or not."""
+        return self._here(self._journal.last_pushed(imu))
+
+    def all_in_force(
+        self, values: Mapping[str, float], writing: int | None = None
+    ) -> dict[int, Planned]:
+        """The last push of every accelerometer that has the values that were pushed.
+
+        That is what a roll-back would take back.  Where the values are not known, or are changing,
+        it is :meth:`in_force`, as the journal has it.
+
+        Args:
+            values: the autopilot's parameters by name.
+            writing: accelerometer of the transaction under way.
+        """
+        found = {}
+        for imu in IMUS:
+            pushed = self.last_pushed(imu)
+            left = None if pushed is None or imu == writing else remains(pushed.plan, values)
+            if left is None:
+                pushed = self.in_force(imu)
+            if pushed is not None and left in {None, Remains.WHOLE}:
+                found[imu] = pushed
+        return found
 
     def read_open(self) -> None:
         """Look for transactions that a crash, or trouble, has left open.
@@ -90,39 +134,12 @@ class Ledger:
     def judged(self) -> Iterator[tuple[int, Planned | None, Watched | None]]:
         """Every accelerometer, its push in force and its verdict; condemned ones are kept."""
         verdicts = {e.transaction: e for _, e in self.entries if isinstance(e, Watched)}
+        replaced = self._journal.replaced()
         self.condemned.clear()
         for imu in IMUS:
             planned = self.in_force(imu)
             verdict = None if planned is None else verdicts.get(planned.transaction)
-            if planned is not None and verdict is not None and verdict.verdict is Verdict.WORSE:
+            worse = verdict is not None and verdict.verdict is Verdict.WORSE
+            if planned is not None and worse and planned.transaction not in replaced:
                 self.condemned[imu] = planned
             yield imu, planned, verdict
-
-    def audited(
-        self, values: Mapping[str, float], confirmed: Collection[str]
-    ) -> Iterator[tuple[Planned, Recovery | None]]:
-        """Whether what was written is still there, now that the autopilot has (perhaps) rebooted.
-
-        That is a push, or the way back from one, which has to last no less.
-
-        Args:
-            values: the autopilot's parameters by name.
-            confirmed: names whose values were read since it was there again.
-
-        Yields:
-            What was written and is still there (with None), or is gone (with what has to be
-            taken up, which is from then on open); those of which neither can be said are left out.
-        """
-        names = set(confirmed)
-        for imu in IMUS:
-            planned = self._here(self._journal.last_written(imu))
-            if planned is None or not planned.plan.wanted.keys() <= names:
-                continue
-            wanted = planned.plan.wanted
-            self.counters["audits"] += 1
-            recovery = audit(planned, values)
-            if recovery is not None:
-                self.open.append(recovery)
-                yield planned, recovery
-            elif all(values[name] == value for name, value in wanted.items()):
-                yield planned, None

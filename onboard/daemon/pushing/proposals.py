@@ -27,7 +27,7 @@ from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
 from onboard.daemon.pushing import limits
-from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
+from onboard.daemon.pushing.people import DIAGNOSIS, approvable, named, told
 from onboard.errors import PushError, RefusedError
 from onboard.push.diagnosed import Diagnosed
 from onboard.push.plan import PushPlan, as_known_now, propose
@@ -39,15 +39,6 @@ from onboard.push.policy import (
     consistency,
     judge,
 )
-
-PEOPLE = frozenset({"approval", "refused", "unconfirmed"})
-"""Reasons that a person lifts."""
-DIAGNOSIS = frozenset({"physics_missing", "not_diagnosed"})
-"""Reasons that a person lifts by saying so explicitly."""
-
-
-UNWRITABLE = frozenset({"out_of_bounds", "zero_offsets", "name_not_allowed"})
-"""Reasons against the very values that an approval would be for."""
 
 NOT_DIAGNOSED = object()
 """Stands for the diagnosis that there is not."""
@@ -168,7 +159,7 @@ class Proposals:
             held_back = dict(held[imu])
             for refusal in consistency(plan, self.settings, values=parameters, others=others):
                 held_back.setdefault(refusal.objection.value, refusal.sentence)
-            self.current[imu] = Proposal(plan, held_back)
+            self.current[imu] = Proposal(plan, told(imu, held_back))
 
     def _to_write(self, known: PushPlan, calibration: Calibration) -> PushPlan:
         """What a person approved, as long as that is for what is there and known; else ``known``.
@@ -352,31 +343,16 @@ class Proposals:
         if self._imus and imu not in self._imus:
             found["not_selected"] = f"IMU {imu} is not among [push] imus"
         if standing.refused:
-            found["refused"] = f"{standing.refused}; `onboard approve {imu}` lifts that"
+            found["refused"] = standing.refused
         if now < standing.not_before:
             wait = standing.not_before - now
             found["failed_before"] = f"the last try failed: the next one in {wait:.0f} s"
         unconfirmed = self._unconfirmed(imu)
         if unconfirmed and standing.approved is None:
-            found["unconfirmed"] = f"{unconfirmed}: fly, or `onboard approve {imu}`"
+            found["unconfirmed"] = unconfirmed
         if self.approval and standing.approved is None:
             found["approval"] = "a person has to approve"
         return found
-
-
-def approvable(held_back: Mapping[str, str]) -> bool:
-    """Whether a person's approval would lift one of the reasons, and something is to be gained.
-
-    Values that are never written are not approved: better ones would wait for them to lapse.
-    That this flight is not diagnosed yet, which it will be after the landing, is none of them.
-    """
-    lifted = [n for n in held_back if n in PEOPLE | DIAGNOSIS and not landing_lifts(n, held_back)]
-    return bool(lifted) and not held_back.keys() & (NOTHING_GAINED | UNWRITABLE)
-
-
-def named(imus: Sequence[int]) -> str:
-    """IMU 1, IMU 2."""
-    return ", ".join(f"IMU {imu}" for imu in imus)
 
 
 def _lapsed(approved: PushPlan, plan: PushPlan) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.proposals import Proposals, approvable
+from onboard.daemon.pushing.people import approvable
+from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
 from onboard.daemon.view.state import WAITING
 from onboard.daemon.view.written import written_view
-from onboard.push.entries import Purpose
+from onboard.push.entries import Planned, Purpose
 from onboard.push.signals import Outcome
 from onboard.push.transaction import PushTransaction
 
@@ -19,6 +22,9 @@ def push_view(
     transaction: PushTransaction | None,
     last: Outcome | None,
     judged: tuple[JudgedView, ...],
+    in_force: Mapping[int, Planned],
+    lost: Collection[int] = (),
+    mixed: Collection[int] = (),
 ) -> PushView:
     """What the snapshot says of pushes.
 
@@ -28,9 +34,12 @@ def push_view(
         transaction: under way, None if none is.
         last: how the last one of this run of the service ended.
         judged: what flights said of pushes.
+        in_force: pushes whose values the autopilot has, by accelerometer.
+        lost: accelerometers whose values the autopilot had not stored: to be put back.
+        mixed: accelerometers that have old and new values, nobody knows why.
     """
     waiting = (p.held_back.keys() for p in proposals.current.values() if p.held_back)
-    state = "interrupted" if ledger.open else "idle"
+    state = "interrupted" if ledger.open or lost else "idle"
     return PushView(
         policy=proposals.settings.mode.value,
         approval_required=proposals.approval,
@@ -39,9 +48,15 @@ def push_view(
         active_imu=None if transaction is None else transaction.plan.imu,
         proposals=proposal_views(proposals),
         last_outcome=None if last is None else told(last),
-        can_roll_back=tuple(ledger.all_in_force()),
+        can_roll_back=tuple(sorted(in_force.keys() | set(mixed))),
         judged=judged,
-        written=written_view(ledger.entries, ledger.system_id, ledger.board),
+        written=written_view(
+            ledger.entries,
+            ledger.system_id,
+            ledger.board,
+            in_force={imu: pushed.transaction for imu, pushed in in_force.items()},
+            mixed=mixed,
+        ),
     )
 
 

@@ -14,9 +14,11 @@ import msgspec
 
 from onboard.daemon.learning.flight import JudgedFlight
 from onboard.daemon.learning.learner import Learned
+from onboard.daemon.pushing.aftercare import ASKED
 from onboard.daemon.pushing.duties import Duties
 from onboard.daemon.pushing.ledger import Ledger
-from onboard.daemon.pushing.proposals import Proposals, named
+from onboard.daemon.pushing.people import named
+from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.push_view import push_view, told
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.pushing.writer import Writer
@@ -34,7 +36,7 @@ from onboard.mavlink.autopilot import (
 from onboard.mavlink.decode import is_armed, is_autopilot
 from onboard.mavlink.dialect import Message
 from onboard.push.course import TransactionSettings
-from onboard.push.entries import Purpose, Recovery, Result, Support, Watched
+from onboard.push.entries import INTERRUPTED, Planned, Purpose, Recovery, Result, Support, Watched
 from onboard.push.plan import PushPlan
 from onboard.push.policy import VehicleCondition
 from onboard.push.signals import (
@@ -74,8 +76,9 @@ class Pusher:
         self._in_flight_since: float | None = None
         self._report = VehicleReport()
         self._condition = VehicleCondition()
+        self._parameters: Mapping[str, float] = {}
         self._duties = Duties(ledger, proposals, witness, notices)
-        self._closing = False
+        self._closing = self._silent = False
         self.idle = self._writer.idle
         self._read_ledger()
 
@@ -98,7 +101,11 @@ class Pusher:
 
     def start(self, system: int, component: int, now: float) -> None:  # noqa: ARG002 - the participants' signature
         """An autopilot is there (again): open transactions may be taken up, pushes have to show."""
+        if self._writer.target != (system, component):
+            self._parameters = {}
+            self._duties.aftercare.another()
         self._writer.target = (system, component)
+        self._condition, self._silent = VehicleCondition(), False
         self._ledger.system_id = system
         self._duties.begin()
         self._read_ledger()
@@ -121,8 +128,11 @@ class Pusher:
         """What happens to the autopilot in the middle of a transaction."""
         match event:
             case AutopilotRebooted():
+                self._duties.aftercare.rebooted(self._parameters, busy=self.busy)
                 self._ended(self._writer.tell(Rebooted(), now), now)
             case AutopilotSilent() | AutopilotFound():
+                self._silent = isinstance(event, AutopilotSilent)
+                self._duties.aftercare.silent()
                 self._ended(self._writer.tell(LinkLost(), now), now)
             case RivalHeard(armed=True):
                 self._heard_armed(True, now)  # noqa: FBT003 - of whomever: it may be the real one
@@ -156,8 +166,10 @@ class Pusher:
         """
         self._condition = condition
         self._flight = learned.flight
+        self._parameters = parameters
         if board != self._ledger.board:
             self._ledger.board = board
+            self._duties.aftercare.another()
             self._read_ledger()
         report = VehicleReport.of(condition)
         if report != self._report:
@@ -175,7 +187,8 @@ class Pusher:
         )
         if self.busy or self._closing or self._proposals.forbidden:
             return
-        self._duties.audit(parameters, parameters.keys() if confirmed is None else confirmed)
+        if self._duties.look(parameters, parameters.keys() if confirmed is None else confirmed):
+            self._read_ledger()
         self._start_what_is_due(now)
 
     def judge(self, verdicts: Sequence[Watched]) -> None:
@@ -195,7 +208,8 @@ class Pusher:
         Raises:
             RefusedError: there is no push in force, or now is not the moment.
         """
-        in_force = self._ledger.all_in_force()
+        in_force, mixed = self._in_force(), self._duties.aftercare.mixed
+        in_force |= {imu: pushed for imu in mixed if (pushed := self._ledger.last_pushed(imu))}
         chosen = [imu for imu in imus or in_force if imu in in_force]
         if not chosen:
             raise RefusedError("no push is in force that could be rolled back")
@@ -203,14 +217,18 @@ class Pusher:
             raise RefusedError(f"pushes of {named(chosen)} are in force: one at a time")
         if self._writer.target is None or self._proposals.forbidden:
             raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
+        if self._silent:
+            raise RefusedError("the autopilot is silent: nothing can be rolled back now")
         if self.busy or self._duties.unfinished:
             raise RefusedError("another transaction is under way")
         against = self._duties.against(self._condition)
         if against:
             raise RefusedError(against)
         imu = chosen[0]
-        self._proposals.refuse(imu, "a person rolled the last push back")
-        self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
+        if imu in mixed:
+            self._resume(mixed[imu], now)
+        else:
+            self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
     def view(self) -> PushView:
@@ -222,7 +240,13 @@ class Pusher:
             transaction=self._writer.transaction,
             last=self.last_outcome,
             judged=tuple(self._witness.judged.values()),
+            in_force=self._in_force(),
+            lost=self._duties.aftercare.lost.keys(),
+            mixed=self._duties.aftercare.mixed.keys(),
         )
+
+    def _in_force(self) -> dict[int, Planned]:
+        return self._ledger.all_in_force(self._parameters, self._proposals.writing)
 
     def stop(self, sentence: str, now: float) -> None:
         """Have a transaction under way undone."""
@@ -284,9 +308,13 @@ class Pusher:
         if self._writer.target is None:
             return
         self._counts["resumed"] += 1
-        what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
-        text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
-        self._notices.post("push_resumed", text, warning=True)
+        if recovery.sentence == INTERRUPTED:  # of all others it was said before
+            what = "push" if recovery.purpose is Purpose.PUSH else "roll-back"
+            text = f"IMU {recovery.plan.imu}: an interrupted {what} is taken up"
+            self._notices.post("push_resumed", text, warning=True)
+        elif recovery.sentence == ASKED:
+            text = f"IMU {recovery.plan.imu}: roll-back begins"
+            self._notices.post("roll_back_begins", text)
         self._in_flight_since = None
         self._run(
             PushTransaction.resume(
@@ -309,14 +337,18 @@ class Pusher:
         self._proposals.writing = None
         self.last_outcome = outcome
         self._counts[f"outcome_{outcome.result.value}"] += 1
+        asked = outcome.result is Result.ROLLED_BACK and outcome.sentence.startswith(ASKED)
+        kind = f"{outcome.purpose.value}_{outcome.result.value}"
+        well = asked or outcome.result is Result.COMPLETED
         self._notices.post(
-            f"{outcome.purpose.value}_{outcome.result.value}",
-            told(outcome),
-            warning=outcome.result is not Result.COMPLETED,
+            "roll_back_completed" if asked else kind, told(outcome), warning=not well
         )
         imu = outcome.plan.imu
-        if outcome.result is Result.COMPLETED:
+        if well:
             self._proposals.succeeded(imu, [outcome.values[n] for n in outcome.plan.names])
+            back = asked or outcome.purpose is Purpose.ROLL_BACK
+            if back and imu not in self._ledger.condemned:  # of those it was said why
+                self._proposals.refuse(imu, "a person rolled the last push back")
         else:
             changed = outcome.reason is Reason.CHANGED_BY_OTHER
             self._proposals.failed(imu, now, changed_by_other=changed)

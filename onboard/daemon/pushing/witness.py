@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from onboard.core.estimate.result import Calibration
@@ -18,12 +19,16 @@ class Witness:
 
     def __init__(self) -> None:
         self._watches: dict[int, tuple[str, PushWatch]] = {}
+        self._said: Counter[str] = Counter()
         self.judged: dict[int, JudgedView] = {}
 
     @property
     def waiting(self) -> frozenset[str]:
-        """Pushes that wait for a flight, by transaction."""
-        return frozenset(transaction for transaction, _ in self._watches.values())
+        """Pushes that wait for a flight, by transaction; another name for each further flight."""
+        names = (transaction for transaction, _ in self._watches.values())
+        return frozenset(
+            f"{name}+{self._said[name]}" if self._said[name] else name for name in names
+        )
 
     def watch(self, pushed: Planned, *, in_flight_since: float | None = None) -> None:
         """Wait for the flight that judges this push."""
@@ -56,6 +61,7 @@ class Witness:
     ) -> tuple[Watched, ...]:
         for imu, flown, verdict in found:
             baseline = self._watches[imu][1].plan.baseline
+            self._said[verdict.transaction] += 1
             self.judged[imu] = JudgedView(
                 imu=imu,
                 verdict=verdict.verdict.value,

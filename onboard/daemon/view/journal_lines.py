@@ -14,6 +14,7 @@ from onboard.push.entries import (
     Planned,
     Purpose,
     Refused,
+    Replaced,
     Support,
     Undoing,
     Watched,
@@ -40,6 +41,8 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
                 text = f"{result.value.replace('_', ' ')}: {sentence}"
             case Watched(verdict=verdict, sentence=sentence):
                 text = f"flight after the push: {verdict.value}: {sentence}"
+            case Replaced(sentence=sentence):
+                text = f"not ours any more: {sentence}"
             case Found(imu=imu, verdict=verdict, effects=effects, missing=missing):
                 imus[entry.transaction] = imu
                 text = f"flight diagnosed: {diagnosis_in_words(verdict, effects)}"

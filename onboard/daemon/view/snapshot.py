@@ -209,8 +209,8 @@ class WrittenView(Record, frozen=True, kw_only=True):
 
     Residuals ``before`` and ``after`` are of the flight that taught the values: with those that
     were in force then, and with those written.  ``next_*`` are of the flight after it, with the
-    values written; ``verdict`` is what that flight said.  ``in_force``: nothing has been written
-    since, and it was not taken back.  ``account`` is all of it in sentences.
+    values written; ``verdict`` is what that flight said.  ``in_force``: the last push, and the
+    autopilot has its values, as far as it has told them.  ``account`` is all of it in sentences.
     """
 
     imu: int
@@ -244,7 +244,8 @@ class PushView(Record, frozen=True, kw_only=True):
     """Policy, proposals, the transaction under way and the outcome of the last.
 
     ``approval_needed``: some proposal waits for a person and for nothing else.
-    ``can_roll_back``: accelerometers whose last push is still in force.  ``written``: pushes
+    ``can_roll_back``: accelerometers that have the values of their last push, or, nobody knows
+    why, some of them and some of those from before.  ``written``: pushes
     that were completed, oldest first; of each accelerometer the first and the last few.
     """
 

@@ -6,7 +6,7 @@ the push was good for is then seen nowhere but here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from onboard.daemon.view.snapshot import AccountView, WrittenValue, WrittenView
 from onboard.push.account import account
@@ -17,7 +17,12 @@ LATEST_SHOWN = 4
 
 
 def written_view(
-    lines: Sequence[tuple[float, Entry]], system_id: int | None = None, board: str = ""
+    lines: Sequence[tuple[float, Entry]],
+    system_id: int | None = None,
+    board: str = "",
+    *,
+    in_force: Mapping[int, str] | None = None,
+    mixed: Collection[int] = (),
 ) -> tuple[WrittenView, ...]:
     """Pushes that were completed, oldest first.
 
@@ -25,11 +30,14 @@ def written_view(
         lines: the journal: Unix time and entry, oldest first.
         system_id: of the vehicle that is there: of others nothing is shown; None: of all.
         board: its unique id, empty if it tells none.
+        in_force: pushes whose values the autopilot has, transaction by accelerometer; None: as the
+            journal has it.
+        mixed: accelerometers that have values of the last push and of before it.
     """
     plans: dict[str, Planned] = {}
     verdicts: dict[str, Watched] = {}
     completed: dict[int, dict[str, tuple[float, Closed]]] = {}
-    in_force: dict[int, str] = {}
+    journalled: dict[int, str] = {}
     for at, entry in lines:
         match entry:
             case Planned(plan=plan) if system_id is None or plan.vehicle.same_airframe(
@@ -43,30 +51,45 @@ def written_view(
                 imu = planned.plan.imu
                 pushes = completed.setdefault(imu, {})
                 if entry.result is Result.COMPLETED:
-                    in_force.pop(imu, None)
+                    journalled.pop(imu, None)
                     if planned.purpose is Purpose.PUSH:
                         pushes[entry.transaction] = (at, entry)
-                        in_force[imu] = entry.transaction
-                elif pushes.pop(entry.transaction, None) is not None:
+                        journalled[imu] = entry.transaction
+                elif journalled.get(imu) == entry.transaction:
                     # Completed once; after a reboot it was gone and was taken back.
-                    in_force.pop(imu, None)
+                    pushes.pop(entry.transaction)
+                    journalled.pop(imu)
             case _:
                 pass
+    there = journalled if in_force is None else in_force
     shown = []
     for imu, pushes in completed.items():
         names = list(pushes)
         for name in names[:1] + names[1:][-LATEST_SHOWN:]:
             at, closed = pushes[name]
-            current = in_force.get(imu) == name
-            shown.append(_view(plans[name], at, closed, verdicts.get(name), in_force=current))
+            view = _view(
+                plans[name],
+                at,
+                closed,
+                verdicts.get(name),
+                in_force=there.get(imu) == name and imu not in mixed,
+                mixed=imu in mixed and name == names[-1],
+            )
+            shown.append(view)
     return tuple(sorted(shown, key=lambda view: view.at))
 
 
 def _view(
-    planned: Planned, at: float, closed: Closed, watched: Watched | None, *, in_force: bool
+    planned: Planned,
+    at: float,
+    closed: Closed,
+    watched: Watched | None,
+    *,
+    in_force: bool,
+    mixed: bool,
 ) -> WrittenView:
     plan, baseline = planned.plan, planned.plan.baseline
-    told = account(plan, watched, in_force=in_force)
+    told = account(plan, watched, in_force=in_force, mixed=mixed)
     return WrittenView(
         imu=plan.imu,
         at=at,

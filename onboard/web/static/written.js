@@ -3,7 +3,7 @@
 import { byId, h, renew } from "./dom.js";
 import { brief, fixed, moment } from "./words.js";
 
-const BETTER = { kept: "good", worse: "bad", superseded: "" };
+const BETTER = { kept: "good", doubted: "warn", worse: "bad", superseded: "" };
 
 /** The pushes of one accelerometer, newest first. */
 export function showWritten(push, imu) {
