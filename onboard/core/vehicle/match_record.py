@@ -14,6 +14,7 @@ from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
 from onboard.core.vehicle.bounds import below_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.matching import Matched, held_out
@@ -88,6 +89,10 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         places = m.model.indices(name)
         effect = m.model.effect(name)
         shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
+        if name == MotorLag.name and shown[0].value < 0.0:
+            late = Compared(0.0, -shown[0].value, shown[0].sigma, shown[0].unit)
+            out.append(Difference(DELAY, "sensor", {"delay": late}))
+            continue
         apart = fit.theta[places] - m.model.nominal[places]
         columns = [
             k for k, a in enumerate(m.model.axes) if (a in FORCE) != (name == AirspeedScale.name)
