@@ -58,7 +58,8 @@ class WindEstimate:
 
     ``series_*`` are estimates of blocks of flight: times (b,) s since the start, heights above
     ground (b,) m, components (b, 2) and their sigmas (b, 2); ``ekf`` (b, 2) is the autopilot's own
-    (NaN where it has none), ``law`` (b, 2) what one wind and its profile are there.
+    (NaN where it has none), ``law`` (b, 2) what one wind and its profile are there.  ``change`` is
+    the RMS of a wind that became another about its mean, m/s; zero where it did not.
     """
 
     north: float
@@ -74,6 +75,7 @@ class WindEstimate:
     series_sigma: Array = field(default_factory=lambda: np.zeros((0, 2)))
     ekf: Array = field(default_factory=lambda: np.zeros((0, 2)))
     law: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    change: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
