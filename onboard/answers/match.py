@@ -317,7 +317,7 @@ def _value(
 def _verdict(
     vehicle: VehicleMatch, simulated: VehicleMatch | None, effects: tuple[Difference, ...]
 ) -> Verdict:
-    if vehicle.series is None:
+    if vehicle.series is None or not vehicle.shown:
         return Verdict.INSUFFICIENT if not effects else Verdict.PARTLY_EXPLAINED
     explained = vehicle.explained and (simulated is None or simulated.explained)
     if not effects:

@@ -88,9 +88,6 @@ def match_copter(
     )
     absent = copter_missing(flight, frame)
     untested = not_testable_of(found, absent, MANOEUVRES)
-    if set(found.choices.names) <= set(found.chosen.untestable):
-        # What is left of a force that nothing could have explained is no evidence of gusts.
-        return told.beside(VehicleMatch("copter", not_testable=untested, note=NOTHING_SHOWN))
     match = vehicle_match(
         found,
         "copter",
@@ -99,6 +96,10 @@ def match_copter(
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
     )
+    if set(found.choices.names) <= set(found.chosen.untestable):
+        # What is left of a force that nothing could have explained is no evidence of gusts.
+        note = "; ".join(filter(None, (NOTHING_SHOWN, match.note)))
+        match = replace(match, effects=(), shown=False, note=note)
     return told.beside(match)
 
 

@@ -179,6 +179,7 @@ class VehicleMatch:
         seconds: of flight that was used.
         explained: whether what is left is within what the sensors explain.
         note: a sentence for the reader; may be empty.
+        shown: whether this flight would have shown any effect.
     """
 
     vehicle: str
@@ -199,3 +200,4 @@ class VehicleMatch:
     seconds: float = 0.0
     explained: bool = True
     note: str = ""
+    shown: bool = True

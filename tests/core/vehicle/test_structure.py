@@ -101,3 +101,14 @@ def test_nothing_is_said_of_a_wind_that_stays():
     match = matched(copter_flight(seed=9, wind=(3.0, 1.0)))
     assert match.wind.change == 0.0
     assert "became another" not in match.note
+
+
+def test_a_flight_that_shows_nothing_has_no_gusts_either():
+    """In pieces that are too short to tell anything from, what is left is no evidence of air."""
+    flight = gusty(copter_flight(seed=3, seconds=80.0, wind=(2.0, 1.0)), 2.0, 2.0, 3)
+    assert matched(flight).shown
+    flight.piece[:] = np.arange(len(flight))
+    match = matched(flight)
+    assert not match.shown
+    assert names(match) == set()
+    assert "no effect at any plausible size" in match.note
