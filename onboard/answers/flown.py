@@ -15,6 +15,7 @@ from typing import Final, TypeGuard, TypeVar
 import numpy as np
 
 from onboard.answers.answer import Answer
+from onboard.answers.kept_motion import motion_of
 from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.core.diagnosis.records import Diagnosis
@@ -37,6 +38,7 @@ from onboard.core.inputs.samples import (
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.copter import carried_by_rotors
+from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
 from onboard.core.vehicle.trajectory import Sensors
@@ -171,6 +173,10 @@ class Flown:
         del calibrations
         return None
 
+    def disagreement(self, *, derived: bool) -> Disagreement | None:
+        """Two quantities that are not of one motion; None where all are."""
+        return disagreement(motion_of(self._kept), derived=derived)
+
     def signals(self) -> Signals:
         """The vehicle's streams."""
         kept = self._kept
@@ -216,6 +222,7 @@ class FlownRecording:
     batches: tuple[Batch, ...]
     grounded: tuple[tuple[float, float], ...]
     ground: float
+    disagreement: Disagreement | None = None
 
     @property
     def name(self) -> str:
@@ -262,6 +269,7 @@ def flown(
         batches,
         tuple(collected.grounded),
         collected.ground,
+        collected.disagreement(derived=derived),
     )
 
 

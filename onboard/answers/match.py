@@ -16,6 +16,7 @@ from onboard.answers.same_flight import refuse_copies, refuse_one_flight_twice, 
 from onboard.answers.sensor_level import TIMING_NAMES, sensor_differences
 from onboard.core.diagnosis.records import NotTestable, Verdict
 from onboard.core.inputs.segments import Batch
+from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.contradiction import Contradiction, contradiction
 from onboard.core.vehicle.copter import Outputs
@@ -123,6 +124,9 @@ def match(
     sensors = sensor_differences(recording.diagnosis, other.diagnosis if other else None)
     if recording.derived:
         sensors = ()
+    elif recording.disagreement is not None:
+        # A receiver's faults are seen by itself; all else is told from what contradicts itself.
+        sensors = tuple(d for d in sensors if d.name == GpsFault.effect)
     elif any(r.kind == "table" for r in recording.source.recordings):
         # Its velocity is not a receiver's: it has no latency to compare with the simulator's.
         sensors = tuple(d for d in sensors if d.name not in TIMING_NAMES)
@@ -175,6 +179,8 @@ def vehicle_level(
     why = ""
     if kind and kind not in (*COPTERS, *PLANES):
         why = f"there is no model of the airframe of a {kind}"
+    elif recording.disagreement is not None:
+        why = str(recording.disagreement)
     elif doubt.hopeless:
         why = str(doubt)
     elif flight is None or len(flight) < FEWEST_STEPS:
@@ -216,6 +222,8 @@ def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> 
     Raises:
         RecordingError: it is of another kind of vehicle, or none.
     """
+    if recording.disagreement is not None:
+        raise RecordingError(f"{recording.name}: {recording.disagreement}")
     its = recording.signals.kind or kind
     pieces = motions(recording.batches, recording.sensors)
     flight = None if its != kind else _flight(recording, kind, airframe, pieces)
@@ -309,7 +317,7 @@ def _value(
 def _verdict(
     vehicle: VehicleMatch, simulated: VehicleMatch | None, effects: tuple[Difference, ...]
 ) -> Verdict:
-    if vehicle.series is None:
+    if vehicle.series is None or not vehicle.shown:
         return Verdict.INSUFFICIENT if not effects else Verdict.PARTLY_EXPLAINED
     explained = vehicle.explained and (simulated is None or simulated.explained)
     if not effects:

@@ -9,6 +9,7 @@ import numpy as np
 
 from onboard.answers.flown import FlownRecording
 from onboard.answers.sensor_level import DRIVER_LAG_S, calibration_settings
+from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.records import Difference, VehicleMatch
@@ -34,7 +35,8 @@ def settings_of(
     named = {d.name: d for d in (*sensors, *effects)}
     out: list[Setting] = []
     wind = vehicle.wind
-    if "wind" in named and wind is not None:
+    # No constant wind flies like one that becomes another.
+    if "wind" in named and wind is not None and wind.change < FLOOR_M_S:
         out += _wind_settings(vehicle)
     if "turbulence" in named and "rms_with_faster" in named["turbulence"].values:
         # The simulator's gusts change with each of its steps, and point anywhere: the setting is

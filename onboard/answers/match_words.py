@@ -19,6 +19,7 @@ TITLES = {
     "thrust_curve": "curve of thrust over command",
     "voltage_sag": "battery that gives way",
     "motor_lag": "motors that answer late",
+    "output_delay": "outputs that are logged late",
     "thrust_tilt": "direction of the thrust",
     "ground_effect": "ground effect",
     "air_density": "density of the air",

@@ -7,7 +7,6 @@ different rates fit into one table.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
@@ -40,13 +39,10 @@ from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION
 from onboard.errors import RecordingError
 from onboard.recordings.recording import Recording, elapsed_s
+from onboard.recordings.table_cells import FEWEST_ROWS, cells_of, word_in
 from onboard.recordings.table_map import TableMap, load_map
 
-DELIMITERS = ",;\t"
-FEWEST_ROWS = 20
 EARTH_RADIUS_M = 6_371_000.0
-LONGEST_HEAD = 1_000_000
-"""Characters of the names of all columns: 10,000 of a hundred each [bound]."""
 SLOPE_S = 0.1
 """Span over which a position becomes a velocity, s: longer than the noise of motion capture,
 shorter than a manoeuvre."""
@@ -56,7 +52,6 @@ LONGEST_S = 3.2e7
 """A year: what lasts longer is no flight, but a cell that is no time [bound]."""
 SMALLEST = 1e-6
 """Length of a quaternion that is none."""
-NO_NUMBERS = ("", "nan", "null", "none", "na")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +71,7 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     """
     path, chosen = Path(path), load_map(columns)
     wanted = list(dict.fromkeys(c for q in chosen.quantities.values() for c in q.columns))
-    cells, lines = _read(path, wanted)
+    cells, lines = cells_of(path, wanted)
     with np.errstate(all="ignore"):  # a cell may hold any number
         tracks = _tracks(path, cells, lines, chosen)
         samples = _samples(path, tracks, chosen)
@@ -94,49 +89,6 @@ def open_table(path: str | Path, columns: str | Path) -> Recording:
     )
 
 
-def _read(path: Path, wanted: list[str]) -> tuple[dict[str, Array], Array]:
-    """The wanted columns, NaN where a cell holds no number; and the line of each row."""
-    if path.exists() and not path.is_file():
-        raise RecordingError(f"{path}: is not a regular file")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            head = file.readline(LONGEST_HEAD).lstrip("# ")
-            delimiter = max(DELIMITERS, key=head.count)
-            names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter), [])]
-            missing = [name for name in wanted if name not in names]
-            if missing:
-                there = ", ".join(names[:20])
-                raise RecordingError(f"{path}: has no column {missing[0]!r} (there: {there})")
-            places = [names.index(name) for name in wanted]
-            reader = csv.reader(file, delimiter=delimiter)
-            rows = [  # the head is line one, of which this reader does not know
-                [reader.line_num + 1, *(_cell(row[k]) if k < len(row) else np.nan for k in places)]
-                for row in reader
-                if row
-            ]
-    except FileNotFoundError:
-        raise RecordingError(f"{path}: no such file") from None
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: no table of text ({error})") from None
-    if len(rows) < FEWEST_ROWS:
-        raise RecordingError(f"{path}: {len(rows)} rows are too few for a flight")
-    every = np.array(rows, dtype=np.float64)
-    return {name: every[:, k] for k, name in enumerate(wanted, 1)}, every[:, 0]
-
-
-def _cell(text: str) -> float:
-    """A number, or NaN: what is no number is no measurement."""
-    text = text.strip()
-    if text.lower() in NO_NUMBERS:
-        return float("nan")
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
-
-
 def _tracks(
     path: Path, cells: dict[str, Array], lines: Array, chosen: TableMap
 ) -> dict[str, Track]:
@@ -152,12 +104,15 @@ def _tracks(
         name: np.flatnonzero(np.isfinite(x).all(axis=1) & np.isfinite(t))
         for name, x in values.items()
     }
+    _refuse_words(path, t, clock.columns[0])
     _forward(path, t, rows.values(), lines, clock.columns[0])
     out: dict[str, Track] = {}
     for name, x in values.items():
         its, first = np.unique(t[rows[name]], return_index=True)
         if name in ("attitude", "force", "velocity", "position") and len(its) < FEWEST_ROWS:
             where = ", ".join(chosen.quantities[name].columns)
+            for k, column in enumerate(chosen.quantities[name].columns):
+                _refuse_words(path, x[:, k], column)
             raise RecordingError(f"{path}: {len(its)} rows with a number in {where} are no flight")
         out[name] = Track(its, x[rows[name]][first])
     # The clock starts at zero: nanoseconds since 1970 would leave no digits for a difference.
@@ -169,6 +124,15 @@ def _tracks(
     if max(float(track.t[-1]) for track in out.values() if len(track.t)) > LONGEST_S:
         raise RecordingError(f"{path}: a flight of more than a year by {where}")
     return out
+
+
+def _refuse_words(path: Path, x: Array, column: str) -> None:
+    """See to it that a column (n,) whose cells are hardly ever numbers is said to be of words."""
+    if np.count_nonzero(np.isfinite(x)) < FEWEST_ROWS and (word := word_in(path, column)):
+        raise RecordingError(
+            f"{path}: {column} holds {word!r}, which is no number: decimals have a point, and "
+            "times are numbers, not dates"
+        )
 
 
 def _forward(

@@ -288,7 +288,7 @@ def test_a_table_that_is_none_is_named(tmp_path, columns):
 
 def test_a_column_of_words_is_no_flight(table, columns):
     table.write_text(table.read_text().replace(".", "x"))
-    with pytest.raises(RecordingError, match="are no flight"):
+    with pytest.raises(RecordingError, match="which is no number"):
         open_table(table, columns())
 
 
@@ -350,3 +350,28 @@ def test_quantities_may_stand_one_below_the_other(table, columns):
     which = {row: tuple(cell != "" for cell in row.split(",")[1:]) for row in rows}
     table.write_text("\n".join([head, *sorted(rows, key=lambda row: which[row])]) + "\n\n")
     assert list(open_table(table, text).samples()) == before
+
+
+def test_a_clock_of_dates_and_decimals_with_a_comma_are_said_to_be_no_numbers(table, columns):
+    its, text = columns(), table.read_text()
+    head, *rows = text.splitlines()
+    dates = [f"2026-01-01T00:00:{k:02d}Z,{row.split(',', 1)[1]}" for k, row in enumerate(rows)]
+    table.write_text("\n".join([head, *dates]))
+    with pytest.raises(RecordingError, match="t_ms holds '2026-01-01T00:00:00Z', which is no num"):
+        open_table(table, its)
+    table.write_text(text.replace(",", ";").replace(".", ","))
+    with pytest.raises(RecordingError, match=r"holds '[-0-9]+,[0-9]+', which is no number"):
+        open_table(table, its)
+
+
+def test_a_column_of_words_is_named_though_its_clock_has_numbers(table, columns):
+    head, *rows = table.read_text().splitlines()
+    place = head.split(",").index("ay")
+    worded = []
+    for row in rows:
+        its = row.split(",")
+        its[place] = "n. a." if its[place] else ""
+        worded.append(",".join(its))
+    table.write_text("\n".join([head, *worded]))
+    with pytest.raises(RecordingError, match=r"ay holds 'n\. a\.', which is no number"):
+        open_table(table, columns())

@@ -11,6 +11,7 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.beyond import LAWS, Beyond
 from onboard.core.vehicle.effects.body_drag import BodyDrag
 from onboard.core.vehicle.effects.charge import Charge
 from onboard.core.vehicle.effects.effect import Effect
@@ -30,6 +31,7 @@ from onboard.core.vehicle.effects.thrust_tilt import ThrustTilt
 from onboard.core.vehicle.effects.vertical_drag import VerticalDrag
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_profile import TOP_M, WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.model import ForceModel
@@ -65,6 +67,8 @@ class Variant:
             1/s; zero: not at all.
         through: by how much in the wind that their thrust shows, beside the drag's, m/s; likewise.
         among: whether there are other flights of the vehicle, though one alone is looked at.
+        beyond: what repeats with the motion, or with time, and is no effect's
+            (:mod:`onboard.core.vehicle.structure`).
     """
 
     profile_top: float = TOP_M
@@ -74,6 +78,7 @@ class Variant:
     moving: float = 0.0
     through: float = 0.0
     among: bool = False
+    beyond: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +197,7 @@ def copter_model(
     still = start(flight)
     everything: list[Effect] = [
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
+        *([WindChange(flight)] if CHANGE in variant.beyond else []),
         own([WindProfile(variant.profile_top) for _ in parts]),
         *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),
@@ -202,6 +208,7 @@ def copter_model(
         RotorDrag(frame, by_components=variant.by_components),
         BodyDrag(frame),
         *([own([OwnMotion(variant.moving) for _ in parts])] if variant.moving else []),
+        *(Beyond(key) for key in variant.beyond if key in LAWS),
         MotorLag(),
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),

@@ -42,6 +42,7 @@ from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.said import change_in
 from onboard.core.vehicle.signals import Signals
+from onboard.core.vehicle.structure import structures
 from onboard.core.vehicle.sudden import CHANGES, change_of
 from onboard.core.vehicle.turbulence import turbulence_of
 
@@ -60,6 +61,10 @@ RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("thrust_tilt", {"by_components": True}),
 )
 """Where an effect was found, another form of the model; see :func:`_better`."""
+NOTHING_SHOWN = "this flight would have shown no effect at any plausible size"
+MOST_BEYOND = 3
+"""Laws that no effect has, and are let in one after the other; with more the model is another
+one [cost]."""
 
 
 def match_copter(
@@ -91,13 +96,17 @@ def match_copter(
         frame=_frame(found, signals, frame, effects),
         curves=copter_curves(found, frame, signals),
     )
+    if set(found.choices.names) <= set(found.chosen.untestable):
+        # What is left of a force that nothing could have explained is no evidence of gusts.
+        note = "; ".join(filter(None, (NOTHING_SHOWN, match.note)))
+        match = replace(match, effects=(), shown=False, note=note)
     return told.beside(match)
 
 
-def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, variant: Variant) -> Matched:
+def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, given: Variant) -> Matched:
     """What is found with the likeliest of the model's forms, beginning with this one."""
     apart = _apart(flight, frame, force_sigma)
-    plain = replace(variant, moving=apart.moving, through=apart.through)
+    plain = replace(given, moving=apart.moving, through=apart.through)
     variant, found = _with_change(flight, frame, force_sigma, plain)
     seen = max(found.turbulence.rms, RECEIVER_M_S)
     answering = replace(variant, gusts=seen)
@@ -114,6 +123,10 @@ def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, variant: V
             other = matched(copter_model(flight, frame, force_sigma, other_form))
             if _better(other, found):
                 variant, found = other_form, other
+    if len(variant.beyond) < MOST_BEYOND and (more := structures(found.fit, variant.beyond)):
+        # All else is asked anew beside it: what looked like gusts may have been this.
+        beyond = (*variant.beyond, more[0].key)
+        return _found(flight, frame, force_sigma, replace(given, beyond=beyond))
     return found
 
 

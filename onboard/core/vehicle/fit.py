@@ -122,6 +122,19 @@ class Fit:
         return float(np.median(self.inflation))
 
 
+@dataclass(frozen=True, slots=True)
+class Slopes:
+    """Derivatives (n, k, m) of a prediction, and without a tilt; None where that is not needed."""
+
+    by: Array
+    level: Array | None
+
+
+def slopes_at(model: ForceModel, theta: Array) -> Slopes:
+    """Those of a model at its unknowns (m,)."""
+    return Slopes(model.jacobian(theta), _level(model, theta))
+
+
 def fitted(
     model: ForceModel, start: Array | None = None, noise: Sequence[AxisNoise] | None = None
 ) -> Fit:
@@ -165,15 +178,19 @@ def summed(
     prior: Array,
     noise: Sequence[AxisNoise],
     sensitivity: Array,
+    slopes: Slopes | None = None,
 ) -> Fit:
-    """Sums by block about ``theta`` (m,), and what their scatter says of the variances."""
+    """Sums by block about ``theta`` (m,), and what their scatter says of the variances.
+
+    ``slopes`` are those at ``theta``, where they are known.
+    """
     residual = model.measured() - model.predicted(theta)
-    jacobian = model.jacobian(theta)
+    slopes = slopes_at(model, theta) if slopes is None else slopes
+    jacobian, level = slopes.by, slopes.level
     windows = windows_of(model.flight)
     of_row = np.floor((model.flight.t[windows.first] - model.flight.t[0]) / BLOCK_S)
     # A step is of the block that its row is counted in, wherever the next one begins.
     block = np.repeat(of_row, windows.counts)
-    level = _level(model, theta)
     rows = whitened_rows(model, residual, jacobian, noise, sensitivity, level)
     part = model.flight.part[windows.first]
     sums = []

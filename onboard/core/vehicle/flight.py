@@ -193,6 +193,7 @@ def _before(battery: Stream, t: float) -> float:
 
 def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[str, Array] | None:
     """Means of a piece's samples over the steps that have any."""
+    m = m.finer(0.5 * STEP_S)
     which = np.floor((m.t - m.t[0]) / STEP_S).astype(np.int64)
     steps, first, counts = np.unique(which, return_index=True, return_counts=True)
     if len(steps) < 3:

@@ -44,6 +44,42 @@ CONTRADICTION_M_S2: Final = 5.0
 attitude that is five degrees off 0.9, so that it is three times what both may be together; an
 attitude that is half a right angle off, or a velocity that jumps, is more [physics]."""
 
+# Quantities that are not of one motion (same_motion).
+
+TURN_S: Final = 0.19
+"""s over which attitude and gyroscope are compared: two samples at 10 Hz, and no more than a part
+of a radian [data sheet]."""
+MOTION_S: Final = 0.95
+"""s over which velocity is compared with force and position: five fixes at 5 Hz, one at 1 Hz, and
+long beside a receiver's lag [data sheet]."""
+LONGEST_SPAN_S: Final = 2.5
+"""s, past which it is an outage between two samples [data sheet]."""
+LONGEST_GAP_S: Final = 0.3
+"""s between samples of the accelerometer or the gyroscope, over which nothing is summed up
+[physics]."""
+APART_RATE_RAD_S: Final = 0.1
+"""Rates further apart are of no gyroscope that works, rad/s: twice what one that nobody calibrated
+is off by at rest [data sheet]."""
+APART_FORCE_M_S2: Final = 1.6
+"""The same of accelerations, m/s^2: an accelerometer that nobody calibrated is 0.7 off and an
+attitude that is five degrees off 0.9 [data sheet]."""
+APART_VELOCITY_M_S: Final = 2.0
+"""The same of velocities, m/s: a metre by which a receiver's height wanders in a second, and a
+metre between its filter of the position and that of the velocity [data sheet]."""
+APART_SHARE: Final = 0.15
+"""Of the squares of both, that the square of their difference may be: axes that are 32 degrees
+apart, or a unit that is 1.75 times the other.  Scales, axes and delays of the catalogue make a
+hundredth [physics]."""
+APART_SHARE_FORCE: Final = 0.5
+"""The same of accelerations: a receiver's lag of half a second takes a quarter of a manoeuvre of
+three seconds out of its place [physics]."""
+FEWEST_APART: Final = 10
+"""Spans that must be wrong at least, beside a tenth of all and half of those that move: a glitch
+of a few seconds is none [probability]."""
+ALIKE_SHARE: Final = 0.15
+"""Of the sizes of both, or of gravity, that is left where a guess of what was exchanged is worth
+saying [use]."""
+
 # Noise (noise).
 
 CORRELATION_S: Final = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0)

@@ -14,9 +14,11 @@ from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
 from onboard.core.vehicle.bounds import below_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence, spoilt_by
+from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.limits import SURE
-from onboard.core.vehicle.matching import Matched, held_out
+from onboard.core.vehicle.matching import Matched, left_by
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.places import AXES, FORCE, places_of
@@ -30,7 +32,7 @@ from onboard.core.vehicle.records import (
     VehicleMatch,
 )
 from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
-from onboard.core.vehicle.wind_record import wind_of
+from onboard.core.vehicle.wind_record import change_sentence, wind_of
 
 PARTLY = "gusts hide a part of its numbers, and only the rest was tested"
 
@@ -80,14 +82,19 @@ def differences(m: Matched) -> tuple[Difference, ...]:
     """The effects that were chosen, and turbulence, with their evidence."""
     fit, chosen = m.fit, m.chosen
     whole = sum(max(chosen.gains[n], 0.0) for n in chosen.effects)
+    spoilt = spoilt_by(beyond_of(m.model.effects))
     out = []
     for name in chosen.effects:
-        if name in m.below:
+        if name in m.below or name in spoilt:
             continue
         without = tuple(n for n in chosen.effects if n != name)
         places = m.model.indices(name)
         effect = m.model.effect(name)
         shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
+        if name == MotorLag.name and shown[0].value < 0.0:
+            late = Compared(0.0, -shown[0].value, shown[0].sigma, shown[0].unit)
+            out.append(Difference(DELAY, "sensor", {"delay": late}))
+            continue
         apart = fit.theta[places] - m.model.nominal[places]
         columns = [
             k for k, a in enumerate(m.model.axes) if (a in FORCE) != (name == AirspeedScale.name)
@@ -102,7 +109,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
                     m.model.flight, fit.jacobian[:, :, places] @ apart, m.model.axes, fit.block
                 ),
                 chosen.rivals[name],
-                rms(held_out(m.choices, without)[:, columns]),
+                rms(left_by(m.choices, without)[:, columns]),
                 rms(m.held[:, columns]),
             )
         )
@@ -206,7 +213,7 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 def is_explained(m: Matched) -> bool:
     """Whether what is left is less than errors of the motion, or the gusts found, make."""
-    if m.remainders or m.chosen.suspected or m.below:
+    if m.remainders or m.chosen.suspected or m.below or beyond_of(m.model.effects):
         return False
     unclear = m.model.unclear(m.fit.theta)
     gusts = _gusts(m) * m.fit.sensitivity
@@ -232,6 +239,8 @@ def note_of(m: Matched) -> str:
         *dict.fromkeys(m.model.effect(n).note for n in m.chosen.effects),
         suspected_sentence(m.chosen.suspected),
         below_sentence(m.below),
+        beyond_sentence(beyond_of(m.model.effects)),
+        change_sentence(m),
         remainder_sentence(m.remainders),
         left_out_sentence(m.left_out),
     )

@@ -12,6 +12,7 @@ from onboard.core.vehicle.bounds import at_bounds, below_bounds
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.felt import felt_by
 from onboard.core.vehicle.fit import Fit, fitted
@@ -81,7 +82,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         fit,
         choices,
         chosen,
-        held_out(choices, chosen.effects),
+        left_by(choices, chosen.effects),
         nominal,
         turbulence,
         remainders(replace(model, flight=whole), fit),
@@ -156,6 +157,14 @@ def held_out(choices: Choices, effects: tuple[str, ...]) -> Array:
     for fold, x in choices.by_fold(effects):
         mine = np.isin(fit.block, numbers[fold])
         out[mine] -= fit.jacobian[mine] @ x
+    return out
+
+
+def left_by(choices: Choices, effects: tuple[str, ...]) -> Array:
+    """(n, k) the same, with what no effect describes in it: it is not handed back."""
+    fit = choices.fit
+    mine = [k for k in range(len(fit.theta)) if isinstance(fit.model.effect_of(k), Beyond)]
+    out: Array = held_out(choices, effects) + fit.jacobian[:, :, mine] @ fit.theta[mine]
     return out
 
 

@@ -189,13 +189,13 @@ class ForceModel:
         out: Array = np.sqrt(np.sum(np.square(slopes), axis=0))
         return out
 
-    def unclear(self, theta: Array) -> Array:
-        """(n, k) m/s^2 that errors of the velocity and of the heading may make, and no gust."""
+    def unclear(self, theta: Array, velocity: float = UNCLEAR_M_S) -> Array:
+        """(n, k) m/s^2 that errors of the velocity (m/s) and the heading may make, and no gust."""
         slope = self.gust_slope(theta)
         u_n = np.einsum("nij,ni->nj", self.flight.R_bn, self.air(theta).u_b)
         across = np.column_stack([-u_n[:, 1], u_n[:, 0], np.zeros(len(u_n))])
         turned = np.einsum("nki,ni->nk", slope, across)
-        square = UNCLEAR_M_S**2 * np.sum(slope**2, axis=-1)
+        square = velocity**2 * np.sum(slope**2, axis=-1)
         out: Array = np.sqrt(square + (HEADING_RAD * turned) ** 2)
         return out
 
@@ -235,6 +235,16 @@ class ForceModel:
             there[places] += DIFFERENCE * self.plausible[places]
             self._spread(places, self._from(stages, owners[places[0]], there) - here, out)
         return out
+
+    def columns(self, theta: Array, places: Sequence[int]) -> Array:
+        """(n, k, p) derivatives by some of the unknowns, by central differences."""
+        out = []
+        for j in places:
+            step = np.zeros(len(theta))
+            step[j] = DIFFERENCE * self.plausible[j]
+            apart = self.predicted(theta + step) - self.predicted(theta - step)
+            out.append(0.5 * apart / step[j])
+        return np.stack(out, axis=-1)
 
     def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
         """(n, k, m) derivatives by central differences, in air that also moves by ``gust``."""

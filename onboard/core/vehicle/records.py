@@ -58,7 +58,8 @@ class WindEstimate:
 
     ``series_*`` are estimates of blocks of flight: times (b,) s since the start, heights above
     ground (b,) m, components (b, 2) and their sigmas (b, 2); ``ekf`` (b, 2) is the autopilot's own
-    (NaN where it has none), ``law`` (b, 2) what one wind and its profile are there.
+    (NaN where it has none), ``law`` (b, 2) what one wind and its profile are there.  ``change`` is
+    the RMS of a wind that became another about its mean, m/s; zero where it did not.
     """
 
     north: float
@@ -74,6 +75,7 @@ class WindEstimate:
     series_sigma: Array = field(default_factory=lambda: np.zeros((0, 2)))
     ekf: Array = field(default_factory=lambda: np.zeros((0, 2)))
     law: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    change: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +179,7 @@ class VehicleMatch:
         seconds: of flight that was used.
         explained: whether what is left is within what the sensors explain.
         note: a sentence for the reader; may be empty.
+        shown: whether this flight would have shown any effect.
     """
 
     vehicle: str
@@ -197,3 +200,4 @@ class VehicleMatch:
     seconds: float = 0.0
     explained: bool = True
     note: str = ""
+    shown: bool = True

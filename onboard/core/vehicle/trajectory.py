@@ -8,7 +8,7 @@ So the difference of the two, both averaged alike, is what a smoother
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -82,6 +82,27 @@ class Motion:
     velocity_sigma: float
     attitude_sigma: float
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
+
+    def finer(self, step_s: float) -> Motion:
+        """The same motion at even times, where its samples are usually further apart.
+
+        Straight lines between samples are what its velocity is the integral of.  A grid that is as
+        coarse as the samples are would have steps with two of them, and steps with none, which look
+        like gaps of the flight.
+        """
+        if float(np.median(np.diff(self.t))) <= step_s:
+            return self
+        # As fine as half of it: a step's mean is of two at least, wherever it begins.
+        t = self.t[0] + 0.5 * step_s * (np.arange(int(2.0 * np.ptp(self.t) / step_s)) + 0.5)
+        return replace(
+            self,
+            t=t,
+            f_b=_at(t, self.t, self.f_b),
+            w_b=_at(t, self.t, self.w_b),
+            R_nb=_at(t, self.t, self.R_nb.reshape(-1, 9)).reshape(-1, 3, 3),
+            v_n=_at(t, self.t, self.v_n),
+            height=np.interp(t, self.t, self.height),
+        )
 
 
 def motions(batches: Sequence[Batch], sensors: Sensors) -> list[Motion]:

@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.own import Own
+from onboard.core.vehicle.effects.wind_change import WindChange
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.matching import Matched
+from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import WindEstimate
+
+
+def changing(m: Matched) -> Array | None:
+    """(n, 2) wind towards north and east at each step, m/s; None where it is one for all."""
+    change = next((e for e in m.model.effects if isinstance(e, WindChange)), None)
+    if change is None:
+        return None
+    mean = m.fit.theta[m.model.indices("wind")]
+    first = m.model.index(change.unknowns[0].name)
+    values = m.fit.theta[first : first + len(change.unknowns)].tolist()
+    out: Array = mean + change.wind(m.model.flight, values)
+    return out
+
+
+def change_sentence(m: Matched) -> str:
+    """What a person is told of a wind that became another; empty where it did not."""
+    wind = changing(m)
+    if wind is None:
+        return ""
+    (north, east), (n, e) = wind[0].tolist(), wind[-1].tolist()
+    return (
+        f"the wind became another: towards north and east from {north:.1f} and {east:.1f} m/s to "
+        f"{n:.1f} and {e:.1f}; its mean is told, and no setting makes it"
+    )
 
 
 def wind_of(m: Matched, number: int = 0) -> WindEstimate:
@@ -30,6 +59,7 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         if isinstance(law_of, WindProfile):
             factor = law_of.factor(m.model.start(flight), exponent)
     numbers, since = np.unique(fit.block), flight.since_start
+    changed = changing(m)
     series, spread, when, heights, ekf, law = [], [], [], [], [], []
     for block, block_number in zip(fit.blocks, numbers, strict=True):
         mine = fit.block == block_number
@@ -46,6 +76,9 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         law.append(here * (measured + fit.theta[places]))
         when.append(float(np.mean(since[mine])))
         heights.append(float(np.mean(flight.height[mine]) - flight.ground))
+        if changed is not None:
+            beside = np.mean(changed[mine], axis=0) - fit.theta[places]
+            series[-1], law[-1] = series[-1] + beside, law[-1] + beside
         has = flight.ekf_wind.shape[1] == 2
         ekf.append(np.mean(flight.ekf_wind[mine], axis=0) if has else np.full(2, np.nan))
     return WindEstimate(
@@ -62,4 +95,5 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         np.array(spread).reshape(-1, 2),
         np.array(ekf).reshape(-1, 2),
         np.array(law).reshape(-1, 2),
+        0.0 if changed is None else math.sqrt(2.0) * rms(changed - np.mean(changed, axis=0)),
     )

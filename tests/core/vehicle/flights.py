@@ -73,12 +73,13 @@ def copter_flight(
     lag=0.0,
     mass=None,
     weaker=None,
+    turning=(0.0, 0.0),
 ):
     """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
 
     The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and
     ``weaker`` are (moment, factor): from so many seconds on it, or the thrust, is so many times
-    itself.
+    itself.  The wind becomes another by twice ``turning``, at an even rate, about its mean.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -95,6 +96,7 @@ def copter_flight(
     factor = (above / np.clip(np.mean(height) - 580.0, 0.5, 60.0)) ** exponent
     w_n = np.zeros((n, 3))
     w_n[:, :2] = factor[:, None] * np.asarray(wind)
+    w_n[:, :2] += np.linspace(-1.0, 1.0, n)[:, None] * np.asarray(turning)
     u = np.einsum("nji,nj->ni", R, v_n - w_n)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     command = 0.6 + size * np.clip(smooth(rng, n, 0.06), -0.2, 0.2)

@@ -140,6 +140,18 @@ def test_motors_that_follow_late_have_the_time_constant_of_their_low_pass():
     assert number.sigma < 0.01
 
 
+@pytest.mark.parametrize("late", [0.05, 0.1, 0.17])
+def test_outputs_that_are_logged_late_are_a_delay_of_the_log_and_no_motor(late):
+    flight = copter_flight(seed=22)
+    command = np.interp(flight.t - late, flight.t, flight.commands[:, 0])
+    flight.commands[:, 0], flight.commands[:, 1] = command, command**2
+    match = matched(flight)
+    assert names(match) == {"output_delay"}
+    delay = match.effects[0].values["delay"]
+    assert match.effects[0].level == "sensor"
+    assert abs(delay.real - late) < 3.0 * delay.sigma + 0.005
+
+
 @pytest.mark.parametrize("seed", [31, 32, 33, 34])
 def test_rotors_that_lean_ahead_and_aside_alike_are_not_said_to_drag_less(seed):
     """The simulator's form of the drag and less of it would do as well: it is one effect more."""

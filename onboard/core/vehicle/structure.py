@@ -1,0 +1,109 @@
+"""Whether what a model leaves repeats with the vehicle's motion, or with time: then it is not air.
+
+Gusts are random: no law of speed, rates and attitude tells them, and what the model leaves of them
+falls no further than chance if such a law is let in.  A force that does is no turbulence, whatever
+its size; and a wind that changes over minutes is a wind.  Both are asked after a fit, by the score
+that decides on effects: the fall of chi-square with everything else free, on flight that was not
+fitted as well, and what it does must be more than errors of the velocity look like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.chi_square import survival
+from onboard.core.vehicle.choices import Choices
+from onboard.core.vehicle.effects.beyond import LAWS, Beyond
+from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
+from onboard.core.vehicle.fit import Fit, Slopes, inflation_of, slopes_at, summed
+from onboard.core.vehicle.limits import FALSE_ALARM, RECEIVER_M_S, SURE
+from onboard.core.vehicle.noise import rms
+
+ASKED = "asked"
+"""Name of what is asked about, while it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """What repeats: its key, the fall of chi-square, and the RMS of its force, m/s^2."""
+
+    key: str
+    gain: float
+    force: float
+
+
+def structures(fit: Fit, known: Sequence[str]) -> tuple[Structure, ...]:
+    """What repeats in the remainder of a copter's fit, the strongest first.
+
+    Args:
+        fit: of everything else.
+        known: keys of what the model has already.
+    """
+    model = fit.model
+    air = model.start(model.flight)
+    every: dict[str, Effect] = {key: Beyond(key, name=ASKED) for key in LAWS}
+    every[CHANGE] = WindChange(model.flight, name=ASKED)
+    asked = {k: e for k, e in every.items() if k not in known and not e.missing(air)}
+    slopes = slopes_at(model, fit.theta)
+    found = [_found(key, e, fit, slopes, FALSE_ALARM / len(every)) for key, e in asked.items()]
+    return tuple(sorted((s for s in found if s is not None), key=lambda s: -s.gain))
+
+
+def _found(key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float) -> Structure | None:
+    """What one law finds, if it is more than chance and than errors of the velocity."""
+    wide = _with(fit, slopes, effect)
+    choices = Choices(wide)
+    names = [n for n in choices.names if n != ASKED]
+    without, whole = choices.solved(names), choices.solved([*names, ASKED])
+    places = wide.model.indices(ASKED)
+    x = whole.x[places]
+    gain = min(without.chi2 - whole.chi2, whole.apart(places, x))
+    if not survival(gain, len(places)) < level:
+        return None
+    if choices.held_out(names) <= choices.held_out([*names, ASKED]):
+        return None
+    axes = [k for k, axis in enumerate(wide.model.axes) if axis in (0, 1)]
+    made = wide.jacobian[:, axes][:, :, places]
+    force, sigma = rms(made @ x), _spread(made, whole.covariance[np.ix_(places, places)])
+    # Up to here it may be the velocity's or the heading's error, as gusts that small may be.
+    if force < rms(fit.model.unclear(fit.theta, RECEIVER_M_S)[:, axes]) + SURE * sigma:
+        return None
+    return Structure(key, gain, force)
+
+
+def _spread(made: Array, covariance: Array) -> float:
+    """Root of the mean variance of a force by unknowns that are so well known."""
+    mean = np.einsum("nki,nkj->ij", made, made) / (made.shape[0] * made.shape[1])
+    return float(np.sqrt(np.sum(mean * covariance)))
+
+
+def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
+    """The sums with one more effect, which does nothing yet; ``slopes`` are those without it."""
+    effects = list(fit.model.effects)
+    at = len(effects)
+    if isinstance(effect, WindChange):
+        at = 1 + next(k for k, e in enumerate(effects) if e.name == Wind.name)
+    place = sum(len(e.unknowns) for e in effects[:at])
+    effects.insert(at, effect)
+    model = replace(fit.model, effects=tuple(effects))
+    theta = np.insert(fit.theta, place, np.zeros(len(effect.unknowns)))
+    more = list(range(place, place + len(effect.unknowns)))
+    by = np.insert(slopes.by, [place] * len(more), model.columns(theta, more), axis=2)
+    level = slopes.level
+    if level is not None:
+        columns = model.levelled.columns(theta, more)
+        level = np.insert(level, [place] * len(more), columns, axis=2)
+    wide = summed(
+        model, theta, 1.0 / model.plausible**2, fit.noise, fit.sensitivity, Slopes(by, level)
+    )
+    # Where it does nothing yet, scores of what it should do have a mean, which is no scatter.
+    step = Choices(wide).solved([e.name for e in effects]).x
+    there = [replace(b, b=b.b - b.N @ step) for b in wide.blocks]
+    held = theta + step <= model.least
+    return replace(wide, inflation=inflation_of(there, wide.prior, held))
