@@ -55,6 +55,11 @@ SLOW_M_S: Final = 3.0
 FAST_M_S: Final = 7.0
 """Speed over ground that a tenth of the flight is slower than, m/s, of a copter and of a plane: the
 one stops now and then, the other cannot [physics]."""
+ALOFT_M: Final = 10.0
+"""m above the lowest place from which a vehicle flies: a receiver's height wanders by some of
+them, and a runway slopes [data sheet]."""
+ALOFT_S: Final = 10.0
+"""s of flight there that are asked by themselves: a plane climbs out for longer [physics]."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
 
 
@@ -205,11 +210,22 @@ def vehicle_level(
 
 
 def guessed_kind(batches: Sequence[Batch]) -> str:
-    """A copter stops in the air, a plane does not; empty where neither is clear."""
-    v_n = [b.fixes.v_n for b in batches]
-    if not v_n:
+    """A copter stops in the air, a plane does not; empty where neither is clear.
+
+    On the ground both stand: what is well above the lowest place is asked, if anything was.
+    """
+    if not batches:
         return ""
-    speed = np.linalg.norm(np.nan_to_num(np.concatenate(v_n))[:, :2], axis=1)
+    v_n = np.nan_to_num(np.concatenate([b.fixes.v_n for b in batches]))
+    height = np.concatenate([b.fixes.height for b in batches])
+    speed = np.linalg.norm(v_n[:, :2], axis=1)
+    # Of a wild fix or two, no ground is made.
+    known = np.isfinite(height)
+    ground = float(np.percentile(height[known], 1)) if known.any() else np.inf
+    aloft = known & (height > ground + ALOFT_M)
+    step = float(np.median(np.concatenate([np.diff(b.fixes.t) for b in batches])))
+    if np.count_nonzero(aloft) * step >= ALOFT_S:
+        speed = speed[aloft]
     slow = float(np.percentile(speed, 10))
     if slow < SLOW_M_S:
         return "copter"
