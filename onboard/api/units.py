@@ -14,8 +14,8 @@ from onboard.core.maths.frames import (
     vector_from_rotation,
 )
 from onboard.errors import ArraysError
+from onboard.recordings.table_cells import FEWEST_ROWS
 
-FEWEST_ROWS: Final = 20
 LONGEST_STEP_S: Final = 1.0
 """Median, between two inertial samples: slower ones are not estimated from."""
 SHORTEST_STEP_S: Final = 1e-5

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 from msgspec import Struct
 
@@ -182,6 +182,18 @@ class Recovery:
     confirmed: frozenset[str]
     sentence: str = INTERRUPTED
 
+    @classmethod
+    def undoing(cls, completed: Planned, sentence: str) -> Self:
+        """What was completed is to be taken back, as if it had been interrupted."""
+        return cls(
+            completed.transaction,
+            completed.plan,
+            completed.purpose,
+            undo=True,
+            confirmed=frozenset(),
+            sentence=sentence,
+        )
+
     @property
     def all_confirmed(self) -> bool:
         """Whether every write is known to have been stored: then it may be finished."""
@@ -234,11 +246,4 @@ def audit(completed: Planned, values: Mapping[str, float]) -> Recovery | None:
     """
     if remains(completed.plan, values) not in {Remains.MIXED, Remains.GONE}:
         return None
-    return Recovery(
-        completed.transaction,
-        completed.plan,
-        completed.purpose,
-        undo=True,
-        confirmed=frozenset(),
-        sentence=NOT_STORED,
-    )
+    return Recovery.undoing(completed, NOT_STORED)

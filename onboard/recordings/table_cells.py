@@ -14,6 +14,7 @@ from onboard.errors import RecordingError
 
 DELIMITERS = ",;\t"
 FEWEST_ROWS = 20
+"""Rows of any quantity, below which there is no flight: two seconds at 10 Hz [bound]."""
 LONGEST_HEAD = 1_000_000
 """Characters of the names of all columns: 10,000 of a hundred each [bound]."""
 NO_NUMBERS = ("", "nan", "null", "none", "na")

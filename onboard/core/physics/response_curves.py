@@ -24,6 +24,11 @@ Shape: TypeAlias = Callable[[Array, float], Array]
 """Effect of one unit at signal ``x`` (n,), about a reference (a temperature, a moment): (n,)."""
 
 
+def begun(x: Array, about: float) -> Array:
+    """Nothing before ``about``, one from then on."""
+    return (x >= about).astype(np.float64)
+
+
 @dataclass(frozen=True, slots=True)
 class Response:
     """The formula behind a curve: a signal, a quantity, what one unit of an unknown makes of it."""

@@ -69,6 +69,14 @@ def each(unknowns: Mapping[str, Quantity], factor: float = 1.0, unit: str | None
     return f"{', '.join(parts)}{unit if unit == '°' else f' {unit}'}".rstrip()
 
 
+def jumped(unknowns: Mapping[str, Quantity], factor: float = 1.0, unit: str | None = None) -> str:
+    """``at 84 s by x 0.31 m/s²``: the time, where it is known, and the rest as of :func:`each`."""
+    at = unknowns.get("time")
+    when = f"at {at.value:.0f} s " if at else ""
+    rest = {k: q for k, q in unknowns.items() if k != "time"}
+    return f"{when}by {each(rest, factor, unit)}"
+
+
 def first(unknowns: Mapping[str, Quantity]) -> Quantity:
     """The only unknown, or the first of several."""
     return next(iter(unknowns.values()))

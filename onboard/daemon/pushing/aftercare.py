@@ -211,14 +211,7 @@ class Aftercare:
         pushed = self._ledger.last_pushed(imu)
         if pushed is None or imu in self._mixed:  # that was said
             return
-        self._mixed[imu] = Recovery(
-            pushed.transaction,
-            pushed.plan,
-            pushed.purpose,
-            undo=True,
-            confirmed=frozenset(),
-            sentence=ASKED,
-        )
+        self._mixed[imu] = Recovery.undoing(pushed, ASKED)
         text = (
             f"IMU {imu}: some values are those from before the last push, lost or set by somebody; "
             f"`onboard rollback {imu}` puts the others back, too"

@@ -48,17 +48,8 @@ def written_view(
                 verdicts[entry.transaction] = entry
             case Closed() if entry.transaction in plans:
                 planned = plans[entry.transaction]
-                imu = planned.plan.imu
-                pushes = completed.setdefault(imu, {})
-                if entry.result is Result.COMPLETED:
-                    journalled.pop(imu, None)
-                    if planned.purpose is Purpose.PUSH:
-                        pushes[entry.transaction] = (at, entry)
-                        journalled[imu] = entry.transaction
-                elif journalled.get(imu) == entry.transaction:
-                    # Completed once; after a reboot it was gone and was taken back.
-                    pushes.pop(entry.transaction)
-                    journalled.pop(imu)
+                pushes = completed.setdefault(planned.plan.imu, {})
+                _take(entry, at, planned, pushes, journalled)
             case _:
                 pass
     there = journalled if in_force is None else in_force
@@ -77,6 +68,26 @@ def written_view(
             )
             shown.append(view)
     return tuple(sorted(shown, key=lambda view: view.at))
+
+
+def _take(
+    entry: Closed,
+    at: float,
+    planned: Planned,
+    pushes: dict[str, tuple[float, Closed]],
+    journalled: dict[int, str],
+) -> None:
+    """A transaction that was closed, into the accelerometer's pushes and what is in force."""
+    imu = planned.plan.imu
+    if entry.result is Result.COMPLETED:
+        journalled.pop(imu, None)
+        if planned.purpose is Purpose.PUSH:
+            pushes[entry.transaction] = (at, entry)
+            journalled[imu] = entry.transaction
+    elif journalled.get(imu) == entry.transaction:
+        # Completed once; after a reboot it was gone and was taken back.
+        pushes.pop(entry.transaction)
+        journalled.pop(imu)
 
 
 def _view(

@@ -14,7 +14,7 @@ from onboard.core.model.regressors import Unknown
 from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import Bearing, Cure, Effect, on_axes
 from onboard.core.physics.finding import Finding
-from onboard.core.physics.wording import each
+from onboard.core.physics.wording import jumped
 
 LARGEST = 3.0
 """m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
@@ -65,7 +65,7 @@ class BiasStep(Effect):
         "offset error",
         "m/s^2",
         curves.time,
-        lambda x, about: (x >= about).astype(np.float64),
+        curves.begun,
     )
 
     witness: Witness | None = None
@@ -112,10 +112,7 @@ class BiasStep(Effect):
     @classmethod
     def size(cls, found: Finding) -> str:
         """``at 84 s by x 0.31 m/s²``."""
-        rest = {k: q for k, q in found.unknowns.items() if k != "time"}
-        at = found.unknowns.get("time")
-        when = f"at {at.value:.0f} s " if at else ""
-        return f"{when}by {each(rest)}"
+        return jumped(found.unknowns)
 
     @classmethod
     def condition(cls, found: Finding, offset: float, change: float) -> str:

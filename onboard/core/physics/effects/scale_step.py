@@ -14,7 +14,7 @@ from onboard.core.physics.effect import Bearing, on_axes
 from onboard.core.physics.effects.bias_step import Witness
 from onboard.core.physics.finding import Finding
 from onboard.core.physics.proportional import Proportional
-from onboard.core.physics.wording import each
+from onboard.core.physics.wording import jumped
 
 LARGEST = 0.2
 """A sensor whose scale jumps by more is broken, or on another range, and not miscalibrated."""
@@ -45,7 +45,7 @@ class ScaleStep(Proportional):
         "scale error",
         "1",
         curves.time,
-        lambda x, about: (x >= about).astype(np.float64),
+        curves.begun,
     )
 
     witness: Witness | None = None
@@ -72,10 +72,7 @@ class ScaleStep(Proportional):
     @classmethod
     def size(cls, found: Finding) -> str:
         """``at 84 s by x 2.0 %``."""
-        rest = {k: q for k, q in found.unknowns.items() if k != "time"}
-        at = found.unknowns.get("time")
-        when = f"at {at.value:.0f} s " if at else ""
-        return f"{when}by {each(rest, 100.0, '%')}"
+        return jumped(found.unknowns, 100.0, "%")
 
     @classmethod
     def condition(cls, found: Finding, offset: float, change: float) -> str:  # noqa: ARG003
