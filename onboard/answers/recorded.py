@@ -16,6 +16,7 @@ import numpy as np
 
 from onboard.answers.answer import Answer, judged
 from onboard.answers.chronicle import Chronicle
+from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.one_flight import Contradiction, contradiction
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis, Mismatch, NotTestable, Series, Verdict
@@ -57,7 +58,7 @@ class Recorded:
         self._asked_of: dict[int, tuple[Asked, ...]] = {}
         self._one_of_several = one_of_several
         self._answers: dict[int, Answer] = {}
-        self._engines: dict[int, Engine] = {}
+        self._engines: dict[int, Examination] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
         self._recordings = [-math.inf]  # when each of them begins, on the clock of the first
         self._contradictions: dict[int, Contradiction] = {}
@@ -154,7 +155,8 @@ class Recorded:
 
     def _asked(self, imu: int) -> Answer:
         try:
-            found = examine(self.calibrator, imu)
+            beside = next(iter(self._engines.values()), None)
+            found = examine(self.calibrator, imu, beside=beside)
             given = judged(found.diagnosis())
             if self._one_of_several:
                 self._asked_of[imu] = asked_of(found.choice)

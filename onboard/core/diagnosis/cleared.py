@@ -53,8 +53,22 @@ class Cleared:
         return self.rail, self.fault, self.spikes, self.coarse
 
 
-def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin: Origin) -> Cleared:
-    """Leave out what was clipped and which fixes are false, for no sums may hold them."""
+def cleared(
+    calibrator: Calibrator,
+    engine: Engine,
+    flight: list[Batch],
+    origin: Origin,
+    beside: Examination | None = None,
+) -> Cleared:
+    """Leave out what was clipped and which fixes are false, for no sums may hold them.
+
+    Args:
+        calibrator: has seen the flight.
+        engine: of the accelerometer.
+        flight: what is examined of it.
+        origin: what effects count from.
+        beside: another accelerometer's examination of the same flight; None: the first.
+    """
     rail = saturation_effect(flight, origin.t0)
     batches = flight
     if rail is not None:
@@ -69,11 +83,12 @@ def cleared(calibrator: Calibrator, engine: Engine, flight: list[Batch], origin:
     clipped = rail is not None and batches is flight
     coarse = coarse_of(batches, calibrator.parameters.six(origin.imu))
     carried: tuple[Family, ...] = () if coarse is None else (coarse.conversion,)
-    full = _felt(engine, testable, origin.t0, batches, carried)
+    asked = _Asked(engine, testable, origin.t0, carried, beside)
+    full = _felt(asked, batches)
     spiked = None if rail is not None else spikes_of(batches)
     spikes: Finding | None = None
     if spiked is not None and _matter(spiked, batches, full, engine):
-        without = _felt(engine, testable, origin.t0, spiked.batches, carried)
+        without = _felt(asked, spiked.batches)
         better = 2.0 * (without.log_likelihood - full.log_likelihood)
         if better > CLEARLY:
             full, batches = without, spiked.batches
@@ -116,27 +131,47 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
     return 2.0 * (told[0] - told[1]) > CLEARLY
 
 
-def _felt(
-    engine: Engine,
-    testable: Sequence[Effect],
-    t0: float,
-    batches: Sequence[Batch],
-    carried: Sequence[Family],
-) -> Examination:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Of a flight: whose sensor's, with which effects from when on, what else there is."""
+
+    engine: Engine
+    testable: Sequence[Effect]
+    t0: float
+    carried: Sequence[Family]
+    beside: Examination | None
+
+    def examined(self, batches: Sequence[Batch], start: Examination | None = None) -> Examination:
+        """The flight with its own noise and timing, which are looked for from those of ``start``.
+
+        Else from those of the accelerometer beside it: it has flown the same flight with the same
+        receiver, and a search takes a third of the passes from there.
+        """
+        made = Examination(
+            self.engine,
+            self.testable,
+            t0=self.t0,
+            batches=batches,
+            start=start,
+            carried=self.carried,
+        )
+        if start is None and self.beside is not None:
+            made.begin_as(self.beside)
+        return made.with_noise()
+
+
+def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
     What may be noise in the samples may be real, too: of noise there is no more than the velocity
     walks by, and the flight is taken as its velocity is likelier.
     """
     density = spectrum(batches)
-    sampled = Examination(engine, testable, t0=t0, batches=batches, carried=carried).with_noise()
+    sampled = asked.examined(batches)
     if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
         return sampled
     noise = np.minimum(white(density), sampled.noise.force_walk**2)
-    expecting = expected(batches, density, noise)
-    felt = Examination(
-        engine, testable, t0=t0, batches=expecting, start=sampled, carried=carried
-    ).with_noise()
+    felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 
 

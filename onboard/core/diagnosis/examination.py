@@ -96,6 +96,15 @@ class Examination(Engine):
         known = self.model.taken_over(origin.model, solution.theta, solution.covariance)
         return replace(solution, theta=known[0], covariance=known[1])
 
+    def begin_as(self, other: Engine) -> None:
+        """Look for noise and timing from where another accelerometer of the flight has come to.
+
+        What is known of the other one's scale and offset is nothing to the gates of this one.
+        """
+        own = self.point
+        timing = replace(other.point, skew=own.skew, skew_from=own.skew_from)
+        self._move(replace(timing, scale=own.scale, beta=own.beta), other.noise)
+
     def with_noise(self) -> Examination:
         """Find noise and timing, then go through the whole flight."""
         self.refine()

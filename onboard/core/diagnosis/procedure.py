@@ -54,7 +54,12 @@ def diagnose(
 
 
 def examine(
-    calibrator: Calibrator, imu: int, *, latest: bool = False, since: float = -inf
+    calibrator: Calibrator,
+    imu: int,
+    *,
+    latest: bool = False,
+    since: float = -inf,
+    beside: Examination | None = None,
 ) -> Judge:
     """Find the model of one accelerometer's recording; the calibrator is left as it is.
 
@@ -64,6 +69,8 @@ def examine(
         latest: look only at what is kept since the boot clock last began; times are then since
             the first sample that is kept.
         since: with ``latest``: only what was flown from this time of that clock on, s.
+        beside: another accelerometer of the same flight that has been examined, whose noise and
+            timing are where this one's are looked for first; they end as its own.
 
     Raises:
         KeyError: that accelerometer has not been seen.
@@ -71,7 +78,7 @@ def examine(
     engine = calibrator.engine(imu)
     flight = since_reboot(engine.batches, since) if latest else list(engine.batches)
     origin = _origin(calibrator, imu, flight if latest else ())
-    clear = cleared(calibrator, engine, flight, origin)
+    clear = cleared(calibrator, engine, flight, origin, beside)
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
     if full is not clear.full:

@@ -21,7 +21,14 @@ from onboard.core.model.quadrature import (
 )
 from onboard.core.model.response import Response
 from onboard.core.model.smoothing import Gained
-from onboard.core.model.spread import Spread, place_weights, velocity_weights
+from onboard.core.model.spread import (
+    Spread,
+    among,
+    nodes_within,
+    place_weights,
+    reaches,
+    velocity_weights,
+)
 
 AROUND_SPAN_S = 0.62
 """Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
@@ -194,13 +201,14 @@ class _Followed:
         """
         each = max(1, int(AROUND_SPAN_S / FEWEST_PAIRS / self._step))
         t, step = self._t[::each], each * self._step
-        since = t - epoch[:, None]
+        at = nodes_within(reaches(window, apart, shares), (epoch - t[0]) / step, step)
+        since = t[0] + at * step - epoch[:, None]
         return Spread(
             self._maker.signals(t),
             self._R[::each],
             R_epoch,
-            velocity_weights(since, step, window, apart, shares),
-            place_weights(since, step, window),
+            among(len(t), at, velocity_weights(since, step, window, apart, shares)),
+            among(len(t), at, place_weights(since, step, window)),
         )
 
     def swing(self, now: Signals, window: float) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ fro, and scale and offset of z were up to five sigma off.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -50,14 +49,17 @@ class Response:
         self._velocity, self._t, self._window, self._shares = velocity, t, window, shares
         self._longest = 2.0 * reach
         self.apart = min(float(np.median(np.diff(t))), reach) if len(t) > 1 else 0.0
-        self.shapes: Array = np.stack(self._less_even(range(len(shares)), window, t))
+        moments = [t, t + LATER_S, t - LATER_S] if shares.any() else [t]
+        looked = self._less_even(window, np.concatenate(moments)).reshape(4, len(moments), -1, 3)
+        self.shapes: Array = looked[:, 0]
         self.shaped: Array = np.tensordot(shares, self.shapes, axes=1)
+        self._near: Array = np.tensordot(shares, looked[:, 1:], axes=1)
 
     def force(self) -> Array:
         """(K, 3) what the response changes by with time, m/s^2."""
         out = self._velocity.mean(self._t, self._window)
-        if self._shares.any():
-            after, before = (self._mixed(self._window, self._t + h) for h in (LATER_S, -LATER_S))
+        if len(self._near):
+            after, before = self._near
             out += (after - before) / (2.0 * LATER_S)
         return out
 
@@ -66,26 +68,19 @@ class Response:
         out = self._velocity.slope(self._t, self._window, self._longest)
         if self._shares.any() and self._window >= RESOLVED_S:
             wide, narrow = (self._window * x for x in (1.0 + WIDER, 1.0 - WIDER))
-            change = self._mixed(wide, self._t) - self._mixed(narrow, self._t)
-            out += change / (wide**2 - narrow**2)
+            change = self._less_even(wide, self._t) - self._less_even(narrow, self._t)
+            out += np.tensordot(self._shares, change, axes=1) / (wide**2 - narrow**2)
         return out
 
-    def _mixed(self, window: float, t: Array) -> Array:
-        """(K, 3) what the shares make of the shapes over another window, or at other times."""
-        there = np.flatnonzero(self._shares).tolist()
-        out: Array = np.tensordot(self._shares[there], self._less_even(there, window, t), axes=1)
-        return out
-
-    def _less_even(self, which: Sequence[int], window: float, t: Array) -> list[Array]:
-        """Some of the shapes less the even mean, each (K, 3)."""
+    def _less_even(self, window: float, t: Array) -> Array:
+        """(4, k, 3) the shapes less the even mean over ``window``, s, about times ``t`` (k,)."""
         v, less = self._velocity, weight_of_two(window, self.apart)
+        out = np.zeros((4, len(t), 3))
         if less <= 0.0:
-            return [np.zeros((len(t), 3)) for _ in which]
+            return out
         even = v.averaged(t, window)
-        shapes: tuple[Callable[[], Array], ...] = (
-            lambda: v.paired(t, window, less) - even,
-            lambda: v.paired(t, window, 1.0 - less) - even,
-            lambda: v.leaning(t, window),
-            lambda: v.lagged(t, window) - even,
-        )
-        return [shapes[k]() for k in which]
+        newer, older, leaning_old, leaning_new = v.paired(t, window, (less, 1.0 - less, 0.25, 0.75))
+        out[0], out[1] = newer - even, older - even
+        out[2] = 0.5 * (leaning_old - leaning_new)
+        out[3] = v.lagged(t, window) - even
+        return out

@@ -10,6 +10,7 @@ at two places of an epoch instead of at all samples around it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,41 +60,35 @@ class Gained:
         np.cumsum(0.5 * step * (a[:-1] + a[1:]), axis=0, out=v[1:])
         x[1:] = np.cumsum(step * v[:-1] + step**2 / 6.0 * (2.0 * a[:-1] + a[1:]), axis=0)
 
-    def _compiled(self, t: Array, shift: float) -> tuple[Array, Array] | None:
-        """Velocity and place at ``t + shift``, (k, 3) each, by compiled loops if there are some."""
+    def moments(self, t: Array, shifts: Sequence[float] = (0.0,)) -> tuple[Array, Array]:
+        """Velocity, m/s, and place, m, at ``t + shift`` for each of S shifts (s): (S, k, 3) each.
+
+        All at once: of a dozen moments about an epoch each would cost a call of its own.
+        """
+        at = (t + np.array(shifts)[:, None]).ravel()
         loops = compiled_loops()
         if loops is None:
-            return None
-        velocity, place = np.empty((len(t), 3)), np.empty((len(t), 3))
-        nodes = self._start, self._step, self._a, self._v, self._x
-        loops.gained(*nodes, plain(t), shift, velocity, place)
-        return velocity, place
+            i, s, a, slope = self._since_node(at)
+            velocity = self._v[i] + s * (a + 0.5 * s * slope)
+            place = self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
+        else:
+            velocity, place = np.empty((len(at), 3)), np.empty((len(at), 3))
+            loops.gained(self._start, self._step, self._a, self._v, self._x, at, velocity, place)
+        shape = len(shifts), len(t), 3
+        return velocity.reshape(shape), place.reshape(shape)
 
-    def _since_node(self, t: Array, shift: float) -> tuple[NDArray[np.intp], Array, Array, Array]:
-        """The node before ``t + shift``, s since then (k, 1), the force there and its slope."""
-        since = t + shift - self._start
+    def _since_node(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
+        """The node before times ``t`` (k,), s since then (k, 1), the force there and its slope."""
+        since = t - self._start
         i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
         s = (since - i * self._step)[:, None]
         a = self._a[i]
         return i, s, a, (self._a[i + 1] - a) / self._step
 
-    def velocity(self, t: Array, shift: float = 0.0) -> Array:
-        """(k, 3) gained since the first node until times ``t + shift`` (k,), m/s."""
-        found = self._compiled(t, shift)
-        if found is not None:
-            return found[0]
-        i, s, a, slope = self._since_node(t, shift)
-        velocity: Array = self._v[i] + s * (a + 0.5 * s * slope)
+    def velocity(self, t: Array) -> Array:
+        """(k, 3) gained since the first node until times ``t`` (k,), m/s."""
+        velocity: Array = self.moments(t)[0][0]
         return velocity
-
-    def place(self, t: Array, shift: float = 0.0) -> Array:
-        """(k, 3) its integral, m."""
-        found = self._compiled(t, shift)
-        if found is not None:
-            return found[1]
-        i, s, a, slope = self._since_node(t, shift)
-        place: Array = self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
-        return place
 
     def mean(self, t: Array, width: float) -> Array:
         """Mean of the force over ``width`` (s) about times ``t`` (k,): (k, 3), m/s^2.
@@ -103,7 +98,8 @@ class Gained:
         as a regressor of the latency it would be noise.  No span is shorter than two nodes.
         """
         half = 0.5 * max(width, self._step)
-        out: Array = (self.velocity(t, half) - self.velocity(t, -half)) / (2.0 * half)
+        after, before = self.moments(t, (half, -half))[0]
+        out: Array = (after - before) / (2.0 * half)
         return out
 
     def averaged(self, t: Array, window: float) -> Array:
@@ -112,8 +108,9 @@ class Gained:
             return np.zeros((len(t), 3))
         # Between two nodes it goes with the square of the span, and rounding does not.
         half = 0.5 * max(window, self._step)
-        mean = (self.place(t, half) - self.place(t, -half)) / (2.0 * half)
-        out: Array = (mean - self.velocity(t)) * (window / (2.0 * half)) ** 2
+        velocity, place = self.moments(t, (0.0, half, -half))
+        mean = (place[1] - place[2]) / (2.0 * half)
+        out: Array = (mean - velocity[0]) * (window / (2.0 * half)) ** 2
         return out
 
     def averaged_place(self, t: Array, window: float) -> Array:
@@ -124,29 +121,25 @@ class Gained:
         noise of the height that goes with the force, and so a scale.
         """
         half = 0.5 * window
-        ends = self.place(t, half) + self.place(t, -half)
-        out: Array = (ends - 2.0 * self.place(t)) / 6.0
+        now, after, before = self.moments(t, (0.0, half, -half))[1]
+        out: Array = (after + before - 2.0 * now) / 6.0
         return out
 
-    def paired(self, t: Array, window: float, older: float = 0.5) -> Array:
-        """``mean(V) - V`` of two moments that spread like ``window``, s: (k, 3), m/s.
+    def paired(self, t: Array, window: float, older: Sequence[float] = (0.5,)) -> Array:
+        """``mean(V) - V`` of two moments that spread like ``window``, s: (S, k, 3), m/s.
 
         Args:
             t: (k,) s, where the mean of the two is.
             window: s.
-            older: weight of the older one, between 0 and 1.
+            older: S weights of the older one, between 0 and 1.
         """
-        apart = between_two(window, older)
-        newest, oldest = self.velocity(t, older * apart), self.velocity(t, (older - 1.0) * apart)
-        out: Array = (1.0 - older) * newest + older * oldest - self.velocity(t)
-        return out
-
-    def leaning(self, t: Array, window: float) -> Array:
-        """What two moments do where the newer one weighs three times as much as the older one.
-
-        Less the same the other way round, halved: (k, 3), m/s.
-        """
-        out: Array = 0.5 * (self.paired(t, window, 0.25) - self.paired(t, window, 0.75))
+        apart = [between_two(window, weight) for weight in older]
+        newest = [weight * a for weight, a in zip(older, apart, strict=True)]
+        oldest = [(weight - 1.0) * a for weight, a in zip(older, apart, strict=True)]
+        velocity = self.moments(t, (0.0, *newest, *oldest))[0]
+        weight = np.array(older)[:, None, None]
+        new, old = velocity[1 : 1 + len(older)], velocity[1 + len(older) :]
+        out: Array = (1.0 - weight) * new + weight * old - velocity[0]
         return out
 
     def lagged(self, t: Array, window: float) -> Array:
@@ -158,10 +151,11 @@ class Gained:
         lag = window / SPREAD
         if lag <= 0.0:
             return np.zeros((len(t), 3))
-        i, s, a, slope = self._since_node(t, lag)
+        i, s, a, slope = self._since_node(t + lag)
         kept = np.exp(-s / lag)
         force = kept * self._lagged_force(lag)[i] + (1.0 - kept) * (a - lag * slope) + slope * s
-        out: Array = self.velocity(t, lag) - lag * force - self.velocity(t)
+        now, later = self.moments(t, (0.0, lag))[0]
+        out: Array = later - lag * force - now
         return out
 
     def _lagged_force(self, lag: float) -> Array:

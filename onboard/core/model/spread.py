@@ -17,10 +17,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.smoothing import SPREAD, between_two, weight_of_two
+
+TAIL = 12.0
+"""Time constants after which nothing is left of a lag: 6e-6 [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,33 @@ class Spread:
             back @ (weights @ turned).reshape(-1, 3, m) for weights in (self.velocity, self.place)
         )
         return velocity, place
+
+
+def reaches(window: float, apart: float, h: Array) -> tuple[float, float]:
+    """How far before and after an epoch a receiver looks, s: as of :func:`velocity_weights`."""
+    both = max(window, apart)
+    return both + (TAIL * window / SPREAD if h[-1] else 0.0), both
+
+
+def nodes_within(reach: tuple[float, float], epoch: Array, step: float) -> NDArray[np.intp]:
+    """(K, b) numbers of even nodes about epochs, some of which there may not be.
+
+    Args:
+        reach: before and after an epoch, s.
+        epoch: (K,) counted in nodes.
+        step: from node to node, s.
+    """
+    before, after = (int(r / step) + 2 for r in reach)
+    return np.rint(epoch).astype(np.intp)[:, None] + np.arange(-before, after + 1)
+
+
+def among(n: int, at: NDArray[np.intp], weights: Array) -> Array:
+    """(K, n) weights (K, b) of nodes ``at`` (K, b), where there are such; zero elsewhere."""
+    out = np.zeros((len(at), n))
+    k, j = np.nonzero((at >= 0) & (at < n))
+    node = at[k, j]
+    out[k, node] = weights[k, j]
+    return out
 
 
 def velocity_weights(since: Array, step: float, window: float, apart: float, h: Array) -> Array:

@@ -68,8 +68,8 @@ def test_its_slope_is_what_it_changes_by_with_the_square_of_the_span(gained, win
 def test_two_moments_an_epoch_apart_are_one_of_the_shapes(gained, newer):
     window = SPREAD * APART * np.sqrt(newer * (1.0 - newer))
     # The mean of the two is at the epoch.
-    seen = newer * gained.velocity(T, (1.0 - newer) * APART)
-    seen += (1.0 - newer) * gained.velocity(T, -newer * APART)
+    seen = newer * gained.velocity(T + (1.0 - newer) * APART)
+    seen += (1.0 - newer) * gained.velocity(T - newer * APART)
     shares = (1.0, 0.0, 0.0, 0.0) if newer >= 0.5 else (0.0, 1.0, 0.0, 0.0)
     assert value(gained, window, shares) == pytest.approx(seen, abs=1e-9)
 

@@ -20,7 +20,7 @@ def twice(step: float, a: Array, v: Array, x: Array) -> None:
             )
 
 
-@compiled("void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,::1])")
+@compiled("void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1])")
 def gained(
     start: float,
     step: float,
@@ -28,14 +28,13 @@ def gained(
     v: Array,
     x: Array,
     t: Array,
-    shift: float,
     velocity: Array,
     place: Array,
 ) -> None:
-    """Integrals of :func:`twice` at times ``t + shift`` (k,), into two (k, 3)."""
+    """Integrals of :func:`twice` at times ``t`` (k,), into two (k, 3)."""
     last = len(a) - 2
     for k in range(len(t)):
-        at = t[k] + shift - start
+        at = t[k] - start
         i = min(max(int(at / step), 0), last)
         s = at - i * step
         for c in range(3):
