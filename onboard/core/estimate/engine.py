@@ -24,6 +24,7 @@ from onboard.core.estimate.limits import (
     MOST_IDLE,
     MOST_ROUNDS,
     MOST_STATES,
+    MOST_VAIN,
     NEW_SHARE,
     STEADY,
     WORTH_A_SEARCH,
@@ -281,7 +282,7 @@ class Engine:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             likelihoods = made.log_likelihoods()
             likely = likelihoods[0] + log_prior(self.noise)
-            idle = idle + 1 if search.settled and likely < highest + WORTH_A_SEARCH else 0
+            idle = idle + 1 if likely < highest + WORTH_A_SEARCH else 0
             if likely > highest:
                 highest, best = likely, (self.point, self.noise)
             before, at = at, self.asked(self.nuisances(self._seed))
@@ -289,7 +290,7 @@ class Engine:
             if at.near(before, STEADY) and search.settled:
                 best = at, self.noise
                 break
-            if idle == MOST_IDLE:
+            if idle >= (MOST_IDLE if search.settled else MOST_VAIN):
                 break
             elsewhere = not self.point.stands_for(at)
             if elsewhere:

@@ -39,8 +39,11 @@ than a tenth of a sigma (0.19 with 2.0) [probability]."""
 MOST_ROUNDS: Final = 24
 """Passes of a refinement, at the most: a search takes five to ten of them [cost]."""
 MOST_IDLE: Final = 3
-"""Passes with noise levels that stand, none of them worth it by :data:`WORTH_A_SEARCH`, after which
-timing that will not come to rest is taken where it was likeliest [cost]."""
+"""Passes in a row, none of them worth it by :data:`WORTH_A_SEARCH`, after which timing that will
+not come to rest beside levels that stand is taken where it was likeliest [cost]."""
+MOST_VAIN: Final = 5
+"""Such passes after which levels are, too, that do not stand: of real flights, whose gates and
+tails go with the estimate, likelihood goes up and down by tens from pass to pass [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
 """Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
 worth another pass [cost]."""

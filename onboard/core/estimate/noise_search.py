@@ -61,7 +61,8 @@ class NoiseSearch:
             self.settled = nothing and (self._failed or not elsewhere)
             self._failed, self._before = nothing, None
             return self._way[best - 1]
-        step = scoring_step(levels, rise[near:], trades[near:, near:])
+        # While the linearisation moves, what it was off by passes for noise that will be gone.
+        step = scoring_step(levels, rise[near:], trades[near:, near:], in_variances=not elsewhere)
         self.settled = step.gain < WORTH_A_SEARCH
         self._before = levels
         return levels if self.settled else step.levels

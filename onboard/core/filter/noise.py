@@ -71,8 +71,7 @@ class NoiseLevels:
         return tuple(
             name
             for name in ESTIMATED
-            if name not in ("heading_time", "vertical")
-            and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
+            if name not in NO_VARIANCES and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
 
 
@@ -95,6 +94,9 @@ ESTIMATED = (
     "attitude_white",
     "jitter",
 )
+
+NO_VARIANCES = ("vertical", "heading_time")
+"""Those of :data:`ESTIMATED` that are no standard deviation or density of noise."""
 
 
 def log_prior(levels: NoiseLevels, names: Sequence[str] = ESTIMATED) -> float:

@@ -6,6 +6,10 @@ and Engle, 1983), which is what neighbours change the whitened innovations and t
 their scales by.  Levels that change them alike stand in for each other, which steps level by level
 do not see; and, other than the curvature of the likelihood, information is positive wherever the
 search is.
+
+What an innovation varies by is a sum of variances.  Where the slopes are to be trusted the step is
+so taken in them: of what is twice too large one such step takes all, and one of its logarithm a
+third, five of which a simulated flight needs.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.filter.limits import LIMITS, LONGEST_STEP, USUAL_SIGMA
-from onboard.core.filter.noise import ESTIMATED, USUAL, NoiseLevels, nudges
+from onboard.core.filter.noise import ESTIMATED, NO_VARIANCES, USUAL, NoiseLevels, nudges
 from onboard.core.maths.arrays import Array
 
 SWEEPS = 200
@@ -24,6 +28,12 @@ SWEEPS = 200
 level after some dozens, where levels trade [cost]."""
 CLOSE = 1e-4
 """Log ratio that is not worth another sweep [cost]."""
+
+TURNS = 8
+"""Of a step in variances, whose logarithms are what is known beforehand: each halves what is left
+of it and more [cost]."""
+ENOUGH = 1e-2
+"""Log ratio that is not worth another turn [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +50,12 @@ class NoiseStep:
 
 
 def scoring_step(
-    centre: NoiseLevels, rise: Array, trades: Array, names: Sequence[str] = ESTIMATED
+    centre: NoiseLevels,
+    rise: Array,
+    trades: Array,
+    names: Sequence[str] = ESTIMATED,
+    *,
+    in_variances: bool = False,
 ) -> NoiseStep:
     """Step to the expected top, inside the limits.
 
@@ -50,22 +65,35 @@ def scoring_step(
         trades: (n, n) products of what they change the innovations by, as of
             :class:`~onboard.core.filter.passes.Pass`.
         names: the n levels.
+        in_variances: whether the step is one of variances, else of logarithms.
     """
     here = np.array([getattr(centre, name) for name in names])
-    usual = np.array([getattr(USUAL, name) for name in names])
+    off = np.log(here / np.array([getattr(USUAL, name) for name in names]))
     limits = np.array([LIMITS[name] for name in names])
     apart = nudges(centre, names)
     H = trades / np.outer(apart, apart)
     # A neighbour is not so near that its rise is the slope alone.
     slope = rise / apart + np.diag(H) * apart / 2.0
-    slope -= np.log(here / usual) / USUAL_SIGMA**2
-    H += np.eye(len(names)) / USUAL_SIGMA**2
     low, high = np.clip(np.log(limits / here[:, None]), -LONGEST_STEP, LONGEST_STEP).T
-    step = bounded(H, slope, low, high)
+    varies = np.array([in_variances and name not in NO_VARIANCES for name in names])
+    step = np.zeros(len(names))
+    for _ in range(TURNS if in_variances else 1):
+        # Half the relative change of a variance begins as its level's logarithm does.
+        change = np.where(varies, np.expm1(2.0 * step) / 2.0, step)
+        bend = np.where(varies, np.exp(2.0 * step), 1.0)
+        known = np.eye(len(names)) / USUAL_SIGMA**2
+        rest = bend * (slope - H @ change) - (off + step) / USUAL_SIGMA**2
+        more = bounded(H * np.outer(bend, bend) + known, rest, low - step, high - step)
+        step = step + more
+        if np.abs(more).max(initial=0.0) < ENOUGH:
+            break
+    change = np.where(varies, np.expm1(2.0 * step) / 2.0, step)
+    gain = slope @ change - 0.5 * change @ H @ change
+    gain -= 0.5 * float(np.sum((off + step) ** 2 - off**2)) / USUAL_SIGMA**2
     found = centre
     for name, by in zip(names, np.exp(step).tolist(), strict=True):
         found = found.scaled(name, by)
-    return NoiseStep(found, float(slope @ step - 0.5 * step @ H @ step))
+    return NoiseStep(found, float(gain))
 
 
 def bounded(H: Array, slope: Array, low: Array, high: Array) -> Array:

@@ -43,6 +43,40 @@ def step(levels, change):
     return scoring_step(levels, np.array(height[1:]) - height[0], moved @ moved.T)
 
 
+def step_of_variance(level, share, ratio, count):
+    """Of ``count`` innovations, of whose variance a level has a share, and which are so scattered.
+
+    ``ratio`` is the variance that they have over the one that is assumed.
+    """
+
+    def height(levels):
+        variance = 1.0 - share + share * (getattr(levels, level) / getattr(CENTRE, level)) ** 2
+        return -0.5 * count * (np.log(variance) + ratio / variance), np.log(variance)
+
+    every = np.array([height(m) for m in (CENTRE, *neighbours(CENTRE))])
+    moved = np.sqrt(count / 2.0) * (every[1:, 1] - every[0, 1])[:, None]
+    return scoring_step(
+        CENTRE, every[1:, 0] - every[0, 0], moved @ moved.T, in_variances=True
+    ).levels
+
+
+@pytest.mark.parametrize(("share", "ratio"), [(1.0, 0.3), (1.0, 3.0), (0.6, 0.7), (0.3, 2.0)])
+def test_one_step_of_variances_ends_where_innovations_scatter_as_they_do(share, ratio):
+    """Whatever share of them a level has: the top of the likelihood of that level alone."""
+    found = step_of_variance("velocity", share, ratio, 1e6)
+    wanted = 1.0 + (ratio - 1.0) / share
+    assert (found.velocity / CENTRE.velocity) ** 2 == pytest.approx(wanted, rel=0.03)
+
+
+def test_a_step_of_variances_does_not_leave_what_is_known_of_their_logarithms():
+    """A flight that says nothing: the prior's top, which a variance's quadratic is far from."""
+    off = replace(USUAL, velocity=USUAL.velocity * 3.0)
+    nothing = np.zeros(len(ESTIMATED))
+    found = scoring_step(off, nothing, np.zeros((len(nothing),) * 2), in_variances=True)
+    assert apart(found.levels, USUAL) < 0.01
+    assert found.gain == pytest.approx(0.5 * (np.log(3.0) / USUAL_SIGMA) ** 2, rel=0.01)
+
+
 def climbed(levels, change, steps=8):
     for _ in range(steps):
         levels = step(levels, change).levels
