@@ -227,9 +227,9 @@ class Learner:
             if judging:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
-        if self._flight is not None:
-            # Forgotten where other sensors say who they are.
-            self._flight = self._flight.of_these_sensors(self._calibrator.parameters)
+        if self._flight is not None:  # forgotten where other sensors say who they are
+            its = self._calibrator.parameters
+            self._flight = self._flight.of_these_sensors(its, or_of_none=True)
         learned = self._learned()
         if in_flight and self._in_air:
             ready = (c.status is Status.CALIBRATED for c in self._answers.values())
@@ -312,17 +312,17 @@ class Learner:
         self._tell_of_stuck()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
-        window, told = self._calibrator.trust, self._opening.told
-        trust = trust_view(window, told=told, windows=self._windows)
+        window = self._calibrator.trust
+        trust = trust_view(window, told=self._opening.told, windows=self._windows)
+        parameters = self._calibrator.parameters
+        flight = None if self._flight is None else self._flight.of_these_sensors(parameters)
         return Learned(
-            calibrations=known_now(
-                self._flight, self._answers, self._calibrator.parameters, unjudged=self._unjudged
-            ),
+            calibrations=known_now(flight, self._answers, parameters, unjudged=self._unjudged),
             trust=msgspec.structs.replace(trust, trusted_s=self._calibrator.flown_s),
             counters={**self._counters, **self._shelf.counters, **self._examiner.counters},
             news=news,
             flown=flown,
-            flight=None if self._unjudged else self._flight,
+            flight=None if self._unjudged else flight,
             diagnosing=self._examiner.waiting,
         )
 
@@ -343,8 +343,8 @@ class Learner:
 
     def _tell_of_calibration(self, imu: int, answer: Calibration) -> None:
         """Once when there is something to set, once when there is no more to learn."""
-        all_of_it, told = whole(answer), self._calibrated.get(imu)
-        if told is None or all_of_it > told:
+        all_of_it = whole(answer)
+        if imu not in self._calibrated or all_of_it > self._calibrated[imu]:
             self._calibrated[imu] = all_of_it
             more = "" if all_of_it else " in part; fly on for more"
             self._tell("calibrated", f"IMU {imu} is calibrated{more}")

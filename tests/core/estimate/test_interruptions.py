@@ -245,6 +245,16 @@ def test_saved_sums_are_taken_in_by_the_flight_that_agrees_with_them(identified)
     assert np.all(six(second)[1] < six(first)[1])
 
 
+def test_an_identifier_of_none_forgets_nothing_and_hides_no_exchange(identified, plain):
+    half = len(identified) // 2
+    none = ParameterValue("INS_ACC_ID", 0.0)
+    back = fed([*identified[:half], none, identified[0], *identified[half:]])[0]
+    assert np.array_equal(six(back)[0], six(plain)[0])
+    other = ParameterValue("INS_ACC_ID", 99.0)
+    swapped = fed([*identified[:half], none, other, *identified[half:]])[0]
+    assert swapped.calibration(1).trusted_s < 0.7 * plain.calibration(1).trusted_s
+
+
 def test_sums_of_another_sensor_are_refused(identified, plain):
     saved = fed(identified)[0].to_bytes()
     other = Calibrator.from_bytes(saved, ONCE)
