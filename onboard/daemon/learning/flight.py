@@ -108,16 +108,16 @@ class JudgedFlight:
         return replace(self, current=False)
 
     def of_these_sensors(
-        self, parameters: ParametersInForce, *, or_of_none: bool = False
+        self, parameters: ParametersInForce, *, of_none: bool = False
     ) -> JudgedFlight | None:
         """Without what is about accelerometers with other identifiers; None: nothing is left.
 
         Args:
             parameters: in force.
-            or_of_none: keep what is about one in whose place none is named now.  One that was not
+            of_none: keep what is about one in whose place none is named now.  One that was not
                 found at this boot may be at the next: nothing of it holds, and nothing is lost.
         """
-        none = {NO_SENSOR} if or_of_none else set[float]()
+        none = {NO_SENSOR} if of_none else set[float]()
         there = {
             imu: judged
             for imu, judged in self.imus.items()

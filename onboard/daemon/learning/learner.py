@@ -158,8 +158,10 @@ class Learner:
             text = "what was learned before is added when a flight agrees with it"
             self._tell("state_resumed", text)
 
-    def gap(self) -> None:
-        """The autopilot rebooted or was silent: from here on it may be another board."""
+    def gap(self, *, rebooted: bool = False) -> None:
+        """The autopilot rebooted (unseen by its samples) or was silent: it may be another board."""
+        for event in self._calibrator.restart("reboot") if rebooted else ():
+            self._note(event)
         self._before_gap = meanings(self._calibrator.parameters.values)
 
     def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
@@ -228,8 +230,7 @@ class Learner:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
         if self._flight is not None:  # forgotten where other sensors say who they are
-            its = self._calibrator.parameters
-            self._flight = self._flight.of_these_sensors(its, or_of_none=True)
+            self._flight = self._flight.of_these_sensors(self._calibrator.parameters, of_none=True)
         learned = self._learned()
         if in_flight and self._in_air:
             ready = (c.status is Status.CALIBRATED for c in self._answers.values())
@@ -312,8 +313,7 @@ class Learner:
         self._tell_of_stuck()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
-        window = self._calibrator.trust
-        trust = trust_view(window, told=self._opening.told, windows=self._windows)
+        trust = trust_view(self._calibrator.trust, told=self._opening.told, windows=self._windows)
         parameters = self._calibrator.parameters
         flight = None if self._flight is None else self._flight.of_these_sensors(parameters)
         return Learned(

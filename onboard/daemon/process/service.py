@@ -161,7 +161,7 @@ class Service:
         parts.pusher.judge(parts.witness.report(condition, now))
         self.handover.tell_of_lag(now)
         self._tell_of_stalls(now)
-        learned = self.handover.learned
+        learned, clock = self.handover.learned, self.link.boot_clock
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
         known = parts.parameters.complete and self.handover.identified and self.link.presence.proven
@@ -172,7 +172,8 @@ class Service:
                 parameters=parts.parameters.values,
                 board=parts.board.uid,
                 condition=condition,
-                confirmed=parts.parameters.confirmed,
+                # Whether a reboot has lost what is gone, or somebody has set it, shows its clock.
+                confirmed=parts.parameters.confirmed if clock.certain(now) else (),
             )
         if self.server is not None:
             self.server.publish()
