@@ -69,7 +69,9 @@ class Service:
         self.ready = asyncio.Event()
         self._life = Life()
         self.contact = Contact(self.parts, self._life)
-        self._outlets = Outlets(configuration, self, self.notices, clock=clock)
+        self._outlets = Outlets(
+            configuration, self, self.notices, clock=clock, board=self._board_that_is_there
+        )
         self._turns = turns_here()
         self._stalls_told, self._tell_stalls_at = 0, 0.0
         self._portrait = Portrait(self.parts, self._outlets, self._life, self._turns, wall_clock)
@@ -247,6 +249,11 @@ class Service:
         observe = self.parts.observed.feed
         for sample in self.handover.take(message):
             observe(sample, now)
+
+    def _board_that_is_there(self) -> str | None:
+        """Its unique id, empty if it tells none, None while it may still tell it."""
+        board = self.parts.board
+        return board.uid if board.answered else None
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
 
