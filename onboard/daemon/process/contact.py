@@ -69,8 +69,11 @@ class Contact:
                 counters["autopilot_rebooted"] += 1
                 self._nothing_is_known(rebooted=unseen)
                 if self._reboots.lost("rebooted", now):
-                    text = "the autopilot rebooted" + " while it was silent" * unseen
-                    post("autopilot_rebooted", text, warning=True)
+                    if unseen:
+                        text = "the autopilot rebooted while it was silent"
+                        post("autopilot_rebooted", text, warning=True)
+                    else:
+                        post("autopilot_rebooted", "the autopilot rebooted", warning=True)
                 self._reboots.works(now)
             case ConnectionTrouble(endpoint, reason):
                 text = f"{endpoint}: {reason}; tried again until it answers"
