@@ -76,6 +76,10 @@ class Vehicle(asyncio.DatagramProtocol):
         self.boot_ms += 1e3 * (loop.time() - self._silent_since)
         self._task = loop.create_task(self._stream(), name="vehicle")
 
+    def rename(self, system):
+        """Somebody sets MAV_SYSID: that takes effect at once."""
+        self._mav.srcSystem = system
+
     def reboot(self):
         self.boot_ms = 1000.0
         self.armed = False
