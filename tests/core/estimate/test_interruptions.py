@@ -222,6 +222,16 @@ def identified(flight):
     return [ParameterValue("INS_ACC_ID", 2753028.0), *flight]
 
 
+def test_one_stray_stamp_from_long_ago_begins_no_boot(flight, plain):
+    """A packet that was very long on its way; in a log, damage."""
+    strays = [k for k, s in enumerate(flight) if isinstance(s, ImuSample)][2000:6000:1500]
+    odd = [replace(s, t=s.t - 20.0) if k in strays else s for k, s in enumerate(flight)]
+    got, events = fed(odd)
+    assert [e for e in events if isinstance(e, Restarted)] == []
+    assert got.calibration(1).rejected["imu_late"] == len(strays)
+    assert np.all(np.abs(six(got)[0] - six(plain)[0]) < 0.2 * six(plain)[1])
+
+
 @pytest.mark.slow
 def test_saved_sums_are_taken_in_by_the_flight_that_agrees_with_them(identified):
     first = fed(identified)[0]
