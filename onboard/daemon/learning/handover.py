@@ -240,12 +240,15 @@ class Handover:
         except StateError as error:
             self.counters["save_failed"] += 1
             if self._disk.failed(str(error), now):
-                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+                text = f"what is learned is not kept over a restart: {error}"
+                self._notices.post("not_saved", text, warning=True)
             return
         self._disk.works(now)
         over = self._disk.over(now)
         if over is not None:
-            logger.info("what was learned is on the disk again, after %s", over)
+            self._notices.post(
+                "saved_again", f"what was learned is on the disk again, after {over}"
+            )
 
     def keeps_up(self, now: float) -> bool:
         """Whether the learner is not stuck in a batch."""
