@@ -18,6 +18,8 @@ ARMED = 128
 SILENCE = 60.0
 """Wall-clock seconds without the wanted event after which a simulator counts as dead."""
 WATCHED = ("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "STATUSTEXT")
+NO_AUTOPILOT = 8
+"""MAV_AUTOPILOT_INVALID: who sends such a HEARTBEAT is none."""
 STANDING_M, STANDING_M_S = 2.0, 0.5
 FIX_3D = 3
 
@@ -45,8 +47,11 @@ class Eyes:
 
     async def _follow(self, name: str) -> None:
         async for message in self._direct.subscribe_message(name):
+            fields = json.loads(message.fields_json)
+            if fields.get("autopilot") == NO_AUTOPILOT:
+                continue  # a companion's heartbeat, which the vehicle passes on, has never armed
             async with self._news:
-                self._state[name] = json.loads(message.fields_json)
+                self._state[name] = fields
                 self._news.notify_all()
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:

@@ -73,9 +73,13 @@ class AutopilotReturned:
 
 @dataclass(frozen=True, slots=True)
 class AutopilotRebooted:
-    """The boot clock went back; ``count`` reboots since the link started."""
+    """The boot clock began anew; ``count`` reboots since the link started.
+
+    ``unseen``: in a silence, so that its stamps have not gone back.
+    """
 
     count: int
+    unseen: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,24 +47,47 @@ class BootClock:
     the order of arrival; :meth:`seconds_ms` and :meth:`seconds_us` only convert, so that whoever
     wants to know the time may ask the one clock that there is.  A reboot is confirmed by the
     second stamp that lies in the past, so that one stray late packet is not taken for it.
+
+    After a silence a clock that has begun anew may be ahead of all that was heard before.  But both
+    clocks go at the same rate: one that has gone on for less than ours by more than a link can
+    delay, and stays so for as long as what a link has held back takes to come, has begun anew.
     """
 
     def __init__(self) -> None:
         self.latest: float | None = None
         self.reboots = 0
+        self.unseen = False
+        """Whether the last reboot was in a silence: its stamps have not gone back."""
         self._suspect: float | None = None
+        self._heard: tuple[float, float] | None = None
+        self._silence: tuple[float, float, float] | None = None
         self._unix_offset: float | None = None
         self._paired = False
 
     def begin_anew(self) -> None:
         """It is another autopilot from here on."""
         self.latest = self._suspect = self._unix_offset = None
+        self._heard = self._silence = None
         self._paired = False
 
-    def observe(self, message: Message) -> bool:
+    def certain(self, now: float) -> bool:
+        """Whether it is known if the autopilot has rebooted; not after a silence for some seconds.
+
+        Args:
+            now: our own clock, s, as :meth:`observe` was told it.
+        """
+        if self._heard is None or self._silence is not None:
+            return False
+        return now - self._heard[1] <= LONGEST_DELAY_S
+
+    def observe(self, message: Message, now: float | None = None) -> bool:
         """Take note of the time that a message tells; whether that confirms a reboot.
 
         Messages that are not stamped (see ``STAMPED``) say nothing.
+
+        Args:
+            message: of the autopilot.
+            now: our own monotonic clock, s, where there is one: a recording has none.
         """
         number, before = message.get_msgId(), self.reboots
         if number in _MS:
@@ -73,7 +96,33 @@ class BootClock:
             self._tick_us(message.time_usec)
         elif number == _SYSTEM_TIME:
             self._pair(message.time_unix_usec, message.time_boot_ms)
+        if self.reboots != before:
+            self._heard = self._silence = None
+        if now is not None and self.latest is not None:
+            self._keep_pace(self.latest, now)
         return self.reboots != before
+
+    def _keep_pace(self, latest: float, now: float) -> None:
+        """Whether it has gone on as ours has while nothing was heard, as far as is known by now."""
+        if self._heard is not None and self._silence is None:
+            t, at = self._heard
+            if now - at > LONGEST_DELAY_S:
+                self._silence = t, at, now
+        self._heard = latest, now
+        if self._silence is None:
+            return
+        t, at, since = self._silence
+        if (now - at) - (latest - t) <= LONGEST_DELAY_S:
+            self._silence = None
+        elif now - since > LONGEST_DELAY_S:
+            self._begins_anew(latest, unseen=True)
+
+    def _begins_anew(self, t: float, *, unseen: bool = False) -> None:
+        self.reboots += 1
+        self.unseen = unseen
+        self.latest = t
+        self._suspect = self._silence = None
+        self._unix_offset, self._paired = None, False
 
     def only_advances(self, stamps: NDArray[np.float64]) -> bool:
         """Whether boot times (n,), s, do nothing but go on, in their order of arrival.
@@ -139,9 +188,6 @@ class BootClock:
             self._suspect = None
         elif began_anew(t, latest):
             if self._suspect is not None and abs(t - self._suspect) < LONGEST_DELAY_S:
-                self.reboots += 1
-                self.latest = t
-                self._suspect = None
-                self._unix_offset, self._paired = None, False
+                self._begins_anew(t)
             else:
                 self._suspect = t

@@ -71,8 +71,20 @@ class Claim:
 
     def continues(self, other: Claim, now: float) -> bool:
         """Whether its clock is that of another one, so that both are ways to one vehicle."""
-        if self.source != other.source or self.boot is None:
-            return False
+        return self.source == other.source and self._has_the_clock_of(other, now)
+
+    def is_renamed(self, other: Claim, now: float) -> bool:
+        """Whether it is another one's autopilot under another system id.
+
+        That takes effect at once: on one way one falls silent, and the other begins, whose clock
+        goes on where the first has stopped.
+        """
+        same_place = self.way == other.way and self.source[1] == other.source[1]
+        another = same_place and self.source != other.source and self.proven
+        begins = other.heard - self.first_at <= limits.CLOCK_AGREES_S
+        return another and begins and self._has_the_clock_of(other, now)
+
+    def _has_the_clock_of(self, other: Claim, now: float) -> bool:
         mine, theirs = self.boot_expected(now), other.boot_expected(now)
         if mine is None or theirs is None:
             return False
@@ -130,6 +142,10 @@ class Claims:
         """The vehicle's own claim is not given up."""
         self._pinned = (pinned.source, pinned.way)
         self._claims[self._pinned] = pinned
+
+    def drop(self, claim: Claim) -> None:
+        """It is no more: who makes it again begins anew."""
+        self._claims.pop((claim.source, claim.way), None)
 
     @staticmethod
     def _worth(claim: Claim, now: float) -> tuple[bool, bool, float]:

@@ -324,8 +324,9 @@ class Link:
     def _watch_boot_clock(self, now: float, message: Message) -> None:
         if (message.get_srcSystem(), message.get_srcComponent()) != self.presence.source:
             return
-        if self.boot_clock.observe(message):
-            self._audience.hear_of(now, AutopilotRebooted(self.boot_clock.reboots))
+        clock = self.boot_clock
+        if clock.observe(message, now):
+            self._audience.hear_of(now, AutopilotRebooted(clock.reboots, unseen=clock.unseen))
             self._restart_participants(now)
 
     # Time

@@ -3,11 +3,13 @@
 **One vehicle is one (system, component, endpoint, address).**  The first HEARTBEAT of an autopilot
 is taken up, for without asking it for messages nothing can be proven; it is *pinned* once it has
 shown a stream whose time advances.  What speaks as the vehicle on another way is counted and not
-handed on.  The pin moves in four cases, and never while it is held (a push is under way):
+handed on.  The pin moves in five cases, and never while it is held (a push is under way):
 
 * the one taken up has proven nothing, and another has, or has not been tried yet;
 * it has been silent for a moment, and another way leads to the same boot clock (a second
   endpoint, a router that got another port): that is the same vehicle, nothing has happened;
+* it has been silent for a moment, and on the same way another system begins whose boot clock goes
+  on where its own has stopped: it has another system id, and is asked anew which board it is;
 * it has been silent for as long as counts as lost, and another way claims to be it: that is told
   as a vehicle that is back, which is asked anew which board it is;
 * it is lost, nothing was learned of it, and another vehicle is there.
@@ -186,6 +188,8 @@ class Presence:
         """Whether this claim is to be believed instead of the one that is."""
         if claim.continues(pinned, now):
             return now - pinned.heard > limits.FAILOVER_S
+        if claim.is_renamed(pinned, now):
+            return beats and now - pinned.heard > limits.FAILOVER_S
         lost = self.state is AutopilotState.SILENT
         same = claim.source == pinned.source
         if same and claim.proven and (lost or not pinned.proven):
@@ -209,6 +213,8 @@ class Presence:
     def _take(self, claim: Claim, now: float) -> Events:
         """This is the vehicle from here on."""
         before, self._pinned = self._pinned, claim
+        if before is not None and claim.is_renamed(before, now):
+            self._claims.drop(before)
         claim.tried = now
         self._claims.keep(claim)
         if before is not None and before.source == claim.source:

@@ -51,6 +51,7 @@ class Vehicle(asyncio.DatagramProtocol):
         self._parser.robust_parsing = True
         self._transport = None
         self._task = None
+        self._silent_since = None
 
     async def __aenter__(self):
         loop = asyncio.get_running_loop()
@@ -67,6 +68,17 @@ class Vehicle(asyncio.DatagramProtocol):
 
     def stop_talking(self):
         self._task.cancel()
+        self._silent_since = asyncio.get_running_loop().time()
+
+    def talk_again(self):
+        """Its clock has gone on meanwhile."""
+        loop = asyncio.get_running_loop()
+        self.boot_ms += 1e3 * (loop.time() - self._silent_since)
+        self._task = loop.create_task(self._stream(), name="vehicle")
+
+    def rename(self, system):
+        """Somebody sets MAV_SYSID: that takes effect at once."""
+        self._mav.srcSystem = system
 
     def reboot(self):
         self.boot_ms = 1000.0

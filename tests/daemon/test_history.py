@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import msgspec
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.daemon.view.accelerometers import imu_view
-from onboard.daemon.view.history import ROWS_MAX, SAVE_S, History, Ring, Row
+from onboard.daemon.view.history import BOARDS_KEPT, ROWS_MAX, SAVE_S, History, Ring, Row
 from tests.daemon.blank_snapshot import blank_snapshot
 from tests.daemon.daemons import calibration
 
@@ -81,6 +82,36 @@ def test_it_goes_on_after_a_restart(tmp_path, clock):
     before.save()
     assert times(flown(tmp_path, clock, range(20, 25))) == [float(t) for t in range(1, 25)]
     assert times(flown(tmp_path, clock, range(5, 6), system_id=2)) == [5.0]
+
+
+def test_curves_are_of_a_board_whatever_its_system_id(tmp_path, clock):
+    there: list[str | None] = [None]
+
+    def flying(seconds, system_id=1):
+        history = History(tmp_path, clock=clock, board=lambda: there[0])
+        for t in seconds:
+            history.take(seen(float(t), system_id))
+        history.save()
+        return times(history)
+
+    assert flying(range(1, 5)) == [], "it has not said who it is"
+    for there[0] in ("0a", "0b"):  # one after the other at the same companion, both as system 1
+        assert flying(range(1, 5)) == [1.0, 2.0, 3.0, 4.0]
+    there[0] = "0a"
+    assert flying(range(5, 7), system_id=7) == [float(t) for t in range(1, 7)]
+    there[0] = ""
+    assert flying(range(1, 2)) == [1.0]
+
+
+def test_boards_that_are_made_up_take_a_bounded_place(tmp_path, clock):
+    for number in range(BOARDS_KEPT + 9):
+        history = History(tmp_path, clock=clock, board=lambda number=number: f"{number:04x}")
+        history.take(seen(1.0))
+        history.save()
+        os.utime(history._path, (number, number))
+    kept = sorted(path.name for path in tmp_path.glob("history-*"))
+    assert len(kept) == BOARDS_KEPT
+    assert f"history-board-{BOARDS_KEPT + 8:04x}.bin" in kept
 
 
 @pytest.mark.slow

@@ -117,6 +117,28 @@ async def test_what_the_disk_does_not_forget_is_said_and_nothing_else_is_kept(
         assert service.parts.proposals.standing(1).approved is None
 
 
+async def test_a_disk_that_takes_nothing_is_told_on_the_page_once_and_when_it_does_again(
+    document, daemon, port, monkeypatch
+):
+    document["estimator"] = {"save_every_s": 0.01}
+    async with daemon(document) as service, Vehicle(port):
+        await until(lambda: service.snapshot().counters.get("saves"))
+
+        def full(*_, **__):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def said(kind):
+            return [n for n in service.snapshot().notices if n.kind == kind]
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "replace", full)
+            await until(lambda: service.snapshot().counters.get("save_failed", 0) > 5)
+        await until(lambda: said("saved_again"))
+        (told,) = said("not_saved")
+        assert told.warning
+        assert "No space left on device" in told.text
+
+
 async def test_before_the_first_flight_it_says_what_to_do(document, daemon, port):
     async with daemon(document) as service:
         assert service.snapshot().next_step is None, "nobody is there"

@@ -5,7 +5,7 @@ import logging
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.daemon.pushing.parameters import ParameterWatch
+from onboard.daemon.pushing.parameters import NEEDED, ParameterWatch
 
 
 @pytest.fixture
@@ -42,3 +42,52 @@ def test_an_autopilots_statistics_fill_no_log(watch, caplog):
     ]
     assert watch.counters["parameters_changed"] == 2
     assert watch.values["STAT_RUNTIME"] == 3570.0
+
+
+class Queueing:
+    """Answers reads late, with the values of when they were asked, as ArduPilot does."""
+
+    def __init__(self, values):
+        self.values = values
+        self.answers = []
+
+    def hear(self, messages):
+        for message in messages:
+            if message.get_type() == "PARAM_REQUEST_READ":
+                name = message.param_id
+                if name in self.values:
+                    self.answers.append((name, self.values[name]))
+
+    def answer(self, watch, now):
+        waiting, self.answers = self.answers, []
+        for name, value in waiting:
+            self.hear(watch.feed(told(name, value), now))
+
+
+def test_an_answer_that_is_older_than_an_announcement_is_not_believed_for_long(watch):
+    """Somebody sets a value, or a sensor says who it is, while its old one waits to be sent."""
+    autopilot = Queueing(dict.fromkeys(NEEDED, 0.0))
+    autopilot.hear(watch.poll(0.0))
+    set_meanwhile = {name: 0.25 for name, _ in autopilot.answers}
+    assert "INS_ACCOFFS_X" in set_meanwhile
+    autopilot.values |= set_meanwhile
+    for name, value in set_meanwhile.items():
+        autopilot.hear(watch.feed(told(name, value), 0.3))
+    for tick in range(100):
+        autopilot.answer(watch, 0.4 + 0.02 * tick)
+        autopilot.hear(watch.poll(0.4 + 0.02 * tick))
+    assert watch.complete
+    assert watch.values == autopilot.values
+
+
+def test_what_changes_is_asked_for_once_each(watch):
+    """A person who turns a knob causes a read at a time, not one for each step."""
+    watch.poll(0.0)
+    watch.feed(told("AHRS_TRIM_X", 0.0), 0.1)
+    asked = [
+        message
+        for step in range(1, 100)
+        for message in watch.feed(told("AHRS_TRIM_X", 0.001 * step), 0.1 + 0.001 * step)
+        if message.get_type() == "PARAM_REQUEST_READ" and message.param_id == "AHRS_TRIM_X"
+    ]
+    assert len(asked) <= 50

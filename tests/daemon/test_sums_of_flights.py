@@ -117,6 +117,24 @@ def test_another_sensor_with_the_same_values_in_force_gets_nothing_of_the_one_be
     assert made._calibrator.imus == ()
 
 
+def test_a_sensor_that_a_boot_has_not_found_is_as_it_was_when_the_next_one_finds_it(
+    tmp_path, first
+):
+    """ArduPilot sets the identifier of an empty slot to zero; that names no other sensor."""
+    made = learner(tmp_path, first)
+    found = fly(made, first).flight.diagnosed[1].calibration
+    reboot(made, first, INS_ACC_ID=0.0)
+    learned = made.learn([], judging=())
+    assert learned.flight is None, "nothing is proposed for a slot in which none is named"
+    assert learned.calibrations == {}
+    made.save(1.0)
+    reboot(made, first)
+    learned = made.learn([], judging=())
+    assert not learned.flight.current
+    assert learned.flight.diagnosed[1].calibration.offset == found.offset
+    assert learner(tmp_path, first).learn([], judging=()).flight is not None
+
+
 def test_what_was_not_judged_is_not_kept(tmp_path, first):
     """The power goes at the landing: nobody can say any more whether physics was missing."""
     made = learner(tmp_path, first)

@@ -208,7 +208,7 @@ async def test_what_somebody_has_set_before_our_eyes_stays_whatever_comes(
             if then == "silence":
                 vehicle.stop_talking()
                 await until(lambda: service.snapshot().link.state == "silent")
-                vehicle._task = asyncio.create_task(vehicle._stream())
+                vehicle.talk_again()
             elif then == "reboot":
                 vehicle.reboot()
             if then != "restart":
@@ -223,6 +223,36 @@ async def test_what_somebody_has_set_before_our_eyes_stays_whatever_comes(
         assert in_force(vehicle) == mixed
         said = {*service.snapshot().notices, *again.snapshot().notices}
         assert not [n.text for n in said if "taken back" in n.text or "interrupted" in n.text]
+
+
+async def test_what_a_reboot_in_a_silence_has_lost_is_nobodys_will(document, daemon, port):
+    """Its clock is further on than when it fell silent: the silence outlasts the boot before it."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.boot_ms = 1000.0
+        before = in_force(vehicle)
+        await pushed(service, vehicle)
+        await service.reject((1,))
+        await until(lambda: service.parts.parameters.complete)
+        await ticks(service, 20)
+        vehicle.sets.clear()
+        vehicle.stop_talking()
+        heard = vehicle.boot_ms
+        await asyncio.sleep(300.0)
+        vehicle.parameters |= dict(zip(SIX[:3], before[:3], strict=True))  # as they were stored
+        vehicle.boot_ms = -30_000.0  # booted half a minute after that
+        vehicle.talk_again()
+        assert vehicle.boot_ms > heard
+        await until(lambda: notices(service, "push_mixed"))
+        assert notices(service, "autopilot_rebooted") == [
+            "the autopilot rebooted while it was silent"
+        ]
+        assert notices(service, "push_replaced") == []
+        assert service.handover.learned.counters["event_Restarted"] == 1
+        assert vehicle.sets == []
+        await until(lambda: service.snapshot().link.armed is False)
+        await asyncio.sleep(10.0)
+        await service.rollback((1,))
+        await until(lambda: in_force(vehicle) == before)
 
 
 @pytest.mark.parametrize("policy", ["landed", "never"])

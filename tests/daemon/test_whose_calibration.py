@@ -227,6 +227,34 @@ async def test_a_flight_is_judged_though_the_power_goes_right_after_the_landing(
 
 
 @pytest.mark.parametrize("board", ["0a0b0c" + 30 * "0", ""])
+async def test_a_system_id_that_is_set_while_the_service_runs_is_followed(
+    document, daemon, port, board
+):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.board = board
+        before = in_force(vehicle)
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        await until(lambda: service.snapshot().push.state == "idle")
+        vehicle.sets.clear()
+        vehicle.rename(7)
+        await until(lambda: service.snapshot().link.system_id == 7)
+        await settled(service, 80)
+        assert service.snapshot().link.warnings == ()
+        assert vehicle.sets == []
+        if not board:  # nobody can say that it is the same one
+            assert service.snapshot().push.can_roll_back == ()
+            assert service.snapshot().push.proposals == ()
+            return
+        assert service.snapshot().push.can_roll_back == (1,)
+        await until(lambda: service.snapshot().link.armed is False)
+        await asyncio.sleep(10.0)
+        await service.rollback((1,))
+        await until(lambda: service.snapshot().push.can_roll_back == ())
+        assert in_force(vehicle) == before
+
+
+@pytest.mark.parametrize("board", ["0a0b0c" + 30 * "0", ""])
 async def test_a_board_with_another_system_id_is_known_again_if_it_says_which_it_is(
     document, daemon, port, board
 ):

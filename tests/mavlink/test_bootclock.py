@@ -203,3 +203,60 @@ def test_link_and_estimator_agree_on_what_a_reboot_is(back):
         events = calibrator.feed(ImuSample(t, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)))
         restarted |= any(isinstance(event, Restarted) for event in events)
     assert restarted == bool(clock.reboots)
+
+
+def listened(clock, boot, heard):
+    """Attitude five times a second: booted ``boot(now)`` s ago, for each ``now`` of ``heard``."""
+    for now in heard:
+        message = mavlink.MAVLink_attitude_message(round(1e3 * boot(now)), 0, 0, 0, 0, 0, 0)
+        clock.observe(message, now)
+
+
+def every(begin, end):
+    return np.arange(begin, end, 0.2).tolist()
+
+
+@pytest.mark.parametrize("silence", [6.0, 60.0, 3000.0])
+@pytest.mark.parametrize("late", [0.0, 2.0])
+def test_a_reboot_in_a_silence_that_outlasts_the_boot_before_it_is_found(silence, late):
+    """Its clock is further on than ever, and yet behind ours."""
+    clock, back = BootClock(), 50.0 + silence
+    listened(clock, lambda now: now - 45.0, every(46.0, 50.0))
+    booted = 50.0 + (0.1 if silence > 10.0 else 0.5)
+    assert clock.certain(50.0)
+    assert not clock.certain(back)
+    listened(clock, lambda now: now - booted - late, every(back, back + 2.0))
+    assert clock.reboots == 0, "what was held back may still come"
+    assert not clock.certain(back + 2.0)
+    listened(clock, lambda now: now - booted - late, every(back + 2.0, back + 20.0))
+    assert (clock.reboots, clock.unseen) == (1, True)
+    assert clock.certain(back + 20.0)
+
+
+def test_a_silence_without_a_reboot_is_none():
+    clock = BootClock()
+    listened(clock, lambda now: now, every(100.0, 110.0))
+    listened(clock, lambda now: now - 2.0, every(200.0, 200.5))
+    assert clock.certain(200.5)
+    listened(clock, lambda now: now, every(200.5, 300.0))
+    assert clock.reboots == 0
+
+
+def test_what_a_link_has_held_back_is_no_reboot():
+    """A TCP line that stalls for 20 s gives everything at once; a slow one within some seconds."""
+    clock = BootClock()
+    listened(clock, lambda now: now, every(100.0, 110.0))
+    held = every(110.0, 130.0)
+    for k, sent in enumerate(held):
+        listened(clock, lambda _, sent=sent: sent, [130.0 + 2.0 * k / len(held)])
+    listened(clock, lambda now: now, every(132.0, 160.0))
+    assert clock.reboots == 0
+    assert clock.certain(160.0)
+
+
+def test_a_reboot_that_is_seen_is_counted_once():
+    clock = BootClock()
+    listened(clock, lambda now: now, every(100.0, 110.0))
+    listened(clock, lambda now: now - 114.0, every(115.0, 140.0))
+    assert (clock.reboots, clock.unseen) == (1, False)
+    assert clock.certain(140.0)

@@ -247,3 +247,53 @@ def test_the_vehicles_own_claim_is_kept_however_long_it_is_silent():
     wire.second(HERE)
     assert wire.presence.way == HERE
     assert wire.hear(HERE, message=BEAT) is Whose.VEHICLE
+
+
+RENAMED = (7, 1)
+
+
+def test_a_vehicle_with_another_system_id_is_known_by_its_clock_and_back_again():
+    wire = Wire(committed=True)
+    for _ in range(5):
+        wire.second(HERE)
+    for source in (RENAMED, VEHICLE, RENAMED):
+        for _ in range(4):
+            wire.second(HERE, source=source)
+        assert wire.presence.source == source
+        assert wire.events[-1] == AutopilotFound(wire.presence.autopilot)
+        assert wire.presence.state is AutopilotState.PRESENT
+        assert wire.presence.others(wire.now) == ()
+    assert len(wire.events) == 4
+
+
+@pytest.mark.parametrize(
+    ("offset", "way"),
+    [(130.0, HERE), (70.0, HERE), (100.0, THERE), (100.0, OTHER_ENDPOINT)],
+    ids=["later clock", "earlier clock", "another address", "another endpoint"],
+)
+def test_another_vehicle_that_begins_when_it_falls_silent_is_not_taken_for_it(offset, way):
+    wire = Wire(committed=True)
+    wire.second(HERE)
+    for _ in range(20):
+        wire.second(way, source=RENAMED, offset=offset)
+    assert wire.presence.source == VEHICLE
+    assert wire.presence.state is AutopilotState.SILENT
+
+
+def test_a_vehicle_beside_it_with_the_same_clock_does_not_take_its_place():
+    """Two of them, powered together: both have spoken."""
+    wire = Wire(committed=True)
+    for _ in range(5):
+        wire.second(HERE)
+        wire.second(HERE, source=RENAMED)
+    for _ in range(20):
+        wire.second(HERE, source=RENAMED)
+    assert wire.presence.source == VEHICLE
+
+
+def test_in_a_push_and_where_an_id_is_configured_nothing_is_followed():
+    for wire in (Wire(committed=True, held=True), Wire(system=1)):
+        wire.second(HERE)
+        for _ in range(20):
+            wire.second(HERE, source=RENAMED)
+        assert wire.presence.source == VEHICLE

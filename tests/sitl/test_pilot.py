@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.server import Server
 from sitl.builtin.truth import Truth
 from sitl.errors import SitlError
+from sitl.eyes import Eyes
 from sitl.pilot import Pilot
 
 
@@ -45,6 +48,27 @@ async def test_mavsdk_reads_writes_and_flies(vehicle):
         await pilot.land()
         assert not pilot.armed
         assert np.allclose(server.autopilot.instant().velocity(), 0.0, atol=1.0)
+
+
+class Passed:
+    """What MAVSDK hands on: the vehicle's heartbeat, and the one of a companion behind it."""
+
+    def __init__(self, heartbeats):
+        self._heartbeats = heartbeats
+
+    async def subscribe_message(self, name):
+        for mode, autopilot in self._heartbeats if name == "HEARTBEAT" else ():
+            fields = {"base_mode": mode, "autopilot": autopilot}
+            yield SimpleNamespace(fields_json=json.dumps(fields))
+
+
+async def test_a_companions_heartbeat_is_not_the_vehicles():
+    eyes = Eyes(Passed([(128 + 81, 3), (0, 8)]))
+    eyes.open()
+    await asyncio.sleep(0.0)
+    await asyncio.sleep(0.0)
+    assert eyes.armed
+    await eyes.close()
 
 
 async def test_nobody_there_is_said():

@@ -28,6 +28,7 @@ from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
 from onboard.core.inputs.blocks import Block
+from onboard.core.inputs.boot_time import began_anew
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
@@ -163,7 +164,7 @@ class Calibrator:
         return (
             newest > -math.inf
             and block.is_plain
-            and not self._clock.went_back(block.first_imu)
+            and not began_anew(block.first_imu, newest)
             and block.attitude_ahead(newest) <= AHEAD_OF_IMU_S
             and self._assembly.streams.continued_by(block)
             and not (block.coarse and self._may_forget(block))

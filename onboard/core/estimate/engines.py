@@ -19,7 +19,7 @@ from onboard.core.maths.accelerometer import parameter_names
 
 WHICH_SENSOR: Final = {parameter_names(imu).device_id: imu for imu in range(1, 6)}
 NO_SENSOR: Final = 0.0
-"""INS_ACCn_ID where there is none."""
+"""INS_ACCn_ID where there is none, or none was found at this boot: no other sensor's name."""
 
 
 class Engines:
@@ -44,6 +44,7 @@ class Engines:
         self._parameters = parameters
         self._only = frozenset(only)
         self._engines: dict[int, Engine] = {}
+        self._named: dict[int, float] = {}
         self.earlier = EarlierSums()
         self.beside: dict[int, list[Batch]] = {}
 
@@ -116,8 +117,10 @@ class Engines:
     def replaced_by(self, parameter: ParameterValue) -> int | None:
         """Forget the accelerometer in whose place this tells of another one; which it was."""
         imu = WHICH_SENSOR.get(parameter.name)
-        before = None if imu is None else self._parameters.device_id(imu)
-        if imu is None or before in (None, NO_SENSOR, parameter.value):
+        if imu is None or parameter.value == NO_SENSOR:
+            return None
+        before, self._named[imu] = self._named.get(imu), parameter.value
+        if before in (None, parameter.value):
             return None
         return imu if self.forget(imu) else None
 

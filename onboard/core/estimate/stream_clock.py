@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 
 from onboard.core.estimate.limits import AHEAD_OF_IMU_S, OTHER_CLOCK_S
-from onboard.core.inputs.boot_time import began_anew
+from onboard.core.inputs.boot_time import NEXT_S, began_anew
 
 
 class StreamClock:
     """Newest and first time of the inertial samples, s on the boot clock."""
 
-    __slots__ = ("first", "newest")
+    __slots__ = ("_odd", "first", "newest")
 
     def __init__(self) -> None:
         self.newest = -math.inf
+        self._odd: float | None = None
         self.first = math.inf
 
     def hear(self, t: float) -> None:
@@ -26,12 +27,17 @@ class StreamClock:
 
     def restart(self) -> float:
         """The clock begins anew; its last time before that."""
-        ended, self.newest = self.newest, -math.inf
+        ended, self.newest, self._odd = self.newest, -math.inf, None
         return ended
 
     def went_back(self, t: float) -> bool:
-        """True if an inertial stamp says that the autopilot has started again."""
-        return began_anew(t, self.newest)
+        """True if this inertial stamp and the one before say that the autopilot has started again.
+
+        One alone is a packet that was very long on its way, or damage: see
+        :class:`~onboard.core.inputs.boot_time.Boots`.
+        """
+        before, self._odd = self._odd, t if began_anew(t, self.newest) else None
+        return self._odd is not None and before is not None and 0.0 <= t - before <= NEXT_S
 
     def is_ahead(self, t: float) -> bool:
         """True for a stamp that the inertial stream is too far from reaching."""

@@ -33,7 +33,8 @@ RECOVERY: Final[Mapping[Distrust, float]] = MappingProxyType(
 )
 """Seconds that a reason is held after the report that denies it [tuned]."""
 LATE_IN_A_ROW: Final = 5
-"""So many late fixes are not late: one stamp before them was far ahead [cost: a second at 5 Hz]."""
+"""So many fixes that are later than any link can make them are not late: one stamp before them was
+far ahead [cost: a second at 5 Hz]."""
 MOST_REFUSED_SPANS: Final = 512
 """Spans that are remembered: a receiver that flaps for hours must not fill the memory [cost]."""
 GIVEN_UP_S: Final = 60.0

@@ -31,6 +31,7 @@ from onboard.core.gps.ledger import FixLedger
 from onboard.core.gps.limits import LATE_IN_A_ROW, STUCK_SHARE, TrustLimits
 from onboard.core.gps.plausibility import Contradiction, FixPlausibility
 from onboard.core.gps.receiver_choice import ReceiverChoice
+from onboard.core.inputs.boot_time import began_anew
 from onboard.core.inputs.samples import (
     AttitudeSample,
     EkfHealth,
@@ -193,7 +194,7 @@ class TrustWindow:
         if last is not None and fix.t == last:
             return ()
         if last is not None and fix.t < last:
-            return self._late_fix(last)
+            return self._late_fix(fix.t, last)
         self._late = 0
         has_fix = fix.fix_type >= self._limits.fix_type
         self._repeats = has_fix and self._plausibility.repeats(fix)
@@ -215,9 +216,15 @@ class TrustWindow:
                 events += self._end(fix.t, Distrust.CONFIGURED_END)
         return events
 
-    def _late_fix(self, last: float) -> tuple[WindowEvent, ...]:
-        """A fix older than the one before; many in a row say that *that* one was far ahead."""
+    def _late_fix(self, t: float, last: float) -> tuple[WindowEvent, ...]:
+        """A fix older than the one before; many in a row say that *that* one was far ahead.
+
+        Only those that are later than a link can make them: one that repeats and reorders brings
+        any number of fixes after a newer one.
+        """
         self._ledger.count(Distrust.STALE)
+        if not began_anew(t, last):
+            return ()
         self._late += 1
         if self._late < LATE_IN_A_ROW:
             return ()

@@ -25,6 +25,8 @@ from onboard.core.inputs.limits import (
     MOST_STUCK,
     REACH_MARGIN_S,
     REACH_S,
+    SAME_M_S2,
+    SAME_RAD_S,
     SLOWEST_IMU_HZ,
     TEMPERATURE_EVERY,
     TOUCHED_S,
@@ -192,7 +194,7 @@ class Assembly:
     def _measured(self, imu: int, live: dict[int, ImuTrack], fixes: Fixes) -> tuple[Array, Array]:
         """The samples without those of an accelerometer that repeats one reading."""
         stamps, rows = live[imu].arrays()
-        dead = stuck(stamps, rows[:, 3:6])
+        dead = stuck(stamps, rows[:, 3:6], SAME_M_S2)
         if not np.any(dead) or not len(fixes):
             return stamps[~dead], rows[~dead]
         known = self.stuck.setdefault(imu, [])
@@ -284,7 +286,7 @@ def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:
         stamps, rows = live[imu].arrays()
         during = (stamps >= fixes.t[0]) & (stamps <= fixes.t[-1])
         told.append(rows[during, :3])
-        if not np.any(stuck(stamps[during], told[-1])):
+        if not np.any(stuck(stamps[during], told[-1], SAME_RAD_S)):
             return still(fixes.v_n, told[-1])
     return still(fixes.v_n, told[0])
 
@@ -327,7 +329,7 @@ def _with_rates(
     """
     alone = parameters.one_chip(imu)
     for gyro in sorted(live, key=lambda other: (alone and other != imu, other)):
-        if gyro == imu and not np.any(stuck(at, rows[:, :3])):
+        if gyro == imu and not np.any(stuck(at, rows[:, :3], SAME_RAD_S)):
             break
         w = None if gyro == imu else rates_at(live[gyro], at, IMU_GAP_S)
         if w is not None:

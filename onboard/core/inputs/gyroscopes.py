@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.inputs.limits import AS_DENSE
+from onboard.core.inputs.limits import AS_DENSE, SAME_RAD_S
 from onboard.core.inputs.stuck import stuck
 from onboard.core.inputs.tracks import ImuTrack
 from onboard.core.maths.arrays import Array
@@ -38,6 +38,6 @@ def rates_at(track: ImuTrack, at: Array, longest_gap: float) -> Array | None:
         return None
     if np.diff(t).max() > longest_gap or t[0] > at[0] + longest_gap or t[-1] < at[-1] - longest_gap:
         return None
-    if np.any(stuck(t, w)):
+    if np.any(stuck(t, w, SAME_RAD_S)):
         return None
     return Hermite(t, w)(np.clip(at, t[0], t[-1]))

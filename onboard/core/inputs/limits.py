@@ -47,6 +47,13 @@ STUCK_S: Final = 1.0
 """s for which no accelerometer that works repeats one reading on all three axes in flight.  Where
 steps are a thousandth of g and vibration is no more, one reading of fifty is like that before it,
 and eight in a row, a second of the slowest stream, are one of ten thousand million [physics]."""
+SAME_M_S2: Final = 1e-4
+"""m/s^2 within which readings are one reading.  A low-pass that reckons in float32 never comes to
+rest, but goes on by a few roundings for ever (3e-7 m/s^2 at 1 kHz); the quietest accelerometers
+have a noise of 25 micro-g a root of a hertz, 1e-3 m/s^2 behind 20 Hz [data sheet]."""
+SAME_RAD_S: Final = 1e-6
+"""The same of rates, rad/s: the quietest gyroscopes have 0.003 deg/s a root of a hertz, 2e-4 rad/s
+[data sheet]."""
 MOST_STUCK: Final = 50
 """Such times that are remembered, the latest [cost]."""
 FEWEST_SAMPLES: Final = 8

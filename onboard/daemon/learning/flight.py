@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import msgspec
 
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.engines import NO_SENSOR
 from onboard.core.estimate.result import Calibration, Six, Status
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.accelerometer import parameter_names
@@ -106,12 +107,21 @@ class JudgedFlight:
         """The same after a gap in which the board may have been changed for another."""
         return replace(self, current=False)
 
-    def of_these_sensors(self, parameters: ParametersInForce) -> JudgedFlight | None:
-        """Without what is about accelerometers with other identifiers; None: nothing is left."""
+    def of_these_sensors(
+        self, parameters: ParametersInForce, *, of_none: bool = False
+    ) -> JudgedFlight | None:
+        """Without what is about accelerometers with other identifiers; None: nothing is left.
+
+        Args:
+            parameters: in force.
+            of_none: keep what is about one in whose place none is named now.  One that was not
+                found at this boot may be at the next: nothing of it holds, and nothing is lost.
+        """
+        none = {NO_SENSOR} if of_none else set[float]()
         there = {
             imu: judged
             for imu, judged in self.imus.items()
-            if parameters.device_id(imu) in (None, judged.device_id)
+            if parameters.device_id(imu) in {None, judged.device_id, *none}
         }
         return replace(self, imus=there) if there else None
 

@@ -86,6 +86,7 @@ class Handover:
         self._next_save = 0.0
         self._samples: list[Sample] = []
         self._before_gap: list[Sample] | None = None
+        self._rebooted = False
         self._arrived: float | None = None
         self._taken: float | None = None
         self._behind = False
@@ -149,11 +150,15 @@ class Handover:
         """Whether what was learned is of the autopilot that is there now."""
         return self._begun and self.learned is not None
 
-    def gap(self) -> None:
+    def gap(self, *, rebooted: bool = False) -> None:
         """The autopilot rebooted or is silent: another may answer next, so it is asked who it is.
 
         What comes from here on waits for that; what came before is learned at once.
+
+        Args:
+            rebooted: its clock has begun anew, and the stamps of its samples do not say so.
         """
+        self._rebooted |= rebooted
         self.counters["gaps"] += 1
         self._before_gap = [*(self._before_gap or ()), *(self._samples if self._begun else ())]
         if self._begun:
@@ -190,7 +195,8 @@ class Handover:
         before, self._before_gap = self._before_gap, None
         if before:
             await self._learn(before)
-        await self._call(self._learner.gap)
+        rebooted, self._rebooted = self._rebooted, False
+        await self._call(self._learner.gap, rebooted=rebooted)
 
     async def _begin(self, now: float) -> bool:
         """Whether it is known who is there and what the messages mean, or is waited for in vain."""
@@ -234,12 +240,15 @@ class Handover:
         except StateError as error:
             self.counters["save_failed"] += 1
             if self._disk.failed(str(error), now):
-                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+                text = f"what is learned is not kept over a restart: {error}"
+                self._notices.post("not_saved", text, warning=True)
             return
         self._disk.works(now)
         over = self._disk.over(now)
         if over is not None:
-            logger.info("what was learned is on the disk again, after %s", over)
+            self._notices.post(
+                "saved_again", f"what was learned is on the disk again, after {over}"
+            )
 
     def keeps_up(self, now: float) -> bool:
         """Whether the learner is not stuck in a batch."""

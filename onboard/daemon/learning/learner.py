@@ -158,8 +158,10 @@ class Learner:
             text = "what was learned before is added when a flight agrees with it"
             self._tell("state_resumed", text)
 
-    def gap(self) -> None:
-        """The autopilot rebooted or was silent: from here on it may be another board."""
+    def gap(self, *, rebooted: bool = False) -> None:
+        """The autopilot rebooted (unseen by its samples) or was silent: it may be another board."""
+        for event in self._calibrator.restart("reboot") if rebooted else ():
+            self._note(event)
         self._before_gap = meanings(self._calibrator.parameters.values)
 
     def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
@@ -227,9 +229,8 @@ class Learner:
             if judging:
                 flown = self._proof.feed(sample, self._calibrator.parameters)
                 self._flown = self._flown if flown is None else flown
-        if self._flight is not None:
-            # Forgotten where other sensors say who they are.
-            self._flight = self._flight.of_these_sensors(self._calibrator.parameters)
+        if self._flight is not None:  # forgotten where other sensors say who they are
+            self._flight = self._flight.of_these_sensors(self._calibrator.parameters, of_none=True)
         learned = self._learned()
         if in_flight and self._in_air:
             ready = (c.status is Status.CALIBRATED for c in self._answers.values())
@@ -312,17 +313,16 @@ class Learner:
         self._tell_of_stuck()
         news, self._news = tuple(self._news), []
         flown, self._flown = self._flown, {}
-        window, told = self._calibrator.trust, self._opening.told
-        trust = trust_view(window, told=told, windows=self._windows)
+        trust = trust_view(self._calibrator.trust, told=self._opening.told, windows=self._windows)
+        parameters = self._calibrator.parameters
+        flight = None if self._flight is None else self._flight.of_these_sensors(parameters)
         return Learned(
-            calibrations=known_now(
-                self._flight, self._answers, self._calibrator.parameters, unjudged=self._unjudged
-            ),
+            calibrations=known_now(flight, self._answers, parameters, unjudged=self._unjudged),
             trust=msgspec.structs.replace(trust, trusted_s=self._calibrator.flown_s),
             counters={**self._counters, **self._shelf.counters, **self._examiner.counters},
             news=news,
             flown=flown,
-            flight=None if self._unjudged else self._flight,
+            flight=None if self._unjudged else flight,
             diagnosing=self._examiner.waiting,
         )
 
@@ -343,8 +343,8 @@ class Learner:
 
     def _tell_of_calibration(self, imu: int, answer: Calibration) -> None:
         """Once when there is something to set, once when there is no more to learn."""
-        all_of_it, told = whole(answer), self._calibrated.get(imu)
-        if told is None or all_of_it > told:
+        all_of_it = whole(answer)
+        if imu not in self._calibrated or all_of_it > self._calibrated[imu]:
             self._calibrated[imu] = all_of_it
             more = "" if all_of_it else " in part; fly on for more"
             self._tell("calibrated", f"IMU {imu} is calibrated{more}")

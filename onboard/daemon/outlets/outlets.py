@@ -71,6 +71,7 @@ class Outlets:
         notices: Notices,
         *,
         clock: Callable[[], float],
+        board: Callable[[], str | None] = lambda: "",
     ) -> None:
         self._service = service
         self._notices = notices
@@ -86,7 +87,7 @@ class Outlets:
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
         self._publisher: Publisher | None = None
-        self.history = History(configuration.state.path(), clock=clock)
+        self.history = History(configuration.state.path(), clock=clock, board=board)
         if configuration.parameters.messages:
             self._announcer = Announcer(clock)
             notices.listen(self._announcer.hear)

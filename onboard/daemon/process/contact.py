@@ -65,11 +65,15 @@ class Contact:
                 self._silence.works(now)
             case RivalHeard(armed):
                 self._parts.observed.rival(now, armed=armed)
-            case AutopilotRebooted():
+            case AutopilotRebooted(unseen=unseen):
                 counters["autopilot_rebooted"] += 1
-                self._nothing_is_known()
+                self._nothing_is_known(rebooted=unseen)
                 if self._reboots.lost("rebooted", now):
-                    post("autopilot_rebooted", "the autopilot rebooted", warning=True)
+                    if unseen:
+                        text = "the autopilot rebooted while it was silent"
+                        post("autopilot_rebooted", text, warning=True)
+                    else:
+                        post("autopilot_rebooted", "the autopilot rebooted", warning=True)
                 self._reboots.works(now)
             case ConnectionTrouble(endpoint, reason):
                 text = f"{endpoint}: {reason}; tried again until it answers"
@@ -146,7 +150,7 @@ class Contact:
         self._life.mode, self._life.mode_reason = "advise_only", reason
         self._parts.proposals.forbidden = reason
 
-    def _nothing_is_known(self) -> None:
+    def _nothing_is_known(self, *, rebooted: bool = False) -> None:
         """Another autopilot, or another state of it, may be there when it is heard again."""
         self._parts.observed.forget()
-        self._parts.handover.gap()
+        self._parts.handover.gap(rebooted=rebooted)

@@ -69,7 +69,9 @@ class Service:
         self.ready = asyncio.Event()
         self._life = Life()
         self.contact = Contact(self.parts, self._life)
-        self._outlets = Outlets(configuration, self, self.notices, clock=clock)
+        self._outlets = Outlets(
+            configuration, self, self.notices, clock=clock, board=self._board_that_is_there
+        )
         self._turns = turns_here()
         self._stalls_told, self._tell_stalls_at = 0, 0.0
         self._portrait = Portrait(self.parts, self._outlets, self._life, self._turns, wall_clock)
@@ -161,7 +163,7 @@ class Service:
         parts.pusher.judge(parts.witness.report(condition, now))
         self.handover.tell_of_lag(now)
         self._tell_of_stalls(now)
-        learned = self.handover.learned
+        learned, clock = self.handover.learned, self.link.boot_clock
         # What was learned must be of the board that is there, unless a push is under way, which
         # looks after itself.
         known = parts.parameters.complete and self.handover.identified and self.link.presence.proven
@@ -172,7 +174,8 @@ class Service:
                 parameters=parts.parameters.values,
                 board=parts.board.uid,
                 condition=condition,
-                confirmed=parts.parameters.confirmed,
+                # Whether a reboot has lost what is gone, or somebody has set it, shows its clock.
+                confirmed=parts.parameters.confirmed if clock.certain(now) else (),
             )
         if self.server is not None:
             self.server.publish()
@@ -246,6 +249,11 @@ class Service:
         observe = self.parts.observed.feed
         for sample in self.handover.take(message):
             observe(sample, now)
+
+    def _board_that_is_there(self) -> str | None:
+        """Its unique id, empty if it tells none, None while it may still tell it."""
+        board = self.parts.board
+        return board.uid if board.answered else None
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
 

@@ -58,7 +58,7 @@ NEEDED = frozenset((*REQUIRED, *MEANING, *KNOWLEDGE))
 
 
 class ParameterWatch:
-    """Reads what is needed, again after every reboot or silence, and now and then."""
+    """Reads what is needed, again after every reboot or silence, now and then, and what changes."""
 
     names = ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")
 
@@ -150,6 +150,10 @@ class ParameterWatch:
                         continue
                     self.counters["parameters_changed"] += 1
                     logger.info("%s changed from %.7g to %.7g", name, previous, value)
+                    # ArduPilot answers reads from a queue, with the values of when they were asked:
+                    # an answer can be older than the announcement before it.  What nobody asked for
+                    # is taken, and asked for.
+                    messages += self._act(self._client.read((name,), now), now)
                 case _ if isinstance(output, SendAction):
                     messages.append(self._encode(output))
                 case _:

@@ -32,6 +32,8 @@ LARGEST = 4_000_000
 """bytes; rows of five accelerometers have some hundred thousand."""
 SAVE_S = 300.0
 """Between two writes to the disk; SD cards wear."""
+BOARDS_KEPT = 64
+"""Boards whose charts are kept, as many as there are sums of; the oldest give way."""
 BACK_S = 1.0
 """Trusted time that went back by more: the estimates have begun anew."""
 
@@ -140,14 +142,23 @@ class History:
     """Takes every snapshot, keeps what is new in it.
 
     Args:
-        directory: where its file lies, one for each vehicle.
+        directory: where its file lies, one for each board.
         clock: monotonic time, s.
+        board: the unique id of the board that is there in hex, empty if it tells none, None while
+            it may still tell it.
     """
 
-    def __init__(self, directory: Path, *, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        clock: Callable[[], float],
+        board: Callable[[], str | None] = lambda: "",
+    ) -> None:
         self._directory = directory
         self._clock = clock
-        self._system_id: int | None = None
+        self._board = board
+        self._path: Path | None = None
         self._kept = Kept()
         self._resumed: set[int] = set()
         self._flying = False
@@ -158,11 +169,14 @@ class History:
 
     def take(self, snapshot: Snapshot) -> None:
         """A tick has passed."""
-        system_id = snapshot.link.system_id
-        if system_id is not None and system_id != self._system_id:
+        system_id, board = snapshot.link.system_id, self._board()
+        if system_id is None or board is None:
+            return  # whose they are is not known yet
+        path = self._directory / f"history-{f'board-{board}' if board else system_id}.bin"
+        if path != self._path:
             self.save()
-            self._system_id = system_id
-            self._kept = self._load(system_id)
+            self._path = path
+            self._kept = _load(path)
             self._resumed = set(self._kept.imus)
         self._forget(snapshot.counters.get("resets", 0))
         flew, self._flying = self._flying, is_flying(snapshot)
@@ -193,12 +207,14 @@ class History:
     def save(self) -> None:
         """Put it on the disk, if there is anything new; failing that, go on without."""
         self._next_save = self._clock() + SAVE_S
-        if not self._dirty or self._system_id is None:
+        if not self._dirty or self._path is None:
             return
         self._dirty = False
-        path = self._path(self._system_id)
+        path = self._path
         temporary = path.with_suffix(".new")
         try:
+            if not path.exists():
+                self._make_room()
             temporary.write_bytes(msgspec.msgpack.encode(self._kept))
             temporary.replace(path)
         except OSError as error:
@@ -224,18 +240,21 @@ class History:
 
         application.router.add_get("/api/history", history)
 
-    def _load(self, system_id: int) -> Kept:
-        path = self._path(system_id)
-        try:
-            if path.stat().st_size > LARGEST:
-                return Kept()
-            kept = msgspec.msgpack.decode(path.read_bytes(), type=Kept)
-        except (OSError, msgspec.DecodeError, ValueError, RecursionError):
-            return Kept()
-        return kept if kept.schema == SCHEMA else Kept()
+    def _make_room(self) -> None:
+        """One more board: a board is easily made up, and the disk is the journal's too."""
+        files = sorted(self._directory.glob("history-*.bin"), key=lambda p: p.stat().st_mtime)
+        for path in files[: max(0, len(files) + 1 - BOARDS_KEPT)]:
+            path.unlink(missing_ok=True)
 
-    def _path(self, system_id: int) -> Path:
-        return self._directory / f"history-{system_id}.bin"
+
+def _load(path: Path) -> Kept:
+    try:
+        if path.stat().st_size > LARGEST:
+            return Kept()
+        kept = msgspec.msgpack.decode(path.read_bytes(), type=Kept)
+    except (OSError, msgspec.DecodeError, ValueError, RecursionError):
+        return Kept()
+    return kept if kept.schema == SCHEMA else Kept()
 
 
 def is_flying(snapshot: Snapshot) -> bool:

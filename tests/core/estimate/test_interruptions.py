@@ -222,6 +222,16 @@ def identified(flight):
     return [ParameterValue("INS_ACC_ID", 2753028.0), *flight]
 
 
+def test_one_stray_stamp_from_long_ago_begins_no_boot(flight, plain):
+    """A packet that was very long on its way; in a log, damage."""
+    strays = [k for k, s in enumerate(flight) if isinstance(s, ImuSample)][2000:6000:1500]
+    odd = [replace(s, t=s.t - 20.0) if k in strays else s for k, s in enumerate(flight)]
+    got, events = fed(odd)
+    assert [e for e in events if isinstance(e, Restarted)] == []
+    assert got.calibration(1).rejected["imu_late"] == len(strays)
+    assert np.all(np.abs(six(got)[0] - six(plain)[0]) < 0.2 * six(plain)[1])
+
+
 @pytest.mark.slow
 def test_saved_sums_are_taken_in_by_the_flight_that_agrees_with_them(identified):
     first = fed(identified)[0]
@@ -243,6 +253,16 @@ def test_saved_sums_are_taken_in_by_the_flight_that_agrees_with_them(identified)
     assert twice.trusted_s == pytest.approx(2.0 * first.calibration(1).trusted_s, rel=0.01)
     # The same flight counted twice: variances halve, down to the floor of the model.
     assert np.all(six(second)[1] < six(first)[1])
+
+
+def test_an_identifier_of_none_forgets_nothing_and_hides_no_exchange(identified, plain):
+    half = len(identified) // 2
+    none = ParameterValue("INS_ACC_ID", 0.0)
+    back = fed([*identified[:half], none, identified[0], *identified[half:]])[0]
+    assert np.array_equal(six(back)[0], six(plain)[0])
+    other = ParameterValue("INS_ACC_ID", 99.0)
+    swapped = fed([*identified[:half], none, other, *identified[half:]])[0]
+    assert swapped.calibration(1).trusted_s < 0.7 * plain.calibration(1).trusted_s
 
 
 def test_sums_of_another_sensor_are_refused(identified, plain):

@@ -1,6 +1,7 @@
 """The trust window: one test per reason, its recovery, and invariants under anything at all."""
 
 import math
+import random
 from dataclasses import replace
 
 import pytest
@@ -212,6 +213,16 @@ def test_late_fixes_are_refused_and_counted():
     assert window.rejected == {"stale": 1}
     assert fly(window, 4.2, 6.0) == []
     assert window.is_open
+
+
+def test_a_link_that_repeats_and_reorders_does_not_touch_trust():
+    """Every message twice, each delayed by itself by up to 0.8 s: the receiver is as it was."""
+    rng = random.Random(7)
+    sent = [(k * 0.1, fix(k // 2 * STEP)) for k in range(1200) for _ in range(2)]
+    arriving = sorted(sent, key=lambda at: at[0] + rng.uniform(0.0, 0.8))
+    window = TrustWindow()
+    events = [event for _, sample in arriving for event in window.feed(sample)]
+    assert [type(event) for event in events] == [WindowOpened]
 
 
 def test_one_stamp_from_the_future_does_not_end_trust_for_good():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.inputs.limits import STUCK_S
+from onboard.core.inputs.limits import SAME_M_S2, STUCK_S
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, VehicleState
 from onboard.core.inputs.stuck import stuck
 from onboard.mavlink.decode import Decoder
@@ -22,17 +22,62 @@ def test_readings_that_stay_for_a_second_are_stuck_and_no_others():
     dead, short = (t >= 3.0) & (t <= 3.0 + STUCK_S), (t >= 6.0) & (t < 6.0 + 0.9 * STUCK_S)
     for span in (dead, short):
         f[span] = f[span][0]
-    np.testing.assert_array_equal(stuck(t, f), dead)
+    np.testing.assert_array_equal(stuck(t, f, SAME_M_S2), dead)
+
+
+def low_passed(x, cutoff_hz, rate_hz):
+    """ArduPilot's two-pole low-pass (direct form II), reckoned in float32 as on its boards."""
+    one = np.float32(1.0)
+    fr = np.float32(rate_hz / cutoff_hz)
+    ohm = np.float32(np.tan(np.pi / fr))
+    c = one + np.float32(2.0 * np.cos(np.pi / 4.0)) * ohm + ohm * ohm
+    b0 = ohm * ohm / c
+    a1 = np.float32(2.0) * (ohm * ohm - one) / c
+    a2 = (one - np.float32(2.0 * np.cos(np.pi / 4.0)) * ohm + ohm * ohm) / c
+    d1 = d2 = np.float32(0.0)
+    out = np.empty(len(x), dtype=np.float32)
+    for k, value in enumerate(x.astype(np.float32)):
+        d0 = value - d1 * a1 - d2 * a2
+        out[k] = d0 * b0 + d1 * (b0 + b0) + d2 * b0
+        d1, d2 = d0, d1
+    return out.astype(np.float64)
+
+
+@pytest.mark.parametrize("rate", [1000.0, 2000.0, 4000.0])
+@pytest.mark.parametrize("value", [0.5, 2.4999, -9.80665, 156.9])
+def test_a_filter_that_goes_on_by_its_roundings_does_not_hide_it(rate, value):
+    """The filter behind a dead sensor does not come to rest: HIGHRES_IMU tells float32."""
+    filtered = low_passed(np.full(int(3 * rate), value), 20.0, rate)
+    every = int(rate / 50.0)
+    at_rest = filtered[int(rate) :: every]
+    t = np.arange(len(at_rest)) / 50.0
+    rng = np.random.default_rng(3)
+    f = np.column_stack([np.roll(at_rest, int(k)) for k in rng.integers(0, 5, 3)])
+    assert np.all(stuck(t, f, SAME_M_S2))
+
+
+def test_what_creeps_is_not_the_same():
+    t = np.arange(0.0, 10.0, 0.02)
+    creeping = np.column_stack([0.5 * SAME_M_S2 * np.arange(len(t))] * 3)
+    assert not np.any(stuck(t, creeping, SAME_M_S2))
+
+
+def test_the_quietest_sensor_is_not_the_same():
+    """25 micro-g a root of a hertz behind 20 Hz, at rest: an hour of it."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 3600.0, 0.02)
+    f = 25e-6 * 9.80665 * np.sqrt(20.0) * rng.standard_normal((len(t), 3))
+    assert not np.any(stuck(t, f, SAME_M_S2))
 
 
 def test_one_axis_that_stays_is_no_dead_accelerometer():
     t = np.arange(0.0, 10.0, 0.02)
     f = np.column_stack([np.zeros_like(t), np.zeros_like(t), -9.8 + 0.1 * np.sin(3.0 * t)])
-    assert not np.any(stuck(t, f))
+    assert not np.any(stuck(t, f, SAME_M_S2))
 
 
 def test_no_samples_are_not_stuck():
-    assert stuck(np.zeros(0), np.zeros((0, 3))).shape == (0,)
+    assert stuck(np.zeros(0), np.zeros((0, 3)), SAME_M_S2).shape == (0,)
 
 
 @pytest.mark.parametrize("rate", [10.0, 25.0, 50.0])
@@ -41,7 +86,7 @@ def test_coarse_readings_of_a_quiet_flight_are_not_stuck(rate):
     rng = np.random.default_rng(5)
     t = np.arange(0.0, 3600.0, 1.0 / rate)
     f = 9.80665e-3 * np.round(rng.standard_normal((len(t), 3)))
-    assert not np.any(stuck(t, f))
+    assert not np.any(stuck(t, f, SAME_M_S2))
 
 
 @pytest.fixture(scope="module")
