@@ -155,7 +155,7 @@ class Recorded:
     def _asked(self, imu: int) -> Answer:
         try:
             found = examine(self.calibrator, imu)
-            given = judged(found.diagnosis())
+            given = judged(found.diagnosis(), self.parameters)
             if self._one_of_several:
                 self._asked_of[imu] = asked_of(found.choice)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
