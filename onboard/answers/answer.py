@@ -32,7 +32,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.determined import determine
 from onboard.core.estimate.merged_flights import Apart
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
-from onboard.core.physics.catalogue import bearing_of, phrase_of
+from onboard.core.physics.catalogue import bearing_of, is_excluded, phrase_of, treated_of
 from onboard.core.physics.effect import Bearing
 from onboard.push.diagnosed import Diagnosed
 
@@ -119,6 +119,7 @@ def judged(diagnosis: Diagnosis, parameters: Mapping[str, float] | None = None) 
     suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
     if not diagnosis.mismatch.supported:
         return Answer(_refused(diagnosis))
+    diagnosis = _with_what_was_seen(diagnosis)
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(phrase_of(e) for e in suspects)
         missing = "the residual is not noise, and " + (
@@ -201,6 +202,18 @@ def _refused(diagnosis: Diagnosis) -> Diagnosis:
         return diagnosis
     c = replace(c, status=Status.INSUFFICIENT, note=diagnosis.note or c.note)
     return replace(diagnosis, calibration=c)
+
+
+def _with_what_was_seen(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis that notes what is false in the data, and forbids nothing: to be seen to."""
+    seen = [
+        f"{phrase_of(e)}; {treated_of(e.name)}"
+        for e in diagnosis.effects
+        if is_excluded(e.name) and bearing_of(e.name) is Bearing.HARMLESS
+    ]
+    if not seen:
+        return diagnosis
+    return _noted(diagnosis, f"{'; '.join(seen)}; see onboard explain")
 
 
 def _uncalibrated(diagnosis: Diagnosis) -> Diagnosis:
