@@ -36,7 +36,7 @@ class Said(msgspec.Struct, frozen=True):
     vector: list[float]
     floored: list[float]
     floored_vector: list[float]
-    alike: list[float] = [0.0] * 6
+    alike: list[float] = msgspec.field(default_factory=lambda: [0.0] * 6)
 
     @classmethod
     def of(cls, six: FlightSix) -> Said:
