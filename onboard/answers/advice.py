@@ -11,24 +11,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from onboard.answers import cures
 from onboard.answers.answer import Answer
 from onboard.answers.conditions import conditions
-from onboard.core.diagnosis.limits import CLEARLY
-from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.result import Calibration, Status
-from onboard.core.inputs.parameters import receiver_names
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
-from onboard.core.physics.catalogue import bearing_of
-from onboard.core.physics.effect import Bearing
 from onboard.core.physics.finding import Finding
 from onboard.errors import PushError
 from onboard.push.plan import PushPlan, propose
 from onboard.push.policy import Accelerometer, Objection, PolicySettings, Refusal, objections
-
-FORMER_NAMES = {
-    now: former for receiver in (1, 2) for now, former in receiver_names(receiver).values()
-}
-"""Of parameters before ArduPilot 4.6."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +110,9 @@ def advise(
         against = {
             e.name: why
             for e in a.diagnosis.effects
-            if e.parameters and (why := _against(e, a.diagnosis, parameters, settings))
+            if e.parameters and (why := cures.against(e, a.diagnosis, parameters, settings.sure))
         }
-        names = {new: old for new, old in FORMER_NAMES.items() if _former(new, parameters)}
+        names = cures.former_names(parameters)
         out.append(Advice(plan, refusals, conditions(a.diagnosis, parameters), against, names))
     return tuple(out)
 
@@ -152,37 +143,3 @@ def _objections(
         others=others,
         missing=given.missing,
     )
-
-
-def _against(
-    effect: Finding, diagnosis: Diagnosis, parameters: Mapping[str, float], settings: PolicySettings
-) -> str:
-    """Why the parameters of a found effect should not be set; empty if they may be.
-
-    The standard is that of the six: what is not the whole truth, could as well be something else,
-    is read off from an accelerometer that is not known, or helps next to nothing, is not set.
-    """
-    if contradicted := [c.words for c in diagnosis.inconstant if c.effect == effect.name]:
-        return contradicted[0]
-    if diagnosis.verdict is not Verdict.EXPLAINED:
-        return "what was found does not explain all of the residual"
-    confounders = {r.name for r in effect.confounders if r.delta_bic < CLEARLY}
-    confounders |= {n for a in diagnosis.ambiguous if effect.name in a.names for n in a.names}
-    if confounders := confounders - {effect.name}:
-        return f"not told apart from {', '.join(sorted(confounders))}"
-    beside = bearing_of(effect.name) is Bearing.BESIDE
-    if beside and diagnosis.calibration.status is not Status.CALIBRATED:
-        return "it is read off from the accelerometer, which this flight does not calibrate"
-    before, after = effect.held_out_before, effect.held_out_after
-    odds = -2.0 * math.log(1.0 - settings.sure)
-    if not (after < before and effect.delta_bic <= -odds):
-        return f"the held-out residual falls from {before:.3g} to {after:.3g} only"
-    unknown = [n for n in effect.parameters if n not in parameters and not _former(n, parameters)]
-    if unknown:
-        return f"{', '.join(unknown)} in force is not in the recording"
-    return ""
-
-
-def _former(name: str, parameters: Mapping[str, float]) -> bool:
-    """Whether this autopilot has the parameter by its former name."""
-    return name not in parameters and FORMER_NAMES.get(name) in parameters

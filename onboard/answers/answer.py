@@ -19,21 +19,21 @@ and a wrong heading are in every model: they are worth knowing and forbid nothin
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from onboard.answers.cures import cured
 from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.determined import determine
 from onboard.core.estimate.merged_flights import Apart
 from onboard.core.estimate.result import SIX_NAMES, Calibration, Status
-from onboard.core.physics.catalogue import bearing_of, phrase_of
+from onboard.core.physics.catalogue import bearing_of, is_excluded, phrase_of, treated_of
 from onboard.core.physics.effect import Bearing
-from onboard.core.physics.finding import Finding
 from onboard.push.diagnosed import Diagnosed
 
 FORCES = tuple(f"{axis} force at the mean load" for axis in "xyz")
@@ -105,18 +105,21 @@ def answer(
         KeyError: that accelerometer has not been seen, or no flight of it was processed.
         ArithmeticError, LookupError, ValueError: numbers that no model fits.
     """
-    return judged(diagnose(calibrator, imu, latest=latest, since=since))
+    found = diagnose(calibrator, imu, latest=latest, since=since)
+    return judged(found, calibrator.parameters.values)
 
 
-def judged(diagnosis: Diagnosis) -> Answer:
+def judged(diagnosis: Diagnosis, parameters: Mapping[str, float] | None = None) -> Answer:
     """What a diagnosis means for its calibration: all the rules of status are here.
 
     Args:
         diagnosis: with the calibration as its engine gave it.
+        parameters: the autopilot's, as the recording has them; None: nobody has asked.
     """
     suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
     if not diagnosis.mismatch.supported:
         return Answer(_refused(diagnosis))
+    diagnosis = _with_what_was_seen(diagnosis)
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(phrase_of(e) for e in suspects)
         missing = "the residual is not noise, and " + (
@@ -126,18 +129,21 @@ def judged(diagnosis: Diagnosis) -> Answer:
         )
         if changing := [c.words for c in diagnosis.inconstant if c.contradicts]:
             missing = "; ".join(changing)
-        return Answer(_withdrawn(diagnosis, missing), missing)
+        return _withdrawn(diagnosis, missing)
     bearings = {bearing_of(e.name) for e in suspects}
     if Bearing.NO_ONE_NUMBER in bearings:
-        missing = _cured(suspects)
-        return Answer(_withdrawn(diagnosis, missing), missing)
+        diagnosis = _uncalibrated(diagnosis)
+        return _withdrawn(diagnosis, cured(suspects, diagnosis, parameters))
     moved = moved_most(diagnosis) if suspects else None
     if moved is None:
         return Answer(diagnosis)
     name, by, sigmas = moved
-    missing = f"{_cured(suspects)} (it moves the {name} by {by:+.2g}, {sigmas:.1f} sigma)"
-    if bearings != {Bearing.BESIDE}:
-        return Answer(_withdrawn(diagnosis, missing), missing)
+    alone = bearings == {Bearing.BESIDE}
+    diagnosis = diagnosis if alone else _uncalibrated(diagnosis)
+    what = cured(suspects, diagnosis, parameters)
+    missing = f"{what} (it moves the {name} by {by:+.2g}, {sigmas:.1f} sigma)"
+    if not alone:
+        return _withdrawn(diagnosis, missing)
     noted = _noted(diagnosis, f"taken into account beside the six: {missing}")
     return Answer(noted, missing, diagnosis.calibration.status is Status.CALIBRATED)
 
@@ -198,28 +204,32 @@ def _refused(diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, calibration=c)
 
 
-def _withdrawn(diagnosis: Diagnosis, why: str) -> Diagnosis:
-    """The diagnosis with a calibration that is not called one; ``why`` is noted with it."""
-    noted = _noted(diagnosis, f"{why}; see onboard explain")
-    if noted.calibration.status is not Status.CALIBRATED:
-        return noted
-    return replace(noted, calibration=replace(noted.calibration, status=Status.INSUFFICIENT))
+def _with_what_was_seen(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis that notes what is false in the data, and forbids nothing: to be seen to."""
+    seen = [
+        f"{phrase_of(e)}; {treated_of(e.name)}"
+        for e in diagnosis.effects
+        if is_excluded(e.name) and bearing_of(e.name) is Bearing.HARMLESS
+    ]
+    if not seen:
+        return diagnosis
+    return _noted(diagnosis, f"{'; '.join(seen)}; see onboard explain")
+
+
+def _uncalibrated(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with a calibration that is not called one."""
+    c = diagnosis.calibration
+    if c.status is not Status.CALIBRATED:
+        return diagnosis
+    return replace(diagnosis, calibration=replace(c, status=Status.INSUFFICIENT))
+
+
+def _withdrawn(diagnosis: Diagnosis, why: str) -> Answer:
+    """The answer whose calibration is not called one; ``why`` is noted with it."""
+    return Answer(_noted(_uncalibrated(diagnosis), f"{why}; see onboard explain"), why)
 
 
 def _noted(diagnosis: Diagnosis, said: str) -> Diagnosis:
     c = diagnosis.calibration
     note = f"{said}. {c.note}".rstrip()
     return replace(diagnosis, calibration=replace(c, note=note))
-
-
-def _cured(effects: Sequence[Finding]) -> str:
-    """What is missing and what to do about it."""
-    cures = [
-        f"set {', '.join(f'{n} {v:.4g}' for n, v in e.parameters.items())}"
-        if e.parameters
-        else e.cure
-        for e in effects
-    ]
-    todo = "; ".join(dict.fromkeys(c for c in cures if c))
-    found = ", ".join(phrase_of(e) for e in effects)
-    return f"{found}; first {todo}, then fly again" if todo else found

@@ -157,7 +157,7 @@ class Recorded:
         try:
             beside = next(iter(self._engines.values()), None)
             found = examine(self.calibrator, imu, beside=beside)
-            given = judged(found.diagnosis())
+            given = judged(found.diagnosis(), self.parameters)
             if self._one_of_several:
                 self._asked_of[imu] = asked_of(found.choice)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits

@@ -63,6 +63,9 @@ def headline(diagnosis: Diagnosis) -> str:
     named = [e for e in diagnosis.effects if is_named(e.name)]
     named.sort(key=lambda e: not danger_of(e))  # what is dangerous is not "one more effect"
     if not named:
+        changing = [c.words for c in diagnosis.inconstant if c.contradicts]
+        if changing:  # which is more than that nothing explains it
+            return capital(changing[0].split(" (")[0])
         return "Something is missing, and no known effect explains it"
     titles = [title_of(e.name) for e in named[:MOST_NAMED]]
     # A name that begins with capitals keeps them in the middle of a sentence.

@@ -77,6 +77,18 @@ def test_a_lever_arm_that_moves_a_number_past_its_claim_is_said_and_its_model_of
     assert "taken into account beside the six" in found.calibration.note
 
 
+@pytest.mark.parametrize("name", ["accelerometer_spikes", "gps_fault", "accelerometer_resolution"])
+def test_what_is_false_in_the_data_is_noted_and_forbids_nothing(name):
+    """Only a diagnosis shows its findings: a replay and the service have the calibration's note."""
+    found = judged(diagnosis(effect(name, size=9.8)))
+    assert found.missing == ""
+    assert found.calibration.status is Status.CALIBRATED
+    assert f"({name})" in found.calibration.note
+    beside = judged(diagnosis(effect(name, size=9.8), effect("bias_step", x=0.1)))
+    assert f"({name})" in beside.calibration.note
+    assert name not in beside.missing
+
+
 @pytest.mark.parametrize("sigmas", [-1.5, 0.0, 1.5])
 @pytest.mark.parametrize("found", [ARM, THROTTLE])
 def test_an_effect_within_the_claim_forbids_nothing(sigmas, found):

@@ -10,7 +10,7 @@ import pytest
 from onboard.answers.advice import advise
 from onboard.answers.answer import judged
 from onboard.answers.verdict import cures, missing, remarks
-from onboard.core.diagnosis.records import Ambiguity, Inconstant, Verdict
+from onboard.core.diagnosis.records import Ambiguity, Inconstant, Plain, Verdict
 from onboard.core.estimate.result import Status
 from onboard.core.physics.finding import Confounder, Quantity, ResponseCurve
 from onboard.report.parameters import parameter_text
@@ -46,6 +46,15 @@ TILT = effect(
     cure="level the autopilot again, or set AHRS_TRIM",
     held_out_before=2.0,
     held_out_after=1.0,
+    confounders=(),
+)
+
+
+ANTENNA = effect(
+    "gps_lever_arm",
+    unknowns={"x": Quantity(0.4, 0.01, "m")},
+    parameters={"GPS1_POS_X": 0.4},
+    cure="measure the antenna's place",
     confounders=(),
 )
 
@@ -161,6 +170,33 @@ def test_what_is_not_the_same_all_flight_long_is_not_set_and_the_rest_is():
     assert loaded(text)["GPS1_POS_X"] == pytest.approx(0.4)
     constant = written(replace(made, inconstant=()))
     assert loaded(constant)["GPS1_DELAY_MS"] == pytest.approx(210.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "parameters"),
+    [
+        ({"effects": (ANTENNA, STEP)}, IN_FORCE),
+        ({"effects": (ANTENNA, effect("throttle_coupling", parameters={}, cure=""))}, IN_FORCE),
+        ({"effects": (ANTENNA,), "calibration": calibration(status=Status.INSUFFICIENT)}, IN_FORCE),
+        ({"effects": (replace(ANTENNA, held_out_after=3.0),)}, IN_FORCE),
+        ({"effects": (ANTENNA,)}, {}),
+        ({"effects": (ANTENNA,)}, {"GPS_POS1_X": 0.0}),
+        ({"effects": (ANTENNA,)}, IN_FORCE),
+    ],
+    ids=["jump", "throttle", "uncalibrated", "no better", "not recorded", "older", "settable"],
+)
+def test_the_reason_against_the_six_asks_for_what_may_be_set_and_for_nothing_else(made, parameters):
+    c = calibration()
+    moved = Plain((c.scale[0] - 1.0, *c.scale[1:], *c.offset), c.scale_sigma + c.offset_sigma)
+    given = judged(diagnosis(plain=moved, **made), parameters)
+    (advice,) = advise((given,), parameters)
+    (name,) = [n for n in ("GPS_POS1_X", "GPS1_POS_X") if n in (parameters or IN_FORCE)]
+    asked = f"set {name} 0.4" in given.missing
+    assert given.missing
+    assert asked == (name in advice.to_set(given.diagnosis.effects))
+    told = " ".join(cures(given.diagnosis, advice))
+    assert asked != ("Do not set" in told)
+    assert "easure the antenna's place" in told
 
 
 def test_why_a_flight_whose_constants_change_calibrates_nothing_is_said_once():

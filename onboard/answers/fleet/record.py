@@ -36,11 +36,12 @@ class Said(msgspec.Struct, frozen=True):
     vector: list[float]
     floored: list[float]
     floored_vector: list[float]
+    alike: list[float] = msgspec.field(default_factory=lambda: [0.0] * 6)
 
     @classmethod
     def of(cls, six: FlightSix) -> Said:
         """The same as lists."""
-        parts = (six.information, six.vector, six.floored, six.floored_vector)
+        parts = (six.information, six.vector, six.floored, six.floored_vector, six.alike)
         return cls(*(np.ravel(x).tolist() for x in parts))
 
     @property
@@ -51,6 +52,7 @@ class Said(msgspec.Struct, frozen=True):
             np.array(self.vector),
             np.array(self.floored).reshape(6, 6),
             np.array(self.floored_vector),
+            np.array(self.alike),
         )
 
 

@@ -19,7 +19,7 @@ from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
-from onboard.core.inputs.expected_force import expected, spectrum, white
+from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
@@ -168,7 +168,10 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     """
     density = spectrum(batches)
     sampled = asked.examined(batches)
-    if density is None or np.all(white(density) <= LIMITS["force_walk"][0] ** 2):
+    if density is None:
+        return sampled
+    little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
+    if little and not drowned(batches, density):
         return sampled
     noise = np.minimum(white(density), sampled.noise.force_walk**2)
     felt = asked.examined(expected(batches, density, noise), sampled)

@@ -20,7 +20,7 @@ from math import log
 import numpy as np
 
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SEARCHED
-from onboard.core.diagnosis.score import needed, surprise, time_sigma
+from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.estimate.limits import (
     FEWEST_WINDOWS,
     MISPLACED_M,
@@ -95,7 +95,7 @@ class Companions:
             one, other = everyone[a], everyone[b]
             windows = shared_windows(one.batches, other.batches)
             if len(windows) >= FEWEST_WINDOWS:
-                self._pairs[a, b] = _pair(windows, one, other)
+                self._pairs[a, b] = _steady(windows, one, other)
 
     def jump(self, imu: int, origin: Origin) -> BiasStep | None:
         """The jump of one accelerometer that its differences show best, with what they say of it.
@@ -181,6 +181,26 @@ class Companions:
         early = np.sum(known * partial * mean, axis=-1) / np.sum(known * mean**2 + TINY, axis=-1)
         share = 2.0 / len(self.imus)
         return _Told(share * gained, mean, share * known, np.clip(early, 0.0, 1.0))
+
+
+def _steady(windows: SharedWindows, a: Companion, b: Companion) -> _Pair:
+    """The pair without windows that are odd by themselves.
+
+    A launch or a bump shakes two accelerometers otherwise, and streams of few samples do not show
+    it.  At the ends of a flight, where few windows are to one side, it looks like a jump.  So a
+    window that is odd by no chance is no part of the series, unless a jump explains more than it.
+    """
+    while True:
+        pair = _pair(windows, a, b)
+        gain, odd = (
+            np.sum([getattr(axis, name) for axis in pair.axes], axis=0) for name in ("gain", "odd")
+        )
+        most = float(np.max(gain[EDGE:], initial=0.0))
+        score = np.array([surprise(x, 3, len(odd)) for x in odd])
+        kept = (score < least()) | (odd <= most)
+        if kept.all() or kept.sum() < FEWEST_WINDOWS:
+            return pair
+        windows = windows.where(kept)
 
 
 def _pair(windows: SharedWindows, a: Companion, b: Companion) -> _Pair:

@@ -17,6 +17,7 @@ from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.effort import FURTHEST
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
@@ -37,7 +38,8 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.diagnosis.settling import families_of, settled
+from onboard.core.diagnosis.settling import families_of, only, settled
+from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.segments import Batch
@@ -86,6 +88,9 @@ def examine(
     rivals = compared(choice, full, calibrator, imu)
     families = families_of(choice)
     final, families = settled(full, choice, families, named_only=clear.clipped)
+    steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
+    if len(steady) < len(families):
+        final, families = only(full, steady, final)
     asked = not clear.clipped
     unused = (
         *unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked),

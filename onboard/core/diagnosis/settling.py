@@ -36,6 +36,13 @@ def settled(
     return final, families
 
 
+def only(
+    full: Examination, families: list[Effect], final: Examination
+) -> tuple[Examination, list[Effect]]:
+    """The model with no more than some of its families."""
+    return _again(full, families, final).with_rows(), families
+
+
 def _pruned(
     full: Examination, families: list[Effect], final: Examination
 ) -> tuple[Examination, list[Effect]]:
@@ -43,7 +50,7 @@ def _pruned(
     kept = _needed(final, families)
     if len(kept) == len(families):
         return final, families
-    return _again(full, kept, final).with_rows(), kept
+    return only(full, kept, final)
 
 
 def families_of(choice: Choice) -> list[Effect]:

@@ -42,7 +42,7 @@ from onboard.core.maths.accelerometer import (
     parameters_jacobian,
     parameters_of,
 )
-from onboard.core.maths.arrays import Array, vector3
+from onboard.core.maths.arrays import Array, Vector3, vector3
 
 
 def calibration_of(
@@ -135,6 +135,7 @@ def _record(
         prior_sigma=_six(engine.settings.needs.prior),
         gyro_sigma=_six(gyro),
         gyro_scale=_gyro_scale(engine, solution),
+        alike_sigma=_alike(engine),
         load_mean=load[0],
         load_square=load[1],
         predictive_gain=residuals.predictive_gain,
@@ -143,6 +144,12 @@ def _record(
         temperature=_temperature(engine),
     )
     return judged(made, engine, solution, parameters)
+
+
+def _alike(engine: Engine) -> Vector3:
+    """What the model's families take for beta in all flights of the sensor, sigmas."""
+    every = [f.alike for f in engine.model.families if f.alike is not None]
+    return vector3(np.linalg.norm(np.array(every).reshape(-1, 3), axis=0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,10 +171,7 @@ class Calibrator:
         )
 
     def _may_forget(self, block: Block) -> bool:
-        """Whether parameters or another receiver may change which samples of a source are taken.
-
-        With an accelerometer that is begun anew it is forgotten that HIGHRES_IMU came.
-        """
+        """Whether an accelerometer may be begun anew; that HIGHRES_IMU came goes with it."""
         receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
         known = {self._trust.receiver} - {None}
         names = {s.name for s in block.others if isinstance(s, ParameterValue)}
@@ -211,6 +208,7 @@ class Calibrator:
         ended = self._clock.restart()
         self._ground.forget()
         self._assembly.clear()
+        self.parameters.boot()
         return (*events, *self._trust.restart(ended), Restarted(ended, reason))
 
     def begin_anew(self, imu: int) -> None:
@@ -341,7 +339,7 @@ class Calibrator:
             self._assembly.streams.attitude(sample)
 
     def _judged(self, sample: Sample) -> tuple[Event, ...]:
-        """What the trust window says; outages are counted, for no fix is there to be refused."""
+        """What the trust window says; outages are counted: there is no fix to be refused."""
         return self._counted(self._trust.feed(sample))
 
     def _counted(self, events: tuple[WindowEvent, ...]) -> tuple[WindowEvent, ...]:
@@ -384,6 +382,9 @@ class Calibrator:
         landed = state.t if following.grounded else math.inf
         events = self._advance(everything=True, landed=landed) if ended or changed else ()
         self._ground = following
+        if self.parameters.waiting:  # and not for what was measured until now
+            self._assembly.streams.settle()
+        self.parameters.hear(armed=following.armed)
         if not ended:
             return events
         self._counts += self._engines.refine()

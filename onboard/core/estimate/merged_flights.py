@@ -5,7 +5,9 @@ what is left of it for the others is a Gaussian of the six numbers, the prior ta
 
     N_i = P_i^-1 - P_0^-1,    b_i = N_i x_i,    x = (sum N_i + P_0^-1)^-1 (sum b_i + P_0^-1 x_0).
 
-With equal noise that is the solution of all samples together.
+With equal noise that is the solution of all samples together.  What is the same error in all of
+them, of covariance C that no flight tells, is left out of each, and added once to what they say
+together: N (1 - C N)^-1 there, and back again.
 
 *Agreement.*  Flights differ in directions that both of them know: those of the eigenvectors of
 ``P_a + P_b``, in units of the prior, whose eigenvalue is at most twice :data:`PRIOR_SHARE` squared.
@@ -26,7 +28,7 @@ looked for; those before count, the last of them first, up to one that contradic
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate, combinations
 
 import numpy as np
@@ -43,6 +45,9 @@ from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 
+KNOWN_ALIKE = 1.0 - 1e-6
+"""Share of what is known of a number, at the most, that may be an error alike in all flights."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlightSix:
@@ -53,12 +58,14 @@ class FlightSix:
         vector: (6,) that times the values that the flight asks for.
         floored: (6, 6) the same with the floors in the sigmas: what is compared.
         floored_vector: (6,) what goes with it.
+        alike: (6,) variances in what it says that are the same error in all flights of the sensor.
     """
 
     information: Array
     vector: Array
     floored: Array
     floored_vector: Array
+    alike: Array = field(default_factory=lambda: np.zeros(6))
 
     def of_raw(self, applied: SixParameters) -> FlightSix:
         """The same of the raw sensor, if the samples were not raw but ``applied`` to it."""
@@ -68,7 +75,20 @@ class FlightSix:
             back.T @ self.vector,
             back.T @ self.floored @ back,
             back.T @ self.floored_vector,
+            self.alike,  # of beta, which is the raw sensor's
         )
+
+    def without(self, alike: Array) -> tuple[Array, Array]:
+        """Information (6, 6) and vector (6,) of what is known but for variances (6,) in it."""
+        if not alike.any():
+            return self.information, self.vector
+        # Rounding must not let a flight know it better than it is alike.
+        root = np.sqrt(alike)
+        most = float(np.linalg.eigvalsh(self.information * np.outer(root, root))[-1])
+        left = np.eye(6) - self.information * (alike * min(1.0, KNOWN_ALIKE / most))
+        information: Array = np.asarray(np.linalg.solve(left, self.information), np.float64)
+        vector: Array = np.asarray(np.linalg.solve(left, self.vector), np.float64)
+        return information, vector
 
 
 def raw_of(applied: SixParameters) -> Array:
@@ -159,6 +179,7 @@ def flight_six(c: Calibration, center: SixParameters | None = None) -> FlightSix
         bare.vector + bare.information @ bare.before,
         floored.information,
         floored.vector + floored.information @ floored.before,
+        np.square([0.0, 0.0, 0.0, *c.alike_sigma]),
     )
 
 
@@ -170,8 +191,16 @@ def merged(flights: Sequence[FlightSix], prior: Prior) -> Merged:
     """
     scatter = scatter_of([_in_units(f, prior) for f in flights])
     inflation = max(1.0, scatter.chi_square / scatter.dof) if scatter.dof else 1.0
-    information = np.sum([f.information for f in flights], axis=0) / inflation
-    vector = np.sum([f.vector for f in flights], axis=0) / inflation
+    alike = np.min([f.alike for f in flights], axis=0)
+    each = [f.without(alike) for f in flights]
+    information = np.sum([N for N, _ in each], axis=0) / inflation
+    vector = np.sum([b for _, b in each], axis=0) / inflation
+    if alike.any():
+        with_it = np.eye(6) + information * alike
+        information, vector = (
+            np.linalg.solve(with_it, information),
+            np.linalg.solve(with_it, vector),
+        )
     unit = prior.sigma
     inverse = np.linalg.inv(information * np.outer(unit, unit) + np.eye(6))
     change = inverse @ (unit * (vector - information @ prior.center))

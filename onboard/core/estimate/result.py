@@ -83,6 +83,8 @@ class Calibration:
     with it share that error.  Only a bench sees it, navigation does not
     (:attr:`with_its_gyroscope`).  ``gyro_scale`` is by what share of the rate each axis of the
     gyroscope reads too much, which nobody has a parameter for.
+    ``alike_sigma`` (m/s^2, of beta) is what of their sigmas is the same error in all flights of
+    the sensor, however many there are.
     ``load_mean`` and ``load_square`` are the means of the raw samples and of their squares, sensor
     axes: the loads that were flown, of which the six should give the force.
     """
@@ -112,6 +114,7 @@ class Calibration:
     prior_sigma: Six = (0.03, 0.03, 0.03, 0.5, 0.5, 0.5)
     gyro_sigma: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     gyro_scale: tuple[Estimate, ...] = (Estimate(0.0, math.inf),) * 3
+    alike_sigma: Vector3 = (0.0, 0.0, 0.0)
     load_mean: Vector3 = (0.0, 0.0, -9.80665)
     load_square: Vector3 = (1.0, 1.0, 97.0)
     predictive_gain: float = float("nan")

@@ -25,7 +25,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from onboard.core.inputs.joined import joined, runs, times, with_samples
-from onboard.core.inputs.limits import FLOOR_BINS, RESOLVED_S, SPECTRUM_BINS
+from onboard.core.inputs.limits import FLOOR_BINS, MOST, RESOLVED_S, SPECTRUM_BINS
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
@@ -49,6 +49,29 @@ def white(density: Array) -> Array:
     """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
     out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
     return out
+
+
+def drowned(batches: Sequence[Batch], density: Array) -> bool:
+    """Whether most of an axis' force at the frequencies that the fixes follow may be noise.
+
+    A latency, an average and an antenna are told by what of the force lies there, and a hover has
+    next to nothing there: noise too small to be seen in the velocity is then what tells them.
+
+    Args:
+        batches: the flight.
+        density: (bins, 3) of its samples.
+    """
+    steps, fixes = (
+        float(np.median(np.concatenate([np.diff(t) for t in times_] or [np.ones(1)])))
+        for times_ in ([times(run) for run in runs(batches)], [b.fixes.t for b in batches])
+    )
+    if not (steps > 0.0 and fixes > 0.0):
+        return False
+    f = np.linspace(0.0, 0.5 / steps, len(density))
+    followed = (f > 0.0) & (f <= 0.5 / fixes)
+    there = _averaged(density, SPECTRUM_BINS)[followed]
+    share = white(density) / np.where(there > 0.0, there, np.inf)
+    return bool(len(share) and np.any(share.mean(axis=0) > MOST))
 
 
 def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Batch]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
 
 import numpy as np
 
@@ -25,6 +28,23 @@ def receiver_names(receiver: int) -> dict[str, tuple[str, str]]:
     return place | {n: (f"GPS{k}_{n}", f"GPS_{n}{former}") for n in ("TYPE", "DELAY_MS")}
 
 
+class Until(Enum):
+    """What has to happen before ArduPilot applies a parameter that was changed."""
+
+    DISARMED = "disarmed"
+    BOOT = "boot"
+
+
+HELD: Final = {
+    "AHRS_ORIENTATION": Until.DISARMED,  # AP_AHRS::update_orientation
+    "EK3_PRIMARY": Until.DISARMED,  # NavEKF3::UpdateFilter: armed, errors choose the lane
+    "EK3_IMU_MASK": Until.BOOT,  # NavEKF3::InitialiseFilter
+    **{name: Until.BOOT for k in (1, 2) for name in receiver_names(k)["TYPE"]},  # AP_GPS: driver
+}
+"""Of what is asked here; all else (the six, filters, trims, places, delays) it reads anew every
+time, also where its documentation asks for a reboot."""
+
+
 def filter_delay(cutoff_hz: float) -> float:
     """Delay (s) of ArduPilot's two-pole Butterworth low-pass well below its cut-off.
 
@@ -36,18 +56,52 @@ def filter_delay(cutoff_hz: float) -> float:
 
 @dataclass(slots=True)
 class ParametersInForce:
-    """What was last reported for each parameter, and what follows from it."""
+    """What the autopilot applies of its parameters, as it was reported, and what follows from it.
+
+    A value is what was last reported, but for the few that wait for something (:data:`HELD`).  What
+    was in force before the first report of a boot nobody knows: that one is taken as it is.
+    """
 
     values: dict[str, float] = field(default_factory=dict)
     receiver: int = 1
     """The one that is watched."""
+    armed: bool | None = None
+    """As the autopilot says; None if it has not."""
+    waiting: dict[str, float] = field(default_factory=dict)
+    """What was reported and is not applied yet."""
+    _known: set[str] = field(default_factory=set)
+    """Of :data:`HELD`, what was reported since the boot."""
     _sixes: dict[int, SixParameters] = field(default_factory=dict)
     """By accelerometer, until another report: every inertial sample asks."""
 
     def set(self, name: str, value: float) -> None:
         """Take a report."""
+        held = HELD.get(name)
+        if held is not None:
+            self.waiting.pop(name, None)
+            stays = name in self._known and (self.armed or held is Until.BOOT)
+            if stays and value != self.values[name]:
+                self.waiting[name] = value
+                return
+            self._known.add(name)
         self.values[name] = value
         self._sixes.clear()
+
+    def hear(self, *, armed: bool | None) -> None:
+        """Take what the autopilot says of itself: disarmed, it applies what waits for that."""
+        self.armed = armed
+        if not armed:
+            self._apply([n for n in self.waiting if HELD[n] is Until.DISARMED])
+
+    def boot(self) -> None:
+        """The autopilot has begun anew: it has read all of them, disarmed or not."""
+        self.armed = None
+        self._apply(list(self.waiting))
+        self._known.clear()
+
+    def _apply(self, names: Sequence[str]) -> None:
+        for name in names:
+            self.values[name] = self.waiting.pop(name)
 
     def get(self, *names: str, default: float) -> float:
         """First of ``names`` that is known."""

@@ -40,12 +40,15 @@ class Steps:
         size: (n,) of that step.
         before: (n,) what the sample before it has of it.
         variance: (n,) of the size; infinite where the series tells nothing of it.
+        odd: (n,) twice the rise by that sample alone being anything, without a step; of the last
+            one nobody asks.
     """
 
     gain: Array
     size: Array
     before: Array
     variance: Array
+    odd: Array
 
 
 def steps_in(y: Array, H: Array, information: Array, floor: float = 0.0) -> Steps:
@@ -106,6 +109,7 @@ def _steps_in(y: Array, H: Array, information: Array, floor: float) -> Steps:
     without = np.maximum(chi2[:, None] - nudged * beside, TINY)
     with_it = np.maximum(without - known * size**2, TINY)
     scale = np.log(grid.sigma) - 0.5 * np.linalg.slogdet(A)[1]
+    plain = scale[:, None] - 0.5 * freedom * np.log(np.maximum(chi2, TINY))[:, None]
     before = scale[:, None] - 0.5 * freedom * np.log(without)
     after = scale[:, None] - 0.5 * freedom * np.log(with_it)
     weight = np.exp(after - np.max(after, axis=0))
@@ -113,12 +117,14 @@ def _steps_in(y: Array, H: Array, information: Array, floor: float) -> Steps:
     told = np.all(tells, axis=0)
     mean = np.sum(weight * size, axis=0)
     partial = np.sum(weight * (nudged - both * size) / pulse, axis=0)
+    odd = np.append(2.0 * (_log_sum(before) - _log_sum(plain))[1:], 0.0)
     each = with_it / freedom / known + (size - mean) ** 2
     return Steps(
         np.where(told, 2.0 * (_log_sum(after) - _log_sum(before)), 0.0),
         mean,
         partial,
         np.where(told, np.sum(weight * each, axis=0), np.inf),
+        odd,
     )
 
 

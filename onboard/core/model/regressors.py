@@ -80,6 +80,14 @@ class Family:
         """Names of unknowns that cannot be negative, by a law of nature."""
         return ()
 
+    @property
+    def alike(self) -> Array | None:
+        """(3,) sigma, m/s^2, sensor axes, of what it takes for beta in all flights of the sensor.
+
+        No flight tells it, and it is the same in each: None, if there is nothing of it.
+        """
+        return None
+
     def available(self, nodes: Signals) -> bool:  # noqa: ARG002 - subclasses look at the signals
         """True if the recording has the signals that the regressors need."""
         return True

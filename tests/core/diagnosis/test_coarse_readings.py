@@ -97,6 +97,9 @@ def test_a_flight_is_told_and_its_numbers_hold(vehicle, cut):
     effect = AccelerometerResolution(step=0.1, cut=cut)
     samples = simulated(vehicle, 200.0, seed=11, imu=IMU, effects=[effect])[0]
     found = answer(fed(samples), 1)
+    # Cut downward by half a step or not at all, in this flight and in all others of the sensor.
+    alike = 0.05 / np.sqrt(3.0)
+    assert found.calibration.alike_sigma == pytest.approx([alike] * 3, rel=0.05)
     (told,) = [e for e in found.diagnosis.effects if e.name != "gps_latency"]
     assert told.name == "accelerometer_resolution"
     assert [q.value for q in told.unknowns.values()] == pytest.approx([0.1] * 3, rel=0.03)

@@ -17,8 +17,11 @@ AT = 46.3
 T0 = 100.0
 
 
-def vehicle(jumps, *, count=3, noise=0.05, seed=1):
-    """Accelerometers on one trajectory, each with its own offset; ``jumps`` by number."""
+def vehicle(jumps, *, count=3, noise=0.05, seed=1, shaken=()):
+    """Accelerometers on one trajectory, each with its own offset; ``jumps`` by number.
+
+    The first one is off while it is ``shaken``: from when to when (s), and by how much.
+    """
     rng = np.random.default_rng(seed)
     shared = flown(rng, SECONDS, rate=RATE)
     since = np.arange(len(shared)) / RATE
@@ -27,6 +30,8 @@ def vehicle(jumps, *, count=3, noise=0.05, seed=1):
         raw = shared + noise * rng.normal(size=shared.shape) + 0.1 * rng.normal(size=3)
         at, size = jumps.get(imu, (AT, np.zeros(3)))
         raw[since >= at] += size
+        for start, end, by in shaken if imu == 1 else ():
+            raw[(since >= start) & (since < end)] += by
         made[imu] = Companion(batches(raw, rate=RATE, t0=T0), IN_FORCE, PRIOR)
     return Companions(made)
 
@@ -98,6 +103,24 @@ def test_quiet_flights_show_no_jump():
     """One in ten is looked into; none is blamed on anyone clearly and large."""
     looked = [vehicle({}, seed=s).jump(1, Origin(T0)) for s in range(12)]
     assert sum(j is not None for j in looked) <= 4  # of 12 at one in ten, exceeded once in 200
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize("at", [(0.0, 1.0), (1.0, 2.0), (60.0, 61.0)])
+def test_what_shakes_a_vehicle_for_a_second_is_no_jump(at, seed):
+    """At the begin of a flight, too, where few windows are before it."""
+    launch = (*at, np.array([0.0, 0.08, 0.1]))
+    for imu in (1, 2):
+        jump = vehicle({}, count=2, seed=seed, shaken=[launch]).jump(imu, Origin(T0))
+        assert jump is None or jump.witness.gain < 25.0  # as in a quiet flight, by chance
+
+
+@pytest.mark.parametrize("size", [SIZE, 0.3 * SIZE, 0.15 * SIZE])
+def test_a_jump_shows_beside_what_shakes_the_vehicle(size):
+    launch, bump = (0.0, 1.0, np.array([0.0, 0.08, 0.1])), (70.0, 71.0, np.array([0.3, 0.0, 0.4]))
+    jump = vehicle({2: (AT, size)}, shaken=[launch, bump]).jump(2, Origin(T0))
+    assert jump.moment == pytest.approx(T0 + AT, abs=2.0)
+    assert np.all(np.abs(jump.witness.size - size) < 4.0 * jump.witness.sigma)
 
 
 def test_two_streams_of_one_sensor_tell_nothing_and_break_nothing():

@@ -7,9 +7,13 @@ import pytest
 
 from onboard.core.diagnosis.cleared import cleared
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.inputs.expected_force import expected
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 from onboard.core.maths.frames import rotation_from_euler
 from onboard.core.physics.effect import Origin
+from onboard.mavlink.decode import Decoder
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec, fly_messages
 from tests.core.estimate.test_simulated_flights import fed, flown
 
 STEP, LATE = 0.02, 0.12
@@ -73,3 +77,23 @@ def test_of_what_is_really_shaken_no_more_is_noise_than_the_velocity_walks_by(fl
     taken = changed(shaken(flight, noise=noise, real=real))
     assert np.all(taken[:2] > 0.5 * noise[:2])
     assert taken[2] < 0.15 * real[2]
+
+
+@pytest.mark.slow
+def test_noise_that_no_velocity_shows_is_asked_about_in_a_hover(flight, monkeypatch):
+    """There it is most of what tells a latency, an average and an antenna: one was 5 sigma off."""
+    asked, little = [], np.full(3, 0.05)
+
+    def expecting(*given):
+        asked.append(given)
+        return expected(*given)
+
+    monkeypatch.setattr("onboard.core.diagnosis.cleared.expected", expecting)
+    spec = FlightSpec(vehicle="copter", seed=6, duration=200.0, imus=random_imus(6), dull=True)
+    decoder = Decoder()
+    hover = [s for _, message in fly_messages(spec) for s in decoder.decode(message)]
+    changed(shaken(hover, noise=little))
+    assert len(asked) == 1
+    # Of brisk flight that noise is nothing: another examination would cost, and say the same.
+    changed(shaken(flight, noise=little))
+    assert len(asked) == 1

@@ -51,6 +51,40 @@ def test_it_is_the_solution_of_all_rows_together():
     np.testing.assert_allclose(got.covariance, np.linalg.inv(A), rtol=1e-6)
 
 
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_an_error_that_is_alike_in_all_flights_does_not_become_less_with_their_number(count):
+    """Against the joint solution: six, and an offset of each axis that all flights have."""
+    rng = np.random.default_rng(3)
+    truth, sigma = drawn(rng), np.array([0.0, 0.0, 0.0, 0.03, 0.05, 0.0])
+    alone = [flight(rng, truth, GOOD, mixed=False, off=sigma) for _ in range(count)]
+    said = []
+    for f in alone:
+        P = np.linalg.inv(f.information) + np.diag(sigma**2)
+        N, b = np.linalg.inv(P), np.linalg.solve(P, np.linalg.solve(f.information, f.vector))
+        said.append(FlightSix(N, b, N, b, sigma**2))
+    got = merged(said, PRIOR)
+    # Rows of every flight are of the six and of the error, which has a prior of its own.
+    both = np.hstack([np.eye(6), np.eye(6)])
+    N = sum(both.T @ f.information @ both for f in alone) / got.inflation
+    b = sum(both.T @ f.vector for f in alone) / got.inflation
+    prior = np.concatenate([SIGMA**-2.0, np.where(sigma > 0.0, sigma, 1e-9) ** -2.0])
+    A = N + np.diag(prior)
+    x = np.linalg.solve(A, b + prior * np.concatenate([PRIOR.center, np.zeros(6)]))
+    np.testing.assert_allclose(got.covariance, np.linalg.inv(A)[:6, :6], rtol=1e-4, atol=1e-10)
+    np.testing.assert_allclose(got.estimate, x[:6], atol=1e-6)
+    shrunk = 1.0 / (sigma[3:5] ** -2.0 + SIGMA[3:5] ** -2.0)  # the prior tells as little as ever
+    assert np.all(np.diag(got.covariance)[3:5] > shrunk)
+
+
+def test_a_flight_without_that_error_tells_it():
+    rng = np.random.default_rng(4)
+    truth, sigma = drawn(rng), np.array([0.0, 0.0, 0.0, 0.05, 0.05, 0.05])
+    fine = flight(rng, truth, GOOD, mixed=False)
+    coarse = replace(flight(rng, truth, GOOD + sigma, mixed=False, off=sigma), alike=sigma**2)
+    got = merged([coarse, fine], PRIOR)
+    assert np.all(np.sqrt(np.diag(got.covariance)) < GOOD * np.sqrt(got.inflation))
+
+
 def test_intervals_hold_the_truth_and_what_no_flight_shows_keeps_the_prior():
     rng = np.random.default_rng(2)
     hover = np.where(np.arange(6) % 3 == 2, 1e4, 1.0) * GOOD

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onboard.core.inputs.expected_force import expected, spectrum, white
+from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 
 STEP, SECONDS = 0.02, 240.0
@@ -110,3 +110,15 @@ def test_white_noise_is_found_a_little_smaller_than_it_is():
     samples = manoeuvre() + sigma * np.random.default_rng(6).normal(size=(len(T), 3))
     share = white(spectrum(batches(samples))) / (sigma**2 * STEP)
     assert np.all((share > 0.75) & (share < 1.0))
+
+
+@pytest.mark.parametrize("size", [1.0, 0.0])
+@pytest.mark.parametrize("sigma", [0.0, 0.02, 0.2])
+def test_noise_drowns_a_force_that_changes_no_more_than_it(size, sigma):
+    force = size * manoeuvre()
+    # A smooth manoeuvre has next to nothing at the frequencies of fixes but what shakes the air.
+    shaking = np.random.default_rng(3).normal(size=force.shape)
+    shaking = np.apply_along_axis(np.convolve, 0, shaking, np.ones(5) / 5.0, "same")
+    rng = np.random.default_rng(2)
+    flight = batches(force + size * shaking + sigma * rng.normal(size=force.shape))
+    assert drowned(flight, spectrum(flight)) == (size == 0.0 and sigma > 0.0)
