@@ -139,7 +139,7 @@ class Flown:
             height = np.array([f.altitude for f in fixes])
             if not self.airborne:
                 # What nobody says of it a vehicle shows: wings stand where no hover is.
-                kind = self.kind or _shown_kind(t, v, height)
+                kind = self.kind or kind_by_motion(t, v, height)
                 self.grounded = grounded_spans(
                     t,
                     v,
@@ -369,12 +369,6 @@ def _mean(group: list[ImuSample]) -> ImuSample:
 def _counts(sample: Sample) -> TypeGuard[GpsFix]:
     """Whether it is a fix in three dimensions."""
     return isinstance(sample, GpsFix) and sample.fix_type >= FIX_3D
-
-
-def _shown_kind(t: Array, v_n: Array, height: Array) -> str:
-    """Kind of vehicle that flies like these fixes; empty where that is not clear."""
-    step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
-    return kind_by_motion(v_n, height, step)
 
 
 def _said_to_stand(samples: list[Sample]) -> Mask:

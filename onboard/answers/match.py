@@ -205,10 +205,9 @@ def guessed_kind(batches: Sequence[Batch]) -> str:
     """Which kind of vehicle flies like this; empty where that is not clear."""
     if not batches:
         return ""
+    t = np.concatenate([b.fixes.t for b in batches])
     v_n = np.concatenate([b.fixes.v_n for b in batches])
-    height = np.concatenate([b.fixes.height for b in batches])
-    step = float(np.median(np.concatenate([np.diff(b.fixes.t) for b in batches])))
-    return kind_by_motion(v_n, height, step)
+    return kind_by_motion(t, v_n, np.concatenate([b.fixes.height for b in batches]))
 
 
 def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> Flight:

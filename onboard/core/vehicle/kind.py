@@ -19,18 +19,19 @@ ALOFT_S: Final = 10.0
 """s of flight there that are asked by themselves: a plane climbs out for longer [physics]."""
 
 
-def kind_by_motion(v_n: Array, height: Array, step_s: float) -> str:
+def kind_by_motion(t: Array, v_n: Array, height: Array) -> str:
     """``copter`` or ``plane``; empty where it is not clear which.
 
     On the ground both stand: what is well above the lowest place is asked, if anything was.
 
     Args:
-        v_n: (n, 2 or 3) velocities of fixes, m/s.
+        t: (n,) times of fixes, s.
+        v_n: (n, 2 or 3) their velocities, m/s.
         height: (n,) m.
-        step_s: s from fix to fix.
     """
-    if not len(v_n):
+    if len(t) < 2:
         return ""
+    step_s = float(np.median(np.diff(t)))
     speed = np.linalg.norm(np.nan_to_num(v_n[:, :2]), axis=1)
     # Of a wild fix or two, no ground is made.
     known = np.isfinite(height)

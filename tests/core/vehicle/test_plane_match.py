@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.effects.servo_lag import ServoLag
 from onboard.core.vehicle.fit import fitted, summed
+from onboard.core.vehicle.flight import History
 from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
-from tests.core.vehicle.flights import G, plane_flight
+from onboard.core.vehicle.several import joined
+from tests.core.vehicle.flights import STEP, G, plane_flight
 
 pytestmark = pytest.mark.slow
 SIGMA = np.array([0.003, 0.003, 0.01])
@@ -302,3 +306,34 @@ def test_what_gusts_may_have_turned_is_no_reason_to_name_drag_before_thrust(seed
         )
     )
     assert names(match) - {"turbulence"} == {"thrust_scale"}
+
+
+def kicked_flight(seed, **changes):
+    """Kicks of the rudder, of which a recording lacks the moment."""
+    flight = plane_flight(seed=seed, kicks=0.5, **changes)
+    whole = replace(flight, history=History(flight.commands, flight.piece))
+    jumps = np.abs(np.diff(flight.commands[:, 1], prepend=0.0)) > 0.1
+    flight = whole.kept(~jumps)
+    flight.piece[:] = np.cumsum(np.diff(flight.t, prepend=flight.t[0]) > 1.5 * STEP)
+    return flight
+
+
+@pytest.mark.parametrize("c_y_b", [-0.4, -0.98])
+def test_a_servo_follows_through_steps_that_are_left_out(c_y_b):
+    """Settled anew at each cut, rudder and sideslip would share the side force in another way."""
+    number = matched(kicked_flight(31, c_y_b=c_y_b)).numbers["side_force.c_y_b"]
+    assert number.real == pytest.approx(c_y_b, rel=0.05)
+    assert abs(number.real - c_y_b) < 3.0 * number.sigma
+
+
+def test_several_flights_keep_their_commands_apart():
+    flights = [kicked_flight(seed, seconds=60.0) for seed in (1, 2)]
+    model = ServoLag()
+    alone = []
+    for flight in flights:
+        air = Air(flight)
+        model.act(air, [0.2])
+        alone.append(air.commands)
+    together = Air(joined(flights))
+    model.act(together, [0.2])
+    assert together.commands == pytest.approx(np.concatenate(alone), abs=1e-9)
