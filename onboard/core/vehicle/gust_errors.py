@@ -15,23 +15,42 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.felt import AHEAD, Felt
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.model import GUST
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
 
+UP = 2
+"""Body axis along which a wing feels air that rises."""
 LEAST_SLOPE = 1e-6
 """1/s: a force that no gust changes tells nothing of gusts [physics]."""
 
 
-def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
+def rising(fit: Fit) -> float:
+    """RMS of the air up and down that would do what a plane's model leaves, m/s.
+
+    Zero for what has no wing.
+    """
+    if not fit.model.indices(Lift.name) or UP not in fit.model.axes:
+        return 0.0
+    k, windows = fit.model.axes.index(UP), windows_of(fit.model.flight)
+    here = fit.model.predicted(fit.theta)
+    gust = GUST * fit.model.flight.R_bn[:, UP]
+    slope = windows.mean(fit.model.predicted(fit.theta, gust) - here)[:, k] / GUST
+    least = max(float(np.sqrt(np.mean(slope**2))), LEAST_SLOPE)
+    return float(np.sqrt(np.mean(windows.mean(fit.residual[:, k]) ** 2))) / least
+
+
+def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None, up: float = 0.0) -> Turned:
     """What gusts of this RMS along the flow, m/s, and at most as large across it, may have done.
 
     Args:
         fit: of everything.
         rms: along the flow, m/s.
         felt: what the force ahead has told, which has no gusts in it.
+        up: of air that rises and sinks where none is felt along the flow (thermals), m/s.
     """
     m = len(fit.theta)
     clear = () if felt is None else felt.places
@@ -44,7 +63,7 @@ def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
         gust = GUST * fit.model.flight.R_bn[:, axis]
         slope = windows.mean(fit.model.predicted(fit.theta, gust) - here) / GUST
         turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
-        level = _level(fit, sizes, slope, axis, rms)
+        level = _level(fit, sizes, slope, axis, max(rms, up) if axis == UP else rms)
         for k, size in enumerate(sizes):
             if felt is not None and k == AHEAD:
                 continue

@@ -32,7 +32,7 @@ from onboard.core.vehicle.records import (
     VehicleMatch,
 )
 from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
-from onboard.core.vehicle.wind_record import change_sentence, wind_of
+from onboard.core.vehicle.wind_record import change_sentence, height_sentence, wind_of
 
 PARTLY = "gusts hide a part of its numbers, and only the rest was tested"
 
@@ -241,6 +241,7 @@ def note_of(m: Matched) -> str:
         below_sentence(m.below),
         beyond_sentence(beyond_of(m.model.effects)),
         change_sentence(m),
+        height_sentence(m),
         remainder_sentence(m.remainders),
         left_out_sentence(m.left_out),
     )
