@@ -43,14 +43,13 @@ def rising(fit: Fit) -> float:
     return float(np.sqrt(np.mean(windows.mean(fit.residual[:, k]) ** 2))) / least
 
 
-def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None, up: float = 0.0) -> Turned:
+def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
     """What gusts of this RMS along the flow, m/s, and at most as large across it, may have done.
 
     Args:
         fit: of everything.
         rms: along the flow, m/s.
         felt: what the force ahead has told, which has no gusts in it.
-        up: of air that rises and sinks where none is felt along the flow (thermals), m/s.
     """
     m = len(fit.theta)
     clear = () if felt is None else felt.places
@@ -63,9 +62,9 @@ def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None, up: float = 
         gust = GUST * fit.model.flight.R_bn[:, axis]
         slope = windows.mean(fit.model.predicted(fit.theta, gust) - here) / GUST
         turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
-        level = _level(fit, sizes, slope, axis, max(rms, up) if axis == UP else rms)
+        level = _level(fit, sizes, slope, axis, rms)
         for k, size in enumerate(sizes):
-            if felt is not None and k == AHEAD:
+            if felt is not None and felt.ahead and k == AHEAD:
                 continue
             # Gusts have the colour of the noise: what whitens it leaves them as they are.
             rows = level * turned[:, k] / size[:, None]

@@ -15,7 +15,7 @@ from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.felt import felt_by
+from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import rising, turned_by_gusts
@@ -107,17 +107,18 @@ class _Finished:
 
 def _finished(first: Fit) -> _Finished:
     plain, kept = described(first)
-    fit = plain
-    turbulence = turbulence_of(fit)
-    if AirspeedScale.name in {e.name for e in fit.model.effects}:
-        felt = felt_by(fit) if turbulence.found else None
-        fit = fit if felt is None else felt.fit
-        if turbulence.seen:
-            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
+    fit, turbulence = plain, turbulence_of(plain)
     up = rising(plain)
-    if not turbulence.found and up > math.hypot(RECEIVER_M_S, turbulence.errors):
-        # No gust along the flow, and the wing feels something all the same: it may be air.
-        fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, None, up))
+    risen = up > math.hypot(RECEIVER_M_S, turbulence.errors)
+    sensed = AirspeedScale.name in {e.name for e in fit.model.effects}
+    felt = felt_by(fit) if sensed and turbulence.found else None
+    if felt is None and risen:
+        # Nothing feels these gusts, and angles that they scatter are told without their scatter.
+        felt = felt_across(fit, up if sensed else 0.0)
+        turbulence = turbulence if sensed else turbulence_of(felt.fit)
+    fit = fit if felt is None else felt.fit
+    if felt is not None or (sensed and turbulence.seen):
+        fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
     return _Finished(plain, replace(fit, doubt=propeller_doubt(fit)), kept, turbulence)
 
 

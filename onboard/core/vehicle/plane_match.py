@@ -79,7 +79,9 @@ def _found(
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma, beyond))
     found = _slipping(found, flying, frame, force_sigma, beyond)
-    more = structures(found.plain or found.fit, beyond, WINGS, answering=found.turbulence.answered)
+    more = structures(
+        found.plain or found.fit, beyond, WINGS, answering=found.fit.turned is not None
+    )
     if more and len(beyond) < MOST_BEYOND:
         # All else is asked anew beside it: what looked like gusts may have been this.
         return _found(flight, frame, force_sigma, (*beyond, more[0].key))
