@@ -20,6 +20,7 @@ from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.effects.beyond import LAWS, Beyond, Law
 from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
@@ -54,11 +55,14 @@ def structures(
         known: keys of what the model has already.
         laws: that are asked for beside a wind that changes; a copter's are the default.
         answering: whether the vehicle answers gusts that the fit takes for its own motion: then
-            a law must hold as well by what it was a second before, which a gust has not made.
+            a law must hold as well by what it was a second before, which a gust has not made, and
+            one of what answers at once is not asked for.
     """
     model = fit.model
     air = model.air(fit.theta)
     every: dict[str, Effect] = {key: Beyond(key, law, name=ASKED) for key, law in laws.items()}
+    if answering:
+        every = {key: e for key, e in every.items() if not laws[key].answers}
     every[CHANGE] = WindChange(model.flight, name=ASKED)
     if laws is not LAWS:
         every[HEIGHT] = WindByHeight(model.flight, name=ASKED)
@@ -69,7 +73,8 @@ def structures(
     if answering:
         told = replace(fit, model=replace(model, instrumented=FORCE))
         seen = {s.key for s in found if s is not None}
-        found = [_found(key, e, told, slopes, level) for key, e in asked.items() if key in seen]
+        again = {key: e for key, e in asked.items() if key in seen}
+        found = [_found(key, e, told, slopes, level, again=True) for key, e in again.items()]
     return tuple(sorted((s for s in found if s is not None), key=lambda s: -s.gain))
 
 
@@ -78,7 +83,9 @@ def _acts(effect: Effect, air: Air) -> bool:
     return effect.acts(air) if isinstance(effect, Beyond) else not effect.missing(air)
 
 
-def _found(key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float) -> Structure | None:
+def _found(
+    key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float, *, again: bool = False
+) -> Structure | None:
     """What one law finds, if it is more than chance and than errors of the velocity."""
     wide = _with(fit, slopes, effect)
     choices = Choices(wide)
@@ -98,13 +105,23 @@ def _found(key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float) -> 
     made = wide.jacobian[:, axes][:, :, places]
     force, sigma = rms(made @ x), _spread(made, whole.covariance[np.ix_(places, places)])
     # Up to here it may be the velocity's or the heading's error, as gusts that small may be.
-    errors = RECEIVER_M_S
-    if isinstance(effect, Beyond) and UP not in effect.law.axes:
-        # Air that rises leans the lift, and what it does along the lift nobody takes for a law.
-        errors = max(errors, rising(fit))
-    if force < rms(fit.model.unclear(fit.theta, errors)[:, axes]) + SURE * sigma:
+    # By its past a law shows that it is there; how large it is, it shows by itself.
+    if not again and force < rms(_unclear(fit, effect)[:, axes]) + SURE * sigma:
         return None
     return Structure(key, gain, force)
+
+
+def _unclear(fit: Fit, effect: Effect) -> Array:
+    """(n, k) m/s^2 that errors look like, which an effect has to exceed.
+
+    What a wrong heading does to a wing goes with the bank and its side, as no law of a wing does.
+    """
+    if not isinstance(effect, Beyond) or not fit.model.indices(Lift.name):
+        return fit.model.unclear(fit.theta, RECEIVER_M_S)
+    # Air that rises leans the lift, and what it does along the lift nobody takes for a law.
+    errors = RECEIVER_M_S if UP in effect.law.axes else max(RECEIVER_M_S, rising(fit))
+    out: Array = errors * np.linalg.norm(fit.model.gust_slope(fit.theta), axis=-1)
+    return out
 
 
 def _spread(made: Array, covariance: Array) -> float:

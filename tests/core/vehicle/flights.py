@@ -160,6 +160,7 @@ def plane_flight(
     rudder_by_slip=0.0,
     servo_lag=0.14,
     kicks=0.0,
+    angles=0.02,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -169,13 +170,14 @@ def plane_flight(
     recorded heading, rad, of the force's noise, m/s^2, and of gusts along each axis that carry the
     plane along, so that it flies through them as through still air, m/s.  The rudder moves at
     random, and by the sideslip that it holds; or it is kicked this far to either side, and the
-    plane slips as it does.  Servos and motor follow behind a low-pass, s.
+    plane slips as it does; ``angles`` is the standard deviation of the angle of attack.  Servos
+    and motor follow behind a low-pass, s.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = 50.0 + STEP * np.arange(n)
     speed, yaw = 24.0 + smooth(rng, n, 3.0, 4.0), np.cumsum(smooth(rng, n, 0.25, 5.0)) * STEP
-    alpha, beta = -0.03 + smooth(rng, n, 0.02), smooth(rng, n, 0.03)
+    alpha, beta = -0.03 + smooth(rng, n, angles), smooth(rng, n, 0.03)
     pitch = smooth(rng, n, 0.1, 4.0)
     R = rotation_from_euler(smooth(rng, n, 0.4, 4.0), pitch, yaw)
     kicked = kicks * np.repeat(rng.integers(-1, 2, n // 30 + 1), 30)[None, :n] if kicks else None

@@ -24,6 +24,8 @@ class Law:
         said: what a person reads of it, as the end of *a force ...*; of a sensor, all of it.
         axes: along which it is large enough to be seen.
         spoils: effects whose numbers are no longer the vehicle's then: they have another law.
+        answers: whether it goes with what a plane and its autopilot answer a gust with at once, so
+            that it cannot be told from the gust.
         sensed: whether it is of the airspeed sensor, and no force.
     """
 
@@ -33,6 +35,7 @@ class Law:
     said: str
     axes: tuple[int, ...] = (0, 1)
     spoils: tuple[str, ...] = ()
+    answers: bool = False
     sensed: bool = False
 
 

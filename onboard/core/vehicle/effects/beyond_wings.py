@@ -126,13 +126,21 @@ AHEAD, SIDE, UP, SENSED = (0,), (1,), (2,), (COLUMN,)
 WINGS: Mapping[str, Law] = {
     "bent": Law(_bent, 10.0, "1/rad^2", "of lift that is no line over the angle of attack", UP),
     "polar": Law(_polar, 0.1, "1", "of drag that is least at another lift than none", AHEAD),
-    "pitching": Law(_pitching, 1.0, "m", "along the lift that goes with the rate of pitch", UP),
+    "pitching": Law(
+        _pitching, 1.0, "m", "along the lift that goes with the rate of pitch", UP, answers=True
+    ),
     "slipping": Law(_slipping, 2.0, "1/rad^2", "along the lift that goes with sideslip", UP),
-    "rolling": Law(_rolling, 0.5, "m", "to the side that goes with the rate of roll", SIDE),
-    "yawing": Law(_yawing, 0.5, "m", "to the side that goes with the rate of yaw", SIDE),
+    "rolling": Law(
+        _rolling, 0.5, "m", "to the side that goes with the rate of roll", SIDE, answers=True
+    ),
+    "yawing": Law(
+        _yawing, 0.5, "m", "to the side that goes with the rate of yaw", SIDE, answers=True
+    ),
     "pulled_up": Law(_pulled_up, 0.1, "1", "upwards that goes with the throttle", UP),
     "curved": Law(_curved, 1.0, "1", "of thrust that is no line over the throttle", AHEAD),
-    "by_elevator": Law(_by_elevator, 0.5, "1", "along the lift that goes with the elevator", UP),
+    "by_elevator": Law(
+        _by_elevator, 0.5, "1", "along the lift that goes with the elevator", UP, answers=True
+    ),
     "by_flap": Law(_by_flap, 0.5, "1", "along the lift that goes with the flaps", UP),
     "read_off": Law(_read_off, 1.0, "m/s", READ_OFF, SENSED, sensed=True),
     "flap_drag": Law(_flap_drag, 0.1, "1", "along the flow that goes with the flaps", AHEAD),
