@@ -115,7 +115,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         )
     if m.turbulence.found:
         t = m.turbulence
-        value = {"rms": Compared(0.0, t.rms, t.sigma, "m/s")}
+        value = {"rms": Compared(0.0, t.rms, math.hypot(t.sigma, t.by_law), "m/s")}
         if t.whole is not None:
             value["rms_with_faster"] = Compared(0.0, t.whole, t.whole_sigma, "m/s")
         out.append(Difference("turbulence", "vehicle", value, 0.0))

@@ -385,6 +385,10 @@ def test_gusts_repeat_with_nothing_that_a_plane_does(seed, reading):
     match = matched(plane_flight(seed=seed, wind=(3.0, 1.0), gusts=0.5, reading=reading))
     assert "repeats" not in match.note
     assert not {"lift", "side_force"} & names(match)
+    for effect in match.effects:
+        if effect.name == "turbulence" and reading is None:
+            # Known no better than the side force that shows it.
+            assert abs(effect.values["rms"].real - 0.5) < 2.0 * effect.values["rms"].sigma
 
 
 def test_a_plane_that_hardly_slips_shows_no_side_force_and_its_wind_is_right():
