@@ -102,7 +102,7 @@ def turbulence_of(fit: Fit) -> Turbulence:
 
 
 def _side_doubt(fit: Fit) -> float:
-    """Share of a plane's side force by sideslip that its sigma is, at most that before the flight."""
+    """Sigma of a side force by sideslip, as a share of it: at most that before the flight."""
     names = [u.name for u in fit.model.unknowns]
     if SLIP not in names:
         return 0.0
