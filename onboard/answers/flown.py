@@ -38,6 +38,7 @@ from onboard.core.inputs.samples import (
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.copter import carried_by_rotors
+from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
@@ -137,6 +138,8 @@ class Flown:
             v = np.array([(f.v_n, f.v_e, math.nan if f.v_d is None else f.v_d) for f in fixes])
             height = np.array([f.altitude for f in fixes])
             if not self.airborne:
+                # What nobody says of it a vehicle shows: wings stand where no hover is.
+                kind = self.kind or kind_by_motion(t, v, height)
                 self.grounded = grounded_spans(
                     t,
                     v,
@@ -144,7 +147,7 @@ class Flown:
                     said=_said_to_stand(self._kept),
                     carried=self._carried(t, v),
                     rolls=self.kind != "copter",
-                    wings=self.kind == "plane",
+                    wings=kind == "plane",
                 )
             self.ground = float(np.percentile(lasting_height(t, height), 0.5))
         step = _averaged_over(self._kept)

@@ -22,6 +22,7 @@ from onboard.core.vehicle.contradiction import Contradiction, contradiction
 from onboard.core.vehicle.copter import Outputs
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.flight import Flight, flight_of
+from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.limits import APART, FEWEST_STEPS
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -51,15 +52,6 @@ SAME: Final = 0.05
 """Share of a number within which two vehicles are the same [use]."""
 DESCRIBING = ("lowest", "capacity", "rms_with_faster")
 """Numbers that tell of the flight, not of the vehicle."""
-SLOW_M_S: Final = 3.0
-FAST_M_S: Final = 7.0
-"""Speed over ground that a tenth of the flight is slower than, m/s, of a copter and of a plane: the
-one stops now and then, the other cannot [physics]."""
-ALOFT_M: Final = 10.0
-"""m above the lowest place from which a vehicle flies: a receiver's height wanders by some of
-them, and a runway slopes [data sheet]."""
-ALOFT_S: Final = 10.0
-"""s of flight there that are asked by themselves: a plane climbs out for longer [physics]."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
 
 
@@ -210,26 +202,12 @@ def vehicle_level(
 
 
 def guessed_kind(batches: Sequence[Batch]) -> str:
-    """A copter stops in the air, a plane does not; empty where neither is clear.
-
-    On the ground both stand: what is well above the lowest place is asked, if anything was.
-    """
+    """Which kind of vehicle flies like this; empty where that is not clear."""
     if not batches:
         return ""
-    v_n = np.nan_to_num(np.concatenate([b.fixes.v_n for b in batches]))
-    height = np.concatenate([b.fixes.height for b in batches])
-    speed = np.linalg.norm(v_n[:, :2], axis=1)
-    # Of a wild fix or two, no ground is made.
-    known = np.isfinite(height)
-    ground = float(np.percentile(height[known], 1)) if known.any() else np.inf
-    aloft = known & (height > ground + ALOFT_M)
-    step = float(np.median(np.concatenate([np.diff(b.fixes.t) for b in batches])))
-    if np.count_nonzero(aloft) * step >= ALOFT_S:
-        speed = speed[aloft]
-    slow = float(np.percentile(speed, 10))
-    if slow < SLOW_M_S:
-        return "copter"
-    return "plane" if slow > FAST_M_S else ""
+    t = np.concatenate([b.fixes.t for b in batches])
+    v_n = np.concatenate([b.fixes.v_n for b in batches])
+    return kind_by_motion(t, v_n, np.concatenate([b.fixes.height for b in batches]))
 
 
 def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> Flight:

@@ -105,3 +105,25 @@ def test_parameters_that_are_no_numbers_are_none():
     made = found([ParameterValue("SERVO9_FUNCTION", float("nan")), *hop()])
     assert "SERVO9_FUNCTION" not in made.signals().parameters
     assert made.signals().motors == (0, 1, 2, 3)
+
+
+def plane(kind, *, wander_m):
+    """Stands, takes off, flies, lands and stands for longer; a receiver's height wanders."""
+    out = [VehicleState(0.0, kind=kind)] if kind else []
+    for t in np.arange(0.0, 300.0, 0.1).tolist():
+        speed = float(np.interp(t, [30.0, 36.0, 150.0, 156.0], [0.0, 18.0, 18.0, 0.0]))
+        up = float(np.interp(t, [36.0, 60.0, 120.0, 150.0], [0.0, 60.0, 60.0, 0.0]))
+        down = -(up - float(np.interp(t - 0.1, [36.0, 60.0, 120.0, 150.0], [0.0, 60.0, 60.0, 0.0])))
+        out.append(ImuSample(t, 1, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
+        height = 100.0 + up + wander_m * t / 300.0
+        out.append(GpsFix(t, 1, 3, 0.5, 0.5, height, speed, 0.0, 10.0 * down))
+    return out
+
+
+@pytest.mark.parametrize("kind", ["", "plane"])
+@pytest.mark.parametrize("wander_m", [-7.0, 7.0])
+def test_a_plane_stands_where_it_stands_whoever_says_that_it_is_one(kind, wander_m):
+    """In a wind what stands is a wing with little slope, flown slowly, and gusts of 5 m/s."""
+    made = found(plane(kind, wander_m=wander_m))
+    assert all(standing(made, t) for t in (5.0, 25.0, 165.0, 230.0, 295.0))
+    assert not any(standing(made, t) for t in (45.0, 90.0, 140.0))

@@ -22,7 +22,6 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.lift import Lift
-from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.instruments import told_by
 from onboard.core.vehicle.limits import ROUNDS, SETTLED
@@ -31,7 +30,7 @@ from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.windows import Windows, windows_of
 
 SIDE, UP = 1, 2
-"""Places of the axes of a plane's model."""
+"""Body axes of the two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,26 +54,32 @@ def whitened_axis(left: Array, columns: Array, windows: Windows) -> Rows:
 def across(fit: Fit, theta: Array) -> tuple[Array, Rows, Rows]:
     """Unknowns (m,) with lift and side force found anew, and rows of the side and upwards."""
     theta = _found(fit, theta, fit.model.indices(Lift.name), upwards)
-    theta = _found(fit, theta, fit.model.indices(SideForce.name), sideways)
+    theta = _found(fit, theta, side_places(fit.model), sideways)
     return theta, sideways(fit.model, theta), upwards(fit.model, theta)
+
+
+def side_places(model: ForceModel) -> list[int]:
+    """Places of the side force by sideslip and by the rudder, whatever it is called."""
+    return [model.index(name) for name in ("c_y_b", "c_y_deltar")]
 
 
 def upwards(model: ForceModel, theta: Array) -> Rows:
     """Whitened force upwards, to which the slope of the lift is what it is at the mean angle."""
-    columns = model.jacobian(theta)[:, UP]
+    k = model.axes.index(UP)
+    columns = model.jacobian(theta)[:, k]
     constant, slope = model.indices(Lift.name)
     columns[:, slope] = float(np.mean(model.air(theta).alpha)) * columns[:, constant]
     windows = windows_of(model.flight)
-    left = windows.mean((model.measured() - model.predicted(theta))[:, UP])
+    left = windows.mean((model.measured() - model.predicted(theta))[:, k])
     return whitened_axis(left, windows.mean(columns), windows)
 
 
 def sideways(model: ForceModel, theta: Array) -> Rows:
     """Whitened force to the side, with the sideslip as far as the rudder tells it."""
-    windows = windows_of(model.flight)
-    left = windows.mean((model.measured() - model.predicted(theta))[:, SIDE])
-    rows = whitened_axis(left, windows.mean(model.jacobian(theta)[:, SIDE]), windows)
-    slope, rudder = model.indices(SideForce.name)
+    windows, k = windows_of(model.flight), model.axes.index(SIDE)
+    left = windows.mean((model.measured() - model.predicted(theta))[:, k])
+    rows = whitened_axis(left, windows.mean(model.jacobian(theta)[:, k]), windows)
+    slope, rudder = side_places(model)
     columns = rows.regressors.copy()
     columns[:, [slope]] = told_by(columns[:, [slope]], columns[:, [rudder]])
     return Rows(rows.left, columns, rows.noise)

@@ -208,7 +208,7 @@ def copter_model(
         RotorDrag(frame, by_components=variant.by_components),
         BodyDrag(frame),
         *([own([OwnMotion(variant.moving) for _ in parts])] if variant.moving else []),
-        *(Beyond(key) for key in variant.beyond if key in LAWS),
+        *(Beyond(key, LAWS[key]) for key in variant.beyond if key in LAWS),
         MotorLag(),
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),

@@ -17,20 +17,20 @@ The lift itself, and the side force, are told as :mod:`onboard.core.vehicle.acro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
-from onboard.core.vehicle.across import UP, Rows, across, whitened_axis
+from onboard.core.vehicle.across import SIDE, UP, Rows, across, side_places, whitened_axis
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
-from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.fit import BlockSums, Fit, inflation_of
@@ -39,7 +39,7 @@ from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel
 from onboard.core.vehicle.windows import windows_of
 
-AHEAD, SENSED = 0, -1
+AHEAD, SENSED, NONE = 0, -1, -1
 """Places of the axes: a plane with throttle and airspeed has x, y, z and the sensor."""
 STEPS = 25
 """Steps at the most: what is left is nearly linear [cost]."""
@@ -53,13 +53,15 @@ class Felt:
 
     Attributes:
         fit: of everything.
-        places: of what that force has told.
+        places: of what has no gusts in it.
         lean: (m, l) of :class:`onboard.core.vehicle.turned.Turned`.
+        ahead: whether the force ahead has none; it takes an airspeed sensor.
     """
 
     fit: Fit
     places: tuple[int, ...]
     lean: Array
+    ahead: bool = True
 
 
 def felt_by(fit: Fit) -> Felt | None:
@@ -84,9 +86,34 @@ def felt_by(fit: Fit) -> Felt | None:
             break
     rows = _rows(model, theta)
     theta, side, up = across(fit, theta)
-    places = (*mine, *model.indices(Lift.name), *model.indices(SideForce.name))
-    found = _summed(fit, theta, (rows, side, up), mine)
+    places = (*mine, *model.indices(Lift.name), *side_places(model))
+    found = _summed(fit, theta, {AHEAD: rows, SIDE: side, UP: up}, {AHEAD: mine}, AHEAD)
     return Felt(found, places, _lean(fit, theta, rows, mine))
+
+
+def felt_across(fit: Fit, lasting: float = 0.0) -> Felt:
+    """The fit with lift and side force alone found anew, where no sensor feels the gusts ahead.
+
+    Those are told by the axes that :mod:`onboard.core.vehicle.across` is about, and by no other.
+
+    Args:
+        fit: of everything.
+        lasting: standard deviation of the air's mean up and down, m/s: none of turbulence, but
+            thermals and waves last, and who soars stays in them.
+    """
+    model = fit.model
+    theta, side, up = across(fit, _balanced(model, fit.theta))
+    lift, slip = model.indices(Lift.name), side_places(model)
+    rows = {model.axes.index(SIDE): side, model.axes.index(UP): up}
+    told = {model.axes.index(SIDE): slip, model.axes.index(UP): lift}
+    found = _summed(fit, theta, rows, told, NONE)
+    lean = np.zeros((len(theta), 1))
+    constant = up.regressors[:, lift[0]]
+    # Risen air is another angle, and that times the slope another lift at no angle.
+    speed = float(np.median(np.linalg.norm(model.air(theta).u_b, axis=1)))
+    risen = constant * float(theta[lift[1]]) * lasting / max(speed, 1.0)
+    lean[lift, 0] = up.regressors[:, lift].T @ risen
+    return Felt(found, (*lift, *slip), lean, ahead=False)
 
 
 def _told_ahead(model: ForceModel) -> list[int]:
@@ -94,7 +121,8 @@ def _told_ahead(model: ForceModel) -> list[int]:
     out: list[int] = []
     at = 0
     for effect in model.effects:
-        if isinstance(effect, Drag | SlipDrag | Propulsion | PropellerInflow):
+        bent = isinstance(effect, Beyond) and effect.law.axes == (AHEAD,)
+        if bent or isinstance(effect, Drag | SlipDrag | Propulsion | PropellerInflow):
             out += range(at, at + len(effect.unknowns))
         at += len(effect.unknowns)
     return [*out, model.index("offset_x")]
@@ -106,8 +134,9 @@ def _balanced(model: ForceModel, theta: Array) -> Array:
     places = model.indices(Lift.name)
     out[places] = model.nominal[places]
     for _ in range(3):
-        short = float(np.mean((model.measured() - model.predicted(out))[:, UP]))
-        slope = float(np.mean(model.jacobian(out)[:, UP, places[0]]))
+        up = model.axes.index(UP)
+        short = float(np.mean((model.measured() - model.predicted(out))[:, up]))
+        slope = float(np.mean(model.jacobian(out)[:, up, places[0]]))
         out[places[0]] += short / slope
     return out
 
@@ -173,26 +202,34 @@ def _lean(fit: Fit, theta: Array, ahead: Rows, mine: Sequence[int]) -> Array:
     return out
 
 
-def _summed(fit: Fit, theta: Array, rows: tuple[Rows, ...], mine: Sequence[int]) -> Fit:
-    """Sums of all axes: the first of the rows tells what is ``mine``, the others all else."""
+def _summed(
+    fit: Fit, theta: Array, rows: Mapping[int, Rows], mine: Mapping[int, Sequence[int]], only: int
+) -> Fit:
+    """Sums of all axes, some by these rows: what is an axis's own is told by it alone.
+
+    The place ``only`` tells nothing else, either: gusts are taken out of it by what others say.
+    """
     model, m = fit.model, len(theta)
     residual = model.measured() - model.predicted(theta)
     jacobian = model.jacobian(theta)
     sensitivity = model.sensitivity(theta)
     windows = windows_of(model.flight)
-    noise = (*(its.noise for its in rows), *fit.noise[len(rows) :])
+    noise = tuple(rows[k].noise if k in rows else its for k, its in enumerate(fit.noise))
     every = whitened_rows(model, residual, jacobian, noise, sensitivity)
-    told = np.zeros(m, dtype=bool)
-    told[list(mine)] = True
-    every[: len(rows)] = [np.column_stack([its.left, its.regressors]) for its in rows]
+    for k, its in rows.items():
+        every[k] = np.column_stack([its.left, its.regressors])
     for k, axis in enumerate(every):
-        axis[:, 1:] = np.where(told == (k == AHEAD), axis[:, 1:], 0.0)
+        others = [place for at, places in mine.items() if at != k for place in places]
+        axis[:, [1 + place for place in others]] = 0.0
+        if k == only:
+            own = np.isin(np.arange(m), mine[k])
+            axis[:, 1:] = np.where(own, axis[:, 1:], 0.0)
     of_row, part = fit.block[windows.first], model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
         here = of_row == number
-        its = np.concatenate([r[here] for r in every])
-        y, h = its[:, 0], its[:, 1:]
+        block = np.concatenate([r[here] for r in every])
+        y, h = block[:, 0], block[:, 1:]
         sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), int(part[here][0])))
     return replace(
         fit,

@@ -19,8 +19,21 @@ from onboard.core.vehicle.trajectory import Motion
 _BY_STEP = (
     *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
     *("outputs", "commands", "battery", "airspeed", "ekf_wind", "measured_wind", "part"),
+    "place",
 )
 """Fields that have a value for each step."""
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Commands at every step of a recording, those that are no part of the flight as well.
+
+    What follows its command with a lag has a memory, which does not begin anew where steps of the
+    flight are left out: ``commands`` (m, k), and ``piece`` (m,) as that of a :class:`Flight`.
+    """
+
+    commands: Array
+    piece: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +64,8 @@ class Flight:
         rest_volts: of the battery before the flight began, V; NaN where nobody saw it.
         step_s: length of a step, s.
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
+        history: of the commands; None where they are those of the flight alone.
+        place: (n,) of each step in the history.
     """
 
     t: Array
@@ -75,6 +90,8 @@ class Flight:
     rest_volts: float = math.nan
     step_s: float = STEP_S
     ground_seen: bool = True
+    history: History | None = None
+    place: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         """One recording, in a wind that nobody measured, where nothing else is said."""
@@ -83,6 +100,8 @@ class Flight:
             object.__setattr__(self, "part", np.zeros(n, dtype=np.int64))
         if len(self.measured_wind) != n:
             object.__setattr__(self, "measured_wind", np.zeros((n, 0)))
+        if len(self.place) != n:
+            object.__setattr__(self, "place", np.arange(n))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -175,6 +194,7 @@ def flight_of(
         ekf_wind=joined["ekf_wind"],
         measured_wind=joined["measured_wind"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
+        history=History(joined["commands"], joined["piece"].astype(np.int64)),
     )
     flight = flight.kept(air)
     # What was cut out divides a piece: the noise's memory must not reach across.

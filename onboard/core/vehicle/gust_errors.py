@@ -15,14 +15,32 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.felt import AHEAD, Felt
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.model import GUST
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
 
+UP = 2
+"""Body axis along which a wing feels air that rises."""
 LEAST_SLOPE = 1e-6
 """1/s: a force that no gust changes tells nothing of gusts [physics]."""
+
+
+def rising(fit: Fit) -> float:
+    """RMS of the air up and down that would do what a plane's model leaves, m/s.
+
+    Zero for what has no wing.
+    """
+    if not fit.model.indices(Lift.name) or UP not in fit.model.axes:
+        return 0.0
+    k, windows = fit.model.axes.index(UP), windows_of(fit.model.flight)
+    here = fit.model.predicted(fit.theta)
+    gust = GUST * fit.model.flight.R_bn[:, UP]
+    slope = windows.mean(fit.model.predicted(fit.theta, gust) - here)[:, k] / GUST
+    least = max(float(np.sqrt(np.mean(slope**2))), LEAST_SLOPE)
+    return float(np.sqrt(np.mean(windows.mean(fit.residual[:, k]) ** 2))) / least
 
 
 def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
@@ -46,7 +64,7 @@ def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
         turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
         level = _level(fit, sizes, slope, axis, rms)
         for k, size in enumerate(sizes):
-            if felt is not None and k == AHEAD:
+            if felt is not None and felt.ahead and k == AHEAD:
                 continue
             # Gusts have the colour of the noise: what whitens it leaves them as they are.
             rows = level * turned[:, k] / size[:, None]

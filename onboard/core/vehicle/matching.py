@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,11 +15,11 @@ from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.felt import felt_by
+from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.gust_errors import turned_by_gusts
-from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING
+from onboard.core.vehicle.gust_errors import rising, turned_by_gusts
+from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING, RECEIVER_M_S
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import likelihood
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
@@ -41,6 +42,7 @@ class Matched:
         remainders: spans that the model does not describe.
         left_out: spans, s since the start, that were not used.
         below: effects that would go below what they can be, and stand for something else.
+        plain: the fit before what gusts did to it was taken out; the same where nothing was.
     """
 
     fit: Fit
@@ -52,6 +54,7 @@ class Matched:
     remainders: tuple[Remainder, ...] = ()
     left_out: tuple[tuple[float, float], ...] = ()
     below: tuple[str, ...] = ()
+    plain: Fit | None = None
 
     @property
     def model(self) -> ForceModel:
@@ -67,14 +70,14 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         first: the fit of it, where it is there already.
     """
     whole = model.flight
-    fit, kept, turbulence = _finished(likelier(model) if first is None else first)
+    done = _finished(likelier(model) if first is None else first)
     below: tuple[str, ...] = ()
-    if at_bounds(fit):
-        free = _finished(likelier(replace(model, bounded=False), fit))
-        below = below_bounds(free[0])
+    if at_bounds(done.fit):
+        free = _finished(likelier(replace(model, bounded=False), done.fit))
+        below = below_bounds(free.fit)
         if below:
-            fit, kept, turbulence = free
-    model = fit.model
+            done = free
+    fit, model = done.fit, done.fit.model
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)
@@ -84,23 +87,39 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         chosen,
         left_by(choices, chosen.effects),
         nominal,
-        turbulence,
+        done.turbulence,
         remainders(replace(model, flight=whole), fit),
-        left_out(whole, kept),
+        left_out(whole, done.kept),
         below,
+        done.plain,
     )
 
 
-def _finished(first: Fit) -> tuple[Fit, Mask, Turbulence]:
-    """The fit of what the model describes, with what gusts did to it; the steps; the air."""
-    fit, kept = described(first)
-    turbulence = turbulence_of(fit)
-    if AirspeedScale.name in {e.name for e in fit.model.effects}:
-        felt = felt_by(fit) if turbulence.found else None
-        fit = fit if felt is None else felt.fit
-        if turbulence.seen:
-            fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
-    return replace(fit, doubt=propeller_doubt(fit)), kept, turbulence
+@dataclass(frozen=True, slots=True)
+class _Finished:
+    """The fit of what the model describes, without and with what gusts did; steps; the air."""
+
+    plain: Fit
+    fit: Fit
+    kept: Mask
+    turbulence: Turbulence
+
+
+def _finished(first: Fit) -> _Finished:
+    plain, kept = described(first)
+    fit, turbulence = plain, turbulence_of(plain)
+    up = rising(plain)
+    risen = up > math.hypot(RECEIVER_M_S, turbulence.errors)
+    sensed = AirspeedScale.name in {e.name for e in fit.model.effects}
+    felt = felt_by(fit) if sensed and turbulence.found else None
+    if felt is None and risen:
+        # Nothing feels these gusts, and angles that they scatter are told without their scatter.
+        felt = felt_across(fit, up if sensed else 0.0)
+        turbulence = turbulence if sensed else turbulence_of(felt.fit)
+    fit = fit if felt is None else felt.fit
+    if felt is not None or (sensed and turbulence.seen):
+        fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
+    return _Finished(plain, replace(fit, doubt=propeller_doubt(fit)), kept, turbulence)
 
 
 def described(fit: Fit) -> tuple[Fit, Mask]:

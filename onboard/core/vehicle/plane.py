@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
+from onboard.core.vehicle.effects.beyond import Beyond
+from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.lift import Lift
@@ -21,16 +24,27 @@ from onboard.core.vehicle.effects.servo_lag import ServoLag
 from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
+from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import STALL_SHARE
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.several import wind_sigmas
-from onboard.core.vehicle.signals import RUDDER_FUNCTION, THROTTLE_FUNCTION, Signals, Stream
+from onboard.core.vehicle.signals import (
+    ELEVATOR_FUNCTION,
+    FLAP_FUNCTIONS,
+    RUDDER_FUNCTION,
+    THROTTLE_FUNCTION,
+    Signals,
+    Stream,
+)
 
 MIDDLE_US, HALF_US = 1500.0, 500.0
 """Pulse width of a surface at rest, and to its end."""
+SURFACES = ((RUDDER_FUNCTION,), (ELEVATOR_FUNCTION,), FLAP_FUNCTIONS)
+"""In the order of the commands, after the throttle."""
 FULL_S = 0.9
 """Share of the readings that an airspeed sensor must have [cost]."""
 LEAST_AIRSPEED_M_S = 5.0
@@ -38,7 +52,10 @@ LEAST_AIRSPEED_M_S = 5.0
 
 
 def plane_commands(signals: Signals) -> Stream:
-    """Throttle (0 to 1) and rudder (-1 to 1) as (j, 2); empty without a throttle."""
+    """Throttle (0 to 1), rudder, elevator and flap (-1 to 1) as (j, 4); empty without a throttle.
+
+    Surfaces that the vehicle has not got are zero.
+    """
     raw = signals.outputs.x
     throttle = signals.channels_of(THROTTLE_FUNCTION)
     if not throttle or not len(signals.outputs):
@@ -49,11 +66,18 @@ def plane_commands(signals: Signals) -> Stream:
     if not low < high or float(np.std(raw[:, k])) <= 0.0:
         return Stream()
     share = np.clip((raw[:, k] - low) / (high - low), 0.0, 1.0)
-    rudder = signals.channels_of(RUDDER_FUNCTION)
-    turned = np.zeros(len(raw))
-    if rudder:
-        turned = np.where(raw[:, rudder[0]] > 0.0, raw[:, rudder[0]] - MIDDLE_US, 0.0) / HALF_US
-    return Stream(signals.outputs.t, np.stack([share, turned], axis=1))
+    surfaces = [_turned(signals, functions) for functions in SURFACES]
+    return Stream(signals.outputs.t, np.stack([share, *surfaces], axis=1))
+
+
+def _turned(signals: Signals, functions: tuple[int, ...]) -> Array:
+    """(j,) -1 to 1 of a surface; zero where there is none."""
+    channels, raw = signals.channels_of(*functions), signals.outputs.x
+    if not channels:
+        return np.zeros(len(raw))
+    us = raw[:, channels[0]]
+    out: Array = np.where(us > 0.0, us - MIDDLE_US, 0.0) / HALF_US
+    return out
 
 
 def has_airspeed(flight: Flight) -> bool:
@@ -85,13 +109,22 @@ def unstalled(flight: Flight, frame: PlaneAirframe, winds: Array) -> Flight:
     return replace(out, piece=np.concatenate([[0], np.cumsum(breaks)]))
 
 
-def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> ForceModel:
+def plane_model(
+    flight: Flight,
+    frame: PlaneAirframe,
+    force_sigma: Array,
+    beyond: Sequence[str] = (),
+    *,
+    held: bool = False,
+) -> ForceModel:
     """Every effect of a plane that this recording can speak of.
 
     Args:
         flight: with throttle and rudder, if the recording has outputs; of one, or of several.
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
+        beyond: keys of what repeats with the motion, or with time, and is no effect's.
+        held: whether the side force is the file's.
     """
     sensor = has_airspeed(flight)
 
@@ -101,15 +134,18 @@ def plane_model(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> For
     still = start(flight)
     everything: list[Effect] = [
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
+        *([WindChange(flight)] if CHANGE in beyond else []),
+        *([WindByHeight(flight)] if HEIGHT in beyond else []),
         own([WindProfile() for _ in range(flight.parts)]),
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),
         ServoLag(),
         Lift(frame),
         Drag(frame),
         SlipDrag(),
-        SideForce(frame),
+        SideForce(frame, steered=still.commands is not None, held=held),
         Propulsion(frame),
         PropellerInflow(frame),
+        *(Beyond(key, WINGS[key]) for key in beyond if key in WINGS),
         *([AirspeedScale(flight.rho)] if sensor else []),
         own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
     ]
@@ -135,6 +171,7 @@ def plane_missing(flight: Flight) -> dict[str, str]:
         absent["wind_profile"] = why
     if air.commands is None:
         absent["thrust_scale"] = absent["drag"] = "no throttle output in the recording"
+        absent["side_force"] = "no rudder output in the recording"
     if not has_airspeed(flight):
         absent["airspeed_scale"] = "no airspeed sensor in the recording"
     if float(np.ptp(flight.height)) <= DENSITY_RANGE_M:

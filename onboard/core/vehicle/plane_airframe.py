@@ -19,8 +19,8 @@ from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.airframe_file import with_numbers
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 
-THROTTLE = 0
-"""Column of the commands of a plane."""
+THROTTLE, ELEVATOR, FLAP = 0, 2, 3
+"""Columns of the commands of a plane; the rudder's is between them."""
 POSITIVE = ("s", "b", "oswald")
 """Keys of a file that are divided by."""
 MASS_KG = 2.0

@@ -12,18 +12,31 @@ from onboard.core.vehicle.agreement import told_alone
 from onboard.core.vehicle.airframe_file import numbers_of_file
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
+from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.propulsion import Propulsion
+from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import FEWEST_STEPS
+from onboard.core.vehicle.limits import FEWEST_STEPS, RECEIVER_M_S
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
-from onboard.core.vehicle.matching import Matched, matched
+from onboard.core.vehicle.matching import Matched, likelier, matched
+from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_curves import plane_curves
 from onboard.core.vehicle.records import Difference, VehicleMatch
+from onboard.core.vehicle.structure import structures
 
-MANOEUVRES = {e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, WindProfile)}
+MOST_BEYOND = 3
+"""Laws that no effect has, and are let in one after the other; with more the model is another
+one [cost]."""
+LEAST_INDUCED = 0.01
+"""Of the file's induced drag, that a file may have where there is none [use]."""
+SIDE = 1
+"""Body axis of the side force."""
+MANOEUVRES = {
+    e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, SideForce, WindProfile)
+}
 
 
 def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> VehicleMatch | None:
@@ -51,19 +64,49 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     return told.beside(match)
 
 
-def _found(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Matched | None:
+def _found(
+    flight: Flight, frame: PlaneAirframe, force_sigma: Array, beyond: tuple[str, ...] = ()
+) -> Matched | None:
     """What is found in flight that is not stalled; None if there is too little."""
     flying = unstalled(flight, frame, np.zeros((flight.parts, 2)))
     if len(flying) < FEWEST_STEPS:
         return None
-    found = matched(plane_model(flying, frame, force_sigma))
+    found = matched(plane_model(flying, frame, force_sigma, beyond))
     places = found.model.indices("wind")
     winds = found.fit.theta[places].reshape(-1, 2)
     flying = unstalled(flight, frame, winds)
     if len(flying) >= FEWEST_STEPS and float(np.max(np.linalg.norm(winds, axis=1))) > 1.0:
         # What was stalled could only be told with the wind.
-        found = matched(plane_model(flying, frame, force_sigma))
+        found = matched(plane_model(flying, frame, force_sigma, beyond))
+    found = _slipping(found, flying, frame, force_sigma, beyond)
+    more = structures(
+        found.plain or found.fit, beyond, WINGS, answering=found.fit.turned is not None
+    )
+    if more and len(beyond) < MOST_BEYOND:
+        # All else is asked anew beside it: what looked like gusts may have been this.
+        return _found(flight, frame, force_sigma, (*beyond, more[0].key))
     return found
+
+
+def _slipping(
+    found: Matched, flying: Flight, frame: PlaneAirframe, sigma: Array, beyond: tuple[str, ...]
+) -> Matched:
+    """The same, but with the file's side force where the flight slips too little to tell it.
+
+    Where sideslip is no more than errors of the velocity, a force of none fits whatever the force
+    is: errors of a regressor make its slope nothing (W. A. Fuller, *Measurement Error Models*,
+    1987, section 1.1), and the wind across is then free.  So it has to be seen that the file's
+    force leaves more than such errors make.
+    """
+    if SideForce.name not in found.chosen.effects:
+        return found
+    fit = likelier(plane_model(flying, frame, sigma, beyond, held=True))
+    k = fit.model.axes.index(SIDE)
+    slope = np.linalg.norm(fit.model.gust_slope(fit.theta)[:, k], axis=-1)
+    errors = math.hypot(RECEIVER_M_S, flying.velocity_sigma)
+    if rms(fit.residual[:, k]) > errors * rms(slope):
+        return found
+    return matched(fit.model, fit)
 
 
 def _coefficients(
@@ -77,9 +120,10 @@ def _coefficients(
         made = replace(made, c_lift_0=c_lift_0, c_lift_a=c_lift_a)
     if "drag" in names:
         c_drag_p, induced = m.fit.theta[m.model.indices("drag")].tolist()
-        made = replace(made, c_drag_p=c_drag_p)
-        if induced > 0.0:
-            made = replace(made, oswald=1.0 / (math.pi * induced * made.b**2 / made.s))
+        # A file divides by it: as good as none is a share of what it has.
+        induced = max(induced, LEAST_INDUCED * frame.induced)
+        oswald = 1.0 / (math.pi * induced * made.b**2 / made.s)
+        made = replace(made, c_drag_p=c_drag_p, oswald=oswald)
     if "side_force" in names:
         c_y_b, c_y_deltar = m.fit.theta[m.model.indices("side_force")].tolist()
         made = replace(made, c_y_b=c_y_b, c_y_deltar=c_y_deltar)

@@ -15,10 +15,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.wind import PLAUSIBLE_M_S
-from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.flight import Flight, History
 from onboard.core.vehicle.limits import BLOCK_S
 
 STREAMS = ("outputs", "commands", "battery", "ekf_wind")
@@ -35,6 +36,7 @@ def joined(flights: Sequence[Flight]) -> Flight:
     if len(flights) == 1:
         return first
     laid, begin, piece = [], float(first.t[0]), 0
+    history, place = _histories(flights)
     for number, flight in enumerate(flights):
         laid.append(
             replace(
@@ -66,7 +68,23 @@ def joined(flights: Sequence[Flight]) -> Flight:
         attitude_sigma=max(f.attitude_sigma for f in flights),
         rest_volts=float(np.fmax.reduce([_highest_volts(f) for f in laid])),
         ground_seen=all(f.ground_seen for f in flights),
+        history=history,
+        place=place,
     )
+
+
+def _histories(flights: Sequence[Flight]) -> tuple[History | None, NDArray[np.int64]]:
+    """Commands of all recordings end to end, and the places (n,) of all steps in them."""
+    every = [f.history or History(f.commands, f.piece) for f in flights]
+    if len({h.commands.shape[1] for h in every}) > 1:
+        return None, np.zeros(0, dtype=np.int64)
+    pieces, places, piece, at = [], [], 0, 0
+    for flight, its in zip(flights, every, strict=True):
+        pieces.append(its.piece - its.piece[0] + piece)
+        places.append(flight.place + at)
+        piece, at = int(pieces[-1][-1]) + 1, at + len(its.piece)
+    commands = np.concatenate([h.commands for h in every])
+    return History(commands, np.concatenate(pieces)), np.concatenate(places)
 
 
 def of_parts(flight: Flight, numbers: Sequence[int]) -> Flight:

@@ -15,6 +15,7 @@ MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
 HELICOPTERS = (6.0, 11.0, 13.0)
 """FRAME_CLASS of what has a swash plate, whose servos have the numbers of motors."""
 THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
+FLAP_FUNCTIONS = (3, 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,24 +9,31 @@ fitted as well, and what it does must be more than errors of the velocity look l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
+from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.choices import Choices
-from onboard.core.vehicle.effects.beyond import LAWS, Beyond
+from onboard.core.vehicle.effects.beyond import LAWS, Beyond, Law
 from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
+from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
 from onboard.core.vehicle.fit import Fit, Slopes, inflation_of, slopes_at, summed
+from onboard.core.vehicle.gust_errors import UP, rising
 from onboard.core.vehicle.limits import FALSE_ALARM, RECEIVER_M_S, SURE
 from onboard.core.vehicle.noise import rms
+from onboard.core.vehicle.places import FORCE
 
 ASKED = "asked"
 """Name of what is asked about, while it is."""
+LEVEL = (0, 1)
+"""Axes along which a wind that changes is asked whether it matters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,24 +45,47 @@ class Structure:
     force: float
 
 
-def structures(fit: Fit, known: Sequence[str]) -> tuple[Structure, ...]:
-    """What repeats in the remainder of a copter's fit, the strongest first.
+def structures(
+    fit: Fit, known: Sequence[str], laws: Mapping[str, Law] = LAWS, *, answering: bool = False
+) -> tuple[Structure, ...]:
+    """What repeats in the remainder of a fit, the strongest first.
 
     Args:
         fit: of everything else.
         known: keys of what the model has already.
+        laws: that are asked for beside a wind that changes; a copter's are the default.
+        answering: whether the vehicle answers gusts that the fit takes for its own motion: then
+            a law must hold as well by what it was a second before, which a gust has not made, and
+            one of what answers at once is not asked for.
     """
     model = fit.model
-    air = model.start(model.flight)
-    every: dict[str, Effect] = {key: Beyond(key, name=ASKED) for key in LAWS}
+    air = model.air(fit.theta)
+    every: dict[str, Effect] = {key: Beyond(key, law, name=ASKED) for key, law in laws.items()}
+    if answering:
+        every = {key: e for key, e in every.items() if not laws[key].answers}
     every[CHANGE] = WindChange(model.flight, name=ASKED)
-    asked = {k: e for k, e in every.items() if k not in known and not e.missing(air)}
+    if laws is not LAWS:
+        every[HEIGHT] = WindByHeight(model.flight, name=ASKED)
+    asked = {k: e for k, e in every.items() if k not in known and _acts(e, air)}
     slopes = slopes_at(model, fit.theta)
-    found = [_found(key, e, fit, slopes, FALSE_ALARM / len(every)) for key, e in asked.items()]
+    level = FALSE_ALARM / len(every)
+    found = [_found(key, e, fit, slopes, level) for key, e in asked.items()]
+    if answering:
+        told = replace(fit, model=replace(model, instrumented=FORCE))
+        seen = {s.key for s in found if s is not None}
+        again = {key: e for key, e in asked.items() if key in seen}
+        found = [_found(key, e, told, slopes, level, again=True) for key, e in again.items()]
     return tuple(sorted((s for s in found if s is not None), key=lambda s: -s.gain))
 
 
-def _found(key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float) -> Structure | None:
+def _acts(effect: Effect, air: Air) -> bool:
+    """Whether this flight could show it."""
+    return effect.acts(air) if isinstance(effect, Beyond) else not effect.missing(air)
+
+
+def _found(
+    key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float, *, again: bool = False
+) -> Structure | None:
     """What one law finds, if it is more than chance and than errors of the velocity."""
     wide = _with(fit, slopes, effect)
     choices = Choices(wide)
@@ -68,13 +98,30 @@ def _found(key: str, effect: Effect, fit: Fit, slopes: Slopes, level: float) -> 
         return None
     if choices.held_out(names) <= choices.held_out([*names, ASKED]):
         return None
-    axes = [k for k, axis in enumerate(wide.model.axes) if axis in (0, 1)]
+    sides = effect.law.axes if isinstance(effect, Beyond) else LEVEL
+    axes = [k for k, axis in enumerate(wide.model.axes) if axis in sides]
+    if not axes:
+        return None
     made = wide.jacobian[:, axes][:, :, places]
     force, sigma = rms(made @ x), _spread(made, whole.covariance[np.ix_(places, places)])
     # Up to here it may be the velocity's or the heading's error, as gusts that small may be.
-    if force < rms(fit.model.unclear(fit.theta, RECEIVER_M_S)[:, axes]) + SURE * sigma:
+    # By its past a law shows that it is there; how large it is, it shows by itself.
+    if not again and force < rms(_unclear(fit, effect)[:, axes]) + SURE * sigma:
         return None
     return Structure(key, gain, force)
+
+
+def _unclear(fit: Fit, effect: Effect) -> Array:
+    """(n, k) m/s^2 that errors look like, which an effect has to exceed.
+
+    What a wrong heading does to a wing goes with the bank and its side, as no law of a wing does.
+    """
+    if not isinstance(effect, Beyond) or not fit.model.indices(Lift.name):
+        return fit.model.unclear(fit.theta, RECEIVER_M_S)
+    # Air that rises leans the lift, and what it does along the lift nobody takes for a law.
+    errors = RECEIVER_M_S if UP in effect.law.axes else max(RECEIVER_M_S, rising(fit))
+    out: Array = errors * np.linalg.norm(fit.model.gust_slope(fit.theta), axis=-1)
+    return out
 
 
 def _spread(made: Array, covariance: Array) -> float:
@@ -87,7 +134,7 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     """The sums with one more effect, which does nothing yet; ``slopes`` are those without it."""
     effects = list(fit.model.effects)
     at = len(effects)
-    if isinstance(effect, WindChange):
+    if isinstance(effect, WindChange | WindByHeight):
         at = 1 + next(k for k, e in enumerate(effects) if e.name == Wind.name)
     place = sum(len(e.unknowns) for e in effects[:at])
     effects.insert(at, effect)

@@ -28,6 +28,8 @@ from onboard.core.vehicle.noise import (
 )
 from onboard.core.vehicle.windows import windows_of
 
+SLIP = "c_y_b"
+"""Unknown by which sideslip makes a side force."""
 TINY = 1e-12
 """Of a square of a sensitivity, 1/s^2: no drag at all [physics]."""
 
@@ -45,6 +47,7 @@ class Turbulence:
         whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; None where
             that is not known.
         whole_sigma: of it.
+        by_law: sigma of the gusts by that of the side force that shows them, m/s.
     """
 
     rms: float
@@ -54,6 +57,7 @@ class Turbulence:
     errors: float
     whole: float | None = None
     whole_sigma: float = math.nan
+    by_law: float = 0.0
 
     @property
     def seen(self) -> bool:
@@ -94,7 +98,17 @@ def turbulence_of(fit: Fit) -> Turbulence:
         if more > SURE * spread:
             whole = gust * math.exp(more)
             return Turbulence(gust, sigma, evidence, floor, errors, whole, whole * spread)
-    return Turbulence(gust, sigma, evidence, floor, errors)
+    return Turbulence(gust, sigma, evidence, floor, errors, by_law=gust * _side_doubt(fit))
+
+
+def _side_doubt(fit: Fit) -> float:
+    """Sigma of a side force by sideslip, as a share of it: at most that before the flight."""
+    names = [u.name for u in fit.model.unknowns]
+    if SLIP not in names:
+        return 0.0
+    k = names.index(SLIP)
+    known = min(float(fit.sigma[k]), fit.model.unknowns[k].plausible)
+    return known / max(abs(float(fit.theta[k])), TINY)
 
 
 def _pushed(fit: Fit) -> tuple[float, float, float]:

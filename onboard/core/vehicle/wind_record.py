@@ -9,6 +9,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.own import Own
 from onboard.core.vehicle.effects.wind_change import WindChange
+from onboard.core.vehicle.effects.wind_height import WindByHeight
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.noise import rms
@@ -36,6 +37,19 @@ def change_sentence(m: Matched) -> str:
     return (
         f"the wind became another: towards north and east from {north:.1f} and {east:.1f} m/s to "
         f"{n:.1f} and {e:.1f}; its mean is told, and no setting makes it"
+    )
+
+
+def height_sentence(m: Matched) -> str:
+    """What a person is told of a wind that is another one higher up; empty where it is not."""
+    by_height = next((e for e in m.model.effects if isinstance(e, WindByHeight)), None)
+    if by_height is None:
+        return ""
+    first = m.model.index(by_height.unknowns[0].name)
+    north, east = (100.0 * m.fit.theta[first : first + 2]).tolist()
+    return (
+        f"the wind is another one higher up: by {north:.1f} and {east:.1f} m/s towards north and "
+        f"east in 100 m; that at the mean height is told, and no setting makes the rest"
     )
 
 

@@ -123,6 +123,20 @@ def copter_flight(
     )
 
 
+def followed(commands, lag):
+    """Commands (k, n) behind a low-pass of ``lag`` s; straight lines between the steps."""
+    decay, late = np.exp(-STEP / lag), np.empty_like(commands)
+    for row, command in zip(late, commands, strict=True):
+        state = command[0]
+        for k in range(len(command)):
+            # The exact answer of a low-pass to a ramp.
+            before = command[k - 1] if k else command[0]
+            slope = (command[k] - before) / STEP
+            state = decay * (state - before + slope * lag) + command[k] - slope * lag
+            row[k] = state
+    return late
+
+
 def plane_flight(
     *,
     seed=1,
@@ -145,6 +159,8 @@ def plane_flight(
     gusts=0.0,
     rudder_by_slip=0.0,
     servo_lag=0.14,
+    kicks=0.0,
+    angles=0.02,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -153,15 +169,20 @@ def plane_flight(
     sideslip and by sideslip itself; standard deviations of the throttle, of a slow error of the
     recorded heading, rad, of the force's noise, m/s^2, and of gusts along each axis that carry the
     plane along, so that it flies through them as through still air, m/s.  The rudder moves at
-    random, and by the sideslip that it holds.  Servos and motor follow behind a low-pass, s.
+    random, and by the sideslip that it holds; or it is kicked this far to either side, and the
+    plane slips as it does; ``angles`` is the standard deviation of the angle of attack.  Servos
+    and motor follow behind a low-pass, s.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = 50.0 + STEP * np.arange(n)
     speed, yaw = 24.0 + smooth(rng, n, 3.0, 4.0), np.cumsum(smooth(rng, n, 0.25, 5.0)) * STEP
-    alpha, beta = -0.03 + smooth(rng, n, 0.02), smooth(rng, n, 0.03)
+    alpha, beta = -0.03 + smooth(rng, n, angles), smooth(rng, n, 0.03)
     pitch = smooth(rng, n, 0.1, 4.0)
     R = rotation_from_euler(smooth(rng, n, 0.4, 4.0), pitch, yaw)
+    kicked = kicks * np.repeat(rng.integers(-1, 2, n // 30 + 1), 30)[None, :n] if kicks else None
+    if kicked is not None:
+        beta = 0.3 * beta + 0.3 * followed(kicked, servo_lag)[0]
     x = speed / np.sqrt(1 + np.tan(alpha) ** 2 + np.tan(beta) ** 2)
     u = np.stack([x, x * np.tan(beta), x * np.tan(alpha)], axis=1)
     v_n = np.einsum("nij,nj->ni", R, u) + np.array([*wind, 0.0])
@@ -175,17 +196,8 @@ def plane_flight(
     drag = drag + slip_straight * np.abs(beta)
     throttle = 0.5 + np.clip(smooth(rng, n, throttle_swing), -0.48, 0.48)
     rudder = smooth(rng, n, 0.15 if not rudder_by_slip else 0.02) + rudder_by_slip * beta
-    decay = np.exp(-STEP / servo_lag)
-    late = np.empty((2, n))
-    for row, command in zip(late, (throttle, rudder), strict=True):
-        state = command[0]
-        for k in range(n):
-            # Straight lines between the steps: the exact answer of a low-pass to a ramp.
-            before = command[k - 1] if k else command[0]
-            slope = (command[k] - before) / STEP
-            lag = slope * servo_lag
-            state = decay * (state - before + lag) + command[k] - lag
-            row[k] = state
+    rudder = rudder if kicked is None else kicked[0]
+    late = followed(np.stack([throttle, rudder]), servo_lag)
     pull = ratio * late[0] - lost * np.sqrt(np.clip(late[0], 0.0, None)) * x
     pull = np.where(pull < 0.0, braking * pull, pull) - bend * (lost * x) ** 2
     f_b = np.stack(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.flight import History
 from onboard.core.vehicle.recursion import behind
 
 NOMINAL_S = 0.14
@@ -13,7 +14,11 @@ NOMINAL_S = 0.14
 
 
 class ServoLag(Effect):
-    """Commands pass a low-pass of this time constant; beside the effects."""
+    """Commands pass a low-pass of this time constant; beside the effects.
+
+    Also through steps that the flight is without: a step of the rudder is far from any model for a
+    moment, and what follows it is where its force is told from that of the sideslip.
+    """
 
     def __init__(self) -> None:
         """Nominally the simulator's."""
@@ -24,4 +29,6 @@ class ServoLag(Effect):
         if air.commands is None:
             return
         flight = air.flight
-        air.commands = behind(air.commands, values[0], flight.piece, flight.step_s)
+        past = flight.history or History(air.commands, flight.piece)
+        late = behind(past.commands, values[0], past.piece, flight.step_s)
+        air.commands = late if flight.history is None else late[flight.place]
