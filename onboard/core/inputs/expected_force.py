@@ -25,7 +25,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from onboard.core.inputs.joined import joined, runs, times, with_samples
-from onboard.core.inputs.limits import FLOOR_BINS, MOST, RESOLVED_S, SPECTRUM_BINS
+from onboard.core.inputs.limits import DROWNED, FLOOR_BINS, RESOLVED_S, SPECTRUM_BINS
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
@@ -71,7 +71,7 @@ def drowned(batches: Sequence[Batch], density: Array) -> bool:
     followed = (f > 0.0) & (f <= 0.5 / fixes)
     there = _averaged(density, SPECTRUM_BINS)[followed]
     share = white(density) / np.where(there > 0.0, there, np.inf)
-    return bool(len(share) and np.any(share.mean(axis=0) > MOST))
+    return bool(len(share) and np.any(share.mean(axis=0) > DROWNED))
 
 
 def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Batch]:

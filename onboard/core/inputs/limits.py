@@ -150,7 +150,7 @@ SPECTRUM_BINS: Final = 3
 FLOOR_BINS: Final = 21
 """The same where the least of it is looked for: the least of many is too small by chance, by a
 tenth [cost]."""
-MOST: Final = 0.5
+DROWNED: Final = 0.5
 """Share of noise in the force at a frequency of the fixes, in the mean of them, from which it is
 more noise than force [bound]."""
 
