@@ -269,7 +269,7 @@ class Engine:
         Args:
             levels: whether noise levels are not told.
         """
-        search = NoiseSearch(settled=not levels)
+        search = NoiseSearch(settled=not levels, blind=self._seed is None)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
         highest, best, idle = -math.inf, (self.point, self.noise), 0

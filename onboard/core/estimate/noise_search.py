@@ -16,17 +16,24 @@ from onboard.core.maths.arrays import Array
 class NoiseSearch:
     """Says which levels a filter bank should try next."""
 
-    def __init__(self, *, settled: bool = False) -> None:
-        """Take whether the levels stand, without a search."""
+    def __init__(self, *, settled: bool = False, blind: bool = False) -> None:
+        """Take where it begins.
+
+        Args:
+            settled: whether the levels stand, without a search.
+            blind: whether nothing is known of timing yet.  The first pass then finds that alone:
+                what it is off by would pass for noise.
+        """
         self._before: NoiseLevels | None = None
         self._way: list[NoiseLevels] = []
         self._failed = False
+        self._blind = blind and not settled
         self.settled = settled
         """Whether another step is expected to gain too little to be worth its pass."""
 
     def members(self, levels: NoiseLevels) -> tuple[NoiseLevels, ...]:
         """Levels of the next pass's bank, the first of them ``levels``."""
-        if self.settled:
+        if self.settled or self._blind:
             return (levels,)
         self._way = [] if self._before is None else between(self._before, levels, SHARES)
         return (levels, *self._way, *neighbours(levels))
@@ -48,7 +55,8 @@ class NoiseSearch:
             elsewhere: whether this pass was about another linearisation than the one before, whose
                 slopes have told the step.
         """
-        if self.settled:
+        if self.settled or self._blind:
+            self._blind = False
             return levels
         near = 1 + len(self._way)
         rise = np.array(log_likelihoods) - log_likelihoods[0]

@@ -1,14 +1,18 @@
 """What only costs time decides nothing: with twice the work a diagnosis says the same."""
 
+import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis import effort, examination, jumps, onsets, procedure, stepped
-from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.procedure import diagnose, examine
+from onboard.core.estimate.noise_search import NoiseSearch
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec
 
+TENTH = 0.1
+"""Sigmas: of one likelihood, whose top is found to half of a unit."""
 HALF = 0.5
 """Sigmas: noise levels that were found on a part of a flight are a little other ones."""
 
@@ -45,3 +49,25 @@ def test_twice_the_work_says_the_same(monkeypatch):
     one, two = found.calibration, again.calibration
     assert two.scale == pytest.approx(one.scale, abs=HALF * min(one.scale_sigma))
     assert two.offset == pytest.approx(one.offset, abs=HALF * min(one.offset_sigma))
+
+
+def test_where_an_accelerometers_noise_is_looked_for_first_costs_passes_and_no_answer(monkeypatch):
+    """The second one of a flight is asked from where the first has come to, or as if alone."""
+    turns = []
+    better = NoiseSearch.better
+    monkeypatch.setattr(
+        NoiseSearch, "better", lambda *a, **k: (turns.append(1), better(*a, **k))[1]
+    )
+    calibrator = heard(
+        FlightSpec(vehicle="copter", seed=29, duration=120.0, imus=random_imus(29, 2))
+    )
+    first = examine(calibrator, 1).engine
+    turns.clear()
+    alone, many = examine(calibrator, 2), len(turns)
+    turns.clear()
+    beside = examine(calibrator, 2, beside=first)
+    assert len(turns) < many
+    one, two = alone.calibration, beside.calibration
+    apart = np.subtract([*two.scale, *two.offset], [*one.scale, *one.offset])
+    assert np.all(np.abs(apart) < TENTH * np.array([*one.scale_sigma, *one.offset_sigma]))
+    assert beside.engine.point.delay == pytest.approx(alone.engine.point.delay, abs=1e-3)

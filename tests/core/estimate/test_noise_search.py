@@ -87,3 +87,14 @@ def test_levels_that_are_told_are_not_searched_for():
     assert search.members(told) == (told,)
     assert search.better(told, [1.0], np.zeros((1, 1))) == told
     assert search.settled
+
+
+def test_a_search_that_knows_no_timing_looks_for_that_alone_first():
+    start = NoiseLevels()
+    search = NoiseSearch(blind=True)
+    assert search.members(start) == (start,)
+    assert search.better(start, [0.0], np.zeros((1, 1)), elsewhere=True) is start
+    assert not search.settled
+    assert search.members(start) == (start, *neighbours(start))
+    told = NoiseSearch(blind=True, settled=True)
+    assert told.members(start) == told.members(start) == (start,)
