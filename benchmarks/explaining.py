@@ -117,7 +117,7 @@ def _true_unknowns(record: dict[str, Any], truth: dict[str, Any]) -> dict[str, f
             return {k: record[k] for k in "xyz"}
         case "saturation":
             return {"limit": record["limit"]}
-    skip = {"name", "imu", "reference", "width", "damping"}
+    skip = {"name", "imu", "reference", "square", "cube", "width", "damping"}
     return {k: float(v) for k, v in record.items() if k not in skip}
 
 
