@@ -20,12 +20,25 @@ def stuck(t: Array, x: Array, same: float) -> Mask:
     """
     if not len(t):
         return np.zeros(0, dtype=bool)
-    begins = np.concatenate([[True], np.any(np.abs(np.diff(x, axis=0)) > same, axis=1)])
-    run = np.cumsum(begins) - 1
-    first = np.flatnonzero(begins)
+    moves = np.any(np.abs(np.diff(x, axis=0)) > same, axis=1)
+    first = np.flatnonzero(np.concatenate([[True], moves]))
     last = np.append(first[1:], len(t)) - 1
-    # What creeps by less than that from sample to sample moves, too.
-    spread = np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)
-    stays = np.all(spread <= 2.0 * same, axis=1)
-    out: Mask = ((t[last] - t[first] >= STUCK_S) & stays)[run]
+    out: Mask = np.zeros(len(t), dtype=bool)
+    for k in np.flatnonzero(t[last] - t[first] >= STUCK_S):
+        there = slice(first[k], last[k] + 1)
+        out[there] = _at_rest(t[there], x[there], same)
+    return out
+
+
+def _at_rest(t: Array, x: Array, same: float) -> Mask:
+    """The samples that stay for long enough where most of them are.
+
+    A low-pass comes there by and by, at a high rate by less than ``same`` from sample to sample;
+    and what only creeps moves, too.
+    """
+    near = np.all(np.abs(x - np.median(x, axis=0)) <= same, axis=1)
+    edges = np.flatnonzero(np.diff(near, prepend=False, append=False))
+    out: Mask = np.zeros(len(t), dtype=bool)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        out[begin:end] = t[end - 1] - t[begin] >= STUCK_S
     return out

@@ -56,6 +56,22 @@ def test_a_filter_that_goes_on_by_its_roundings_does_not_hide_it(rate, value):
     assert np.all(stuck(t, f, SAME_M_S2))
 
 
+@pytest.mark.parametrize("every", [1, 2, 5, 20])
+@pytest.mark.parametrize("cutoff_hz", [5.0, 20.0, 80.0])
+def test_a_filter_that_comes_to_rest_by_and_by_does_not_hide_it(every, cutoff_hz):
+    """At the rates of logs it does so by less than a reading's tolerance from sample to sample."""
+    rate, died, ended = 1000.0, 3.0, 7.0
+    t = np.arange(0.0, 10.0, 1.0 / rate)
+    shaken = 0.3 * np.random.default_rng(4).standard_normal((len(t), 3))
+    shaken[(t >= died) & (t < ended)] = shaken[int(died * rate)]
+    filtered = np.column_stack([low_passed(x, cutoff_hz, rate) for x in shaken.T])[::every]
+    found = t[::every][stuck(t[::every], filtered, SAME_M_S2)]
+    settled_s = 2.0 / cutoff_hz + 2.0 * every / rate  # nine time constants, and two readings
+    assert died <= found[0] <= died + settled_s
+    assert ended - 0.05 <= found[-1] <= ended + 0.05
+    assert len(found) * every / rate >= ended - died - settled_s - 0.05
+
+
 def test_what_creeps_is_not_the_same():
     t = np.arange(0.0, 10.0, 0.02)
     creeping = np.column_stack([0.5 * SAME_M_S2 * np.arange(len(t))] * 3)
