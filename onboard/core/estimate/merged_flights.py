@@ -6,8 +6,9 @@ what is left of it for the others is a Gaussian of the six numbers, the prior ta
     N_i = P_i^-1 - P_0^-1,    b_i = N_i x_i,    x = (sum N_i + P_0^-1)^-1 (sum b_i + P_0^-1 x_0).
 
 With equal noise that is the solution of all samples together.  What is the same error in all of
-them, of covariance C that no flight tells, is left out of each, and added once to what they say
-together: N (1 - C N)^-1 there, and back again.
+them, of covariance C_i that the flight itself does not tell, is left out of each, N (1 - C_i N)^-1,
+and is an unknown u of all of them together: flight i is off by C_i^(1/2) u, of unit variance.  Who
+has none of it tells it, as far as it knows the six.
 
 *Agreement.*  Flights differ in directions that both of them know: those of the eigenvectors of
 ``P_a + P_b``, in units of the prior, whose eigenvalue is at most twice :data:`PRIOR_SHARE` squared.
@@ -78,14 +79,15 @@ class FlightSix:
             self.alike,  # of beta, which is the raw sensor's
         )
 
-    def without(self, alike: Array) -> tuple[Array, Array]:
-        """Information (6, 6) and vector (6,) of what is known but for variances (6,) in it."""
-        if not alike.any():
+    @property
+    def without_alike(self) -> tuple[Array, Array]:
+        """Information (6, 6) and vector (6,) of what is known but for the error that is alike."""
+        if not self.alike.any():
             return self.information, self.vector
         # Rounding must not let a flight know it better than it is alike.
-        root = np.sqrt(alike)
+        root = np.sqrt(self.alike)
         most = float(np.linalg.eigvalsh(self.information * np.outer(root, root))[-1])
-        left = np.eye(6) - self.information * (alike * min(1.0, KNOWN_ALIKE / most))
+        left = np.eye(6) - self.information * (self.alike * min(1.0, KNOWN_ALIKE / most))
         information: Array = np.asarray(np.linalg.solve(left, self.information), np.float64)
         vector: Array = np.asarray(np.linalg.solve(left, self.vector), np.float64)
         return information, vector
@@ -191,16 +193,7 @@ def merged(flights: Sequence[FlightSix], prior: Prior) -> Merged:
     """
     scatter = scatter_of([_in_units(f, prior) for f in flights])
     inflation = max(1.0, scatter.chi_square / scatter.dof) if scatter.dof else 1.0
-    alike = np.min([f.alike for f in flights], axis=0)
-    each = [f.without(alike) for f in flights]
-    information = np.sum([N for N, _ in each], axis=0) / inflation
-    vector = np.sum([b for _, b in each], axis=0) / inflation
-    if alike.any():
-        with_it = np.eye(6) + information * alike
-        information, vector = (
-            np.linalg.solve(with_it, information),
-            np.linalg.solve(with_it, vector),
-        )
+    information, vector = _together(flights, inflation)
     unit = prior.sigma
     inverse = np.linalg.inv(information * np.outer(unit, unit) + np.eye(6))
     change = inverse @ (unit * (vector - information @ prior.center))
@@ -208,6 +201,22 @@ def merged(flights: Sequence[FlightSix], prior: Prior) -> Merged:
     return Merged(
         prior.center + unit * change, (covariance + covariance.T) / 2, information, inflation
     )
+
+
+def _together(flights: Sequence[FlightSix], inflation: float) -> tuple[Array, Array]:
+    """Information (6, 6) and vector (6,) of all, with what is alike in some of them unknown."""
+    N, b, alike = np.zeros((12, 12)), np.zeros(12), False
+    for f in flights:
+        information, vector = f.without_alike
+        of_both = np.hstack([np.eye(6), np.diag(np.sqrt(f.alike))])
+        N += of_both.T @ information @ of_both / inflation
+        b += of_both.T @ vector / inflation
+        alike |= bool(f.alike.any())
+    if not alike:
+        return N[:6, :6], b[:6]
+    # Its unit variance is beforehand, whatever the scatter of the flights is.
+    told = np.linalg.solve(N[6:, 6:] + np.eye(6), np.column_stack([N[6:, :6], b[6:]]))
+    return N[:6, :6] - N[:6, 6:] @ told[:, :6], b[:6] - N[:6, 6:] @ told[:, 6]
 
 
 def reconciled(flights: Sequence[FlightSix], prior: Prior) -> Reconciled:

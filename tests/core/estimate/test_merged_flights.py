@@ -85,6 +85,23 @@ def test_a_flight_without_that_error_tells_it():
     assert np.all(np.sqrt(np.diag(got.covariance)) < GOOD * np.sqrt(got.inflation))
 
 
+def test_one_poor_flight_without_that_error_does_not_make_it_another_one_in_each_of_the_others():
+    rng = np.random.default_rng(5)
+    truth, sigma = drawn(rng), np.array([0.0, 0.0, 0.0, 0.05, 0.05, 0.05])
+    said = []
+    for _ in range(8):
+        alone = flight(rng, truth, GOOD, mixed=False, off=sigma)
+        P = np.linalg.inv(alone.information) + np.diag(sigma**2)
+        N, b = (
+            np.linalg.inv(P),
+            np.linalg.solve(P, np.linalg.solve(alone.information, alone.vector)),
+        )
+        said.append(FlightSix(N, b, N, b, sigma**2))
+    got = merged([*said, flight(rng, truth, 30.0 * GOOD, mixed=False)], PRIOR)
+    assert np.all(np.sqrt(np.diag(got.covariance))[3:] > 0.9 * sigma[3:])
+    assert np.all(np.abs(got.estimate - truth)[3:] < 3.0 * np.sqrt(np.diag(got.covariance))[3:])
+
+
 def test_intervals_hold_the_truth_and_what_no_flight_shows_keeps_the_prior():
     rng = np.random.default_rng(2)
     hover = np.where(np.arange(6) % 3 == 2, 1e4, 1.0) * GOOD
