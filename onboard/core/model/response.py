@@ -79,8 +79,8 @@ class Response:
         if less <= 0.0:
             return out
         even = v.averaged(t, window)
-        newer, older, leaning_old, leaning_new = v.paired(t, window, (less, 1.0 - less, 0.25, 0.75))
+        newer, older, most_new, most_old = v.paired(t, window, (less, 1.0 - less, 0.25, 0.75))
         out[0], out[1] = newer - even, older - even
-        out[2] = 0.5 * (leaning_old - leaning_new)
+        out[2] = 0.5 * (most_new - most_old)
         out[3] = v.lagged(t, window) - even
         return out

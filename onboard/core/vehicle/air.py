@@ -23,8 +23,8 @@ class Air:
         tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
         mass: (n,) over that at the start of the flight, or one.
-        commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 2) of a
-            plane: throttle and rudder.  None where they were not recorded.
+        commands: (n, 3) of a copter's motors, 0 to 1: mean, mean square, and evenness; (n, 4) of a
+            plane: throttle, rudder, elevator, flap.  None where they were not recorded.
         volts: (n,) of the battery; None where it was not recorded.
         power: (n,) mean over the motors of the thrust's share of the largest; by thrust_curve.
         thrust: (n,) specific force of the rotors, or of a plane's propeller at a standstill, from

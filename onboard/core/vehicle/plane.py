@@ -120,7 +120,7 @@ def plane_model(
     """Every effect of a plane that this recording can speak of.
 
     Args:
-        flight: with throttle and rudder, if the recording has outputs; of one, or of several.
+        flight: with throttle and surfaces, if the recording has outputs; of one, or of several.
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
         beyond: keys of what repeats with the motion, or with time, and is no effect's.

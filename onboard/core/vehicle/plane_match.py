@@ -43,7 +43,7 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     """What this flight has that the airframe lacks; None if it never flew as a plane does.
 
     Args:
-        flight: with throttle and rudder, if the recording has outputs.
+        flight: with throttle and surfaces, if the recording has outputs.
         frame: to compare with.
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2.
     """

@@ -77,7 +77,7 @@ class Handover:
         self._learner = learner
         self._notices = notices
         self._there = there
-        self._begun = False
+        self._begun = self._taught = False
         self._clock = clock
         self._wall_clock = wall_clock
         self._save_every_s = save_every_s
@@ -148,7 +148,7 @@ class Handover:
     @property
     def identified(self) -> bool:
         """Whether what was learned is of the autopilot that is there now."""
-        return self._begun and self.learned is not None
+        return self._begun and self._taught
 
     def gap(self, *, rebooted: bool = False) -> None:
         """The autopilot rebooted or is silent: another may answer next, so it is asked who it is.
@@ -163,7 +163,7 @@ class Handover:
         self._before_gap = [*(self._before_gap or ()), *(self._samples if self._begun else ())]
         if self._begun:
             self._samples = []
-        self._begun, self._arrived = False, None
+        self._begun, self._taught, self._arrived = False, False, None
 
     async def run(self) -> None:
         """Learn until cancelled."""
@@ -292,6 +292,8 @@ class Handover:
 
     def _accept(self, learned: Learned) -> None:
         self.learned = learned
+        # Until it has learned a batch of who is there, what is known is of who was there before.
+        self._taught = self._begun
         for news in learned.news:
             self._notices.post(news.kind, news.text, warning=news.warning)
         for listener in self._listeners:

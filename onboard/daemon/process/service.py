@@ -251,9 +251,8 @@ class Service:
             observe(sample, now)
 
     def _board_that_is_there(self) -> str | None:
-        """Its unique id, empty if it tells none, None while it may still tell it."""
-        board = self.parts.board
-        return board.uid if board.answered else None
+        """Its unique id, empty if it tells none; None while what was learned may be another's."""
+        return self.parts.board.uid if self.handover.identified else None
 
     # What people ask for (onboard.daemon.outlets.control.Actions)
 

@@ -144,8 +144,8 @@ class History:
     Args:
         directory: where its file lies, one for each board.
         clock: monotonic time, s.
-        board: the unique id of the board that is there in hex, empty if it tells none, None while
-            it may still tell it.
+        board: the unique id in hex of the board that the snapshot's estimates are of, empty if it
+            tells none, None while nobody knows.
     """
 
     def __init__(
