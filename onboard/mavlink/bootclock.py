@@ -50,7 +50,8 @@ class BootClock:
 
     After a silence a clock that has begun anew may be ahead of all that was heard before.  But both
     clocks go at the same rate: one that has gone on for less than ours by more than a link can
-    delay, and stays so for as long as what a link has held back takes to come, has begun anew.
+    delay, and stays so for as long as what a link has held back takes to come, has begun anew.  One
+    that catches up meanwhile is what is held back: it comes faster than it was stamped.
     """
 
     def __init__(self) -> None:
@@ -60,7 +61,7 @@ class BootClock:
         """Whether the last reboot was in a silence: its stamps have not gone back."""
         self._suspect: float | None = None
         self._heard: tuple[float, float] | None = None
-        self._silence: tuple[float, float, float] | None = None
+        self._silence: tuple[float, float, float, float] | None = None
         self._unix_offset: float | None = None
         self._paired = False
 
@@ -107,15 +108,19 @@ class BootClock:
         if self._heard is not None and self._silence is None:
             t, at = self._heard
             if now - at > LONGEST_DELAY_S:
-                self._silence = t, at, now
+                self._silence = t, at, now, (now - at) - (latest - t)
         self._heard = latest, now
         if self._silence is None:
             return
-        t, at, since = self._silence
-        if (now - at) - (latest - t) <= LONGEST_DELAY_S:
+        t, at, since, before = self._silence
+        behind = (now - at) - (latest - t)
+        if behind <= LONGEST_DELAY_S:
             self._silence = None
         elif now - since > LONGEST_DELAY_S:
-            self._begins_anew(latest, unseen=True)
+            if before - behind > limits.CLOCK_AGREES_S:
+                self._silence = t, at, now, behind
+            else:
+                self._begins_anew(latest, unseen=True)
 
     def _begins_anew(self, t: float, *, unseen: bool = False) -> None:
         self.reboots += 1

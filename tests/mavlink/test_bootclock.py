@@ -254,6 +254,15 @@ def test_what_a_link_has_held_back_is_no_reboot():
     assert clock.certain(160.0)
 
 
+@pytest.mark.parametrize("faster", [2.0, 3.0])
+def test_a_line_that_takes_long_to_give_what_it_held_back_is_no_reboot(faster):
+    clock, stalled, back = BootClock(), 110.0, 130.0
+    listened(clock, lambda now: now, every(100.0, stalled))
+    listened(clock, lambda now: min(now, stalled + faster * (now - back)), every(back, 170.0))
+    assert clock.reboots == 0
+    assert clock.certain(170.0)
+
+
 def test_a_reboot_that_is_seen_is_counted_once():
     clock = BootClock()
     listened(clock, lambda now: now, every(100.0, 110.0))
