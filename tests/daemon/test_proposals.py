@@ -35,12 +35,19 @@ def learned(*calibrations):
     return Learned({c.imu: c for c in calibrations}, trust, {}, flight=flight)
 
 
-def update(proposals, *calibrations, condition=LANDED):
+def update(proposals, *calibrations, condition=LANDED, system_id=1, board=""):
     parameters = {}
     for c in calibrations:
         parameters |= current(c.imu)
     known = learned(*calibrations)
-    proposals.update(0.0, system_id=1, learned=known, parameters=parameters, condition=condition)
+    proposals.update(
+        0.0,
+        system_id=system_id,
+        learned=known,
+        parameters=parameters,
+        condition=condition,
+        board=board,
+    )
     return {imu: set(p.held_back) for imu, p in proposals.current.items()}
 
 
@@ -77,6 +84,16 @@ def test_what_was_approved_is_worth_what_is_known_now():
     assert update(proposals, early)[1] == {"not_sure"}
     assert update(proposals, replace(early, covariance=FINE))[1] == set()
     assert proposals.ready().worth.probability > proposals.settings.sure
+
+
+def test_what_was_approved_of_one_board_is_not_of_another_one():
+    """Of a board that tells its id another system id makes no other one."""
+    proposals, known = Proposals(PolicySettings(), approval=True), calibration(covariance=FINE)
+    update(proposals, known, board="0a")
+    proposals.approve((1,))
+    assert update(proposals, known, board="0a", system_id=7)[1] == set()
+    assert update(proposals, known, board="0b")[1] == {"approval"}
+    assert update(proposals, known, board="0a")[1] == {"approval"}
 
 
 class TestAnotherAccelerometer:

@@ -357,6 +357,9 @@ class Proposals:
 
 def _lapsed(approved: PushPlan, plan: PushPlan) -> bool:
     """Whether what was approved is no longer what is there, or what is known."""
+    there = plan.vehicle
+    if not approved.vehicle.same_airframe(there.system_id, there.board):
+        return True
     return any(
         now.before != then.before
         or (
