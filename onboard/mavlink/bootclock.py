@@ -99,7 +99,8 @@ class BootClock:
             self._pair(message.time_unix_usec, message.time_boot_ms)
         if self.reboots != before:
             self._heard = self._silence = None
-        if now is not None and self.latest is not None:
+        # Unix time runs on through a reboot, and is no boot time before both are known at once.
+        if now is not None and self.latest is not None and boot_seconds(message) is not None:
             self._keep_pace(self.latest, now)
         return self.reboots != before
 

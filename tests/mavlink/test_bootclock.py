@@ -263,6 +263,14 @@ def test_a_line_that_takes_long_to_give_what_it_held_back_is_no_reboot(faster):
     assert clock.certain(170.0)
 
 
+def test_stamps_of_unix_time_tell_of_no_reboot_in_a_silence():
+    clock = BootClock()
+    for now in (*every(100.0, 110.0), *every(200.0, 220.0)):
+        stamp = round(1e6 * (1.7e9 + now))
+        clock.observe(mavlink.MAVLink_raw_imu_message(stamp, *[0] * 9), now)
+    assert clock.reboots == 0
+
+
 def test_a_reboot_that_is_seen_is_counted_once():
     clock = BootClock()
     listened(clock, lambda now: now, every(100.0, 110.0))
