@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeGuard, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -18,17 +18,16 @@ from onboard.answers.answer import Answer
 from onboard.answers.kept_motion import motion_of
 from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
+from onboard.answers.stands import fixes_of, said_to_stand, with_landings
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
-from onboard.core.inputs.airborne import STILL_RATE_RAD_S, Ground
+from onboard.core.inputs.airborne import STILL_RATE_RAD_S
 from onboard.core.inputs.boot_time import NEXT_S, Boots
 from onboard.core.inputs.range_checks import impossible
 from onboard.core.inputs.samples import (
-    FIX_3D,
     AirData,
     Battery,
-    GpsFix,
     ImuSample,
     Outputs,
     ParameterValue,
@@ -132,7 +131,7 @@ class Flown:
     def finish(self) -> object:
         """Everything is known now: find the ground, and learn from the rest."""
         self._keep(math.inf)
-        fixes = [s for s in self._kept if _counts(s)]
+        fixes = fixes_of(self._kept)
         if fixes:
             t = np.array([f.t for f in fixes])
             v = np.array([(f.v_n, f.v_e, math.nan if f.v_d is None else f.v_d) for f in fixes])
@@ -144,14 +143,14 @@ class Flown:
                     t,
                     v,
                     height,
-                    said=_said_to_stand(self._kept),
+                    said=said_to_stand(self._kept, fixes),
                     carried=self._carried(t, v),
                     rolls=self.kind != "copter",
                     wings=kind == "plane",
                 )
             self.ground = float(np.percentile(lasting_height(t, height), 0.5))
         step = _averaged_over(self._kept)
-        for sample in _with_landings(_slower(self._kept, step), self.grounded):
+        for sample in with_landings(_slower(self._kept, step), self.grounded):
             self.recorded.feed(sample)
         return self.recorded.finish()
 
@@ -364,37 +363,3 @@ def _mean(group: list[ImuSample]) -> ImuSample:
         last.w_step,
         last.source,
     )
-
-
-def _counts(sample: Sample) -> TypeGuard[GpsFix]:
-    """Whether it is a fix in three dimensions."""
-    return isinstance(sample, GpsFix) and sample.fix_type >= FIX_3D
-
-
-def _said_to_stand(samples: list[Sample]) -> Mask:
-    """(n,) whether the autopilot said, at each fix, that the vehicle is on the ground."""
-    word, said = Ground(), []
-    for sample in samples:
-        if isinstance(sample, VehicleState):
-            word.feed(sample)
-        elif _counts(sample):
-            said.append(word.grounded is True)
-    return np.array(said, dtype=bool)
-
-
-def _with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) -> list[Sample]:
-    """The samples, with the word that the vehicle has landed where it was on the ground."""
-    if not grounded:
-        return samples
-    out: list[Sample] = []
-    was: bool | None = None
-    for sample in samples:
-        if isinstance(sample, GpsFix):
-            now = any(a <= sample.t <= b for a, b in grounded)
-            if now is not was:
-                out.append(VehicleState(sample.t, landed=now))
-                was = now
-        if isinstance(sample, VehicleState) and sample.landed is not None and was is not None:
-            sample = VehicleState(sample.t, sample.armed, was, sample.kind)  # noqa: PLW2901
-        out.append(sample)
-    return out

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from onboard.core.inputs.samples import FIX_3D, AttitudeSample, GpsFix, ImuSample, Sample
+from onboard.answers.stands import fixes_of
+from onboard.core.inputs.samples import AttitudeSample, ImuSample, Sample
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.same_motion import Recorded
 
@@ -15,7 +16,7 @@ from onboard.core.vehicle.same_motion import Recorded
 def motion_of(kept: Sequence[Sample]) -> Recorded:
     """The samples of a recording as rows of its quantities."""
     inertial = [s for s in kept if isinstance(s, ImuSample)]
-    fixes = [s for s in kept if isinstance(s, GpsFix) and s.fix_type >= FIX_3D]
+    fixes = fixes_of(kept)
     return Recorded(
         force=_rows(((s.t, *s.f_b) for s in inertial), 4),
         rates=_rows(((s.t, *s.w_b) for s in inertial if s.w_b), 4),

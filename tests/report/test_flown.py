@@ -65,6 +65,36 @@ def test_what_is_still_and_as_low_as_a_stand_is_left_out_with_it():
     assert not any(standing(made, t) for t in np.arange(18.5, 41.5, 0.5))
 
 
+def plane_flight():
+    """A plane that stands, flies a minute and stands again; its receiver tells no climb."""
+    out = [VehicleState(0.0, kind="plane")]
+    rng = np.random.default_rng(8)
+    for t in np.arange(0.0, 100.0, 0.1).tolist():
+        up = float(np.interp(t, [15.0, 30.0, 70.0, 85.0], [0.0, 60.0, 60.0, 0.0]))
+        v = 18.0 if 12.0 <= t < 87.0 else 0.0
+        out.append(ImuSample(t, 1, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
+        if round(10 * t) % 2 == 0:
+            height = 100.0 + up + 0.1 * rng.standard_normal()
+            out.append(GpsFix(t, 1, 3, 0.5, 0.5, height, v, 0.0, None))
+    return out
+
+
+def test_fixes_that_telemetry_repeats_and_another_receivers_hide_no_stand():
+    """A stream at twice the receiver's rate has each fix twice: between most no time goes by."""
+    once, often = plane_flight(), []
+    for sample in once:
+        often.append(sample)
+        if isinstance(sample, GpsFix):
+            often += [sample, replace(sample, receiver=2, altitude=sample.altitude + 7.0)]
+    one, other = found(once), found(often)
+    assert len(one.grounded) >= 2
+    assert standing(one, 5.0)
+    assert standing(one, 95.0)
+    assert not any(standing(one, t) for t in np.arange(20.0, 80.0, 1.0))
+    assert other.grounded == one.grounded
+    assert other.ground == one.ground
+
+
 def test_streams_of_two_boots_are_apart():
     first, second = hop(cruise=1400.0, begin=20.0), hop(cruise=1600.0, begin=5.0)
     made = found([*first, *second])
