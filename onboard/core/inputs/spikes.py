@@ -28,6 +28,9 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.medians import NORMAL_MEDIAN
 
+AT_ONCE = 4096
+"""Samples whose neighbours are looked at at once: two megabytes [cost]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Spikes:
@@ -84,8 +87,12 @@ def _beside(raw: Array) -> Array:
     if len(raw) < 5:
         return np.stack([raw, raw])
     padded = np.pad(raw, ((2, 2), (0, 0)), mode="reflect", reflect_type="odd")
-    four = np.stack([padded[k : k + len(raw)] for k in (0, 1, 3, 4)])
-    out: Array = np.sort(four, axis=0)[1:3]
+    out = np.empty((2, *raw.shape))
+    for i in range(0, len(raw), AT_ONCE):
+        part = padded[i : i + AT_ONCE + 4]
+        four = np.stack([part[k : k + len(part) - 4] for k in (0, 1, 3, 4)])
+        four.sort(axis=0)
+        out[:, i : i + AT_ONCE] = four[1:3]
     return out
 
 
@@ -98,7 +105,10 @@ def _spread(off: Array) -> Array:
     for part in np.array_split(np.arange(len(off)), max(len(off) // SPREAD_SAMPLES, 1)):
         out[part] = np.median(size[part], axis=0)
     if len(off) > 2 * NEAR_SAMPLES:
-        near = np.median(sliding_window_view(size, NEAR_SAMPLES, axis=0), axis=-1)
+        windows = sliding_window_view(size, NEAR_SAMPLES, axis=0)
+        # A median copies what it is of: of all at once, half a kilobyte a sample.
+        parts = (windows[i : i + AT_ONCE] for i in range(0, len(windows), AT_ONCE))
+        near = np.concatenate([np.median(part, axis=-1) for part in parts])
         inner = slice(NEAR_SAMPLES, -NEAR_SAMPLES)
         before, after = near[: -NEAR_SAMPLES - 1], near[NEAR_SAMPLES + 1 :]
         out[inner] = np.maximum.reduce([out[inner], before, after])
