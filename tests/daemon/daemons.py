@@ -185,3 +185,31 @@ def held_back(service):
     """Why the first proposal is not written, by objection."""
     proposals = service.snapshot().push.proposals
     return proposals[0].held_back if proposals else {}
+
+
+async def push_done(service, vehicle):
+    """Have the confident answer written; what was in force before it."""
+    before = in_force(vehicle)
+    convinced(service, WANTED)
+    await until(lambda: service.snapshot().push.can_roll_back == (1,))
+    assert pushed(vehicle)
+    return before
+
+
+def notices(service, kind):
+    return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
+
+
+async def ticks(service, number):
+    """Let the service judge so many times."""
+    count = 0
+    judged = service.parts.pusher.consider
+
+    def counted(*args, **kwargs):
+        nonlocal count
+        count += 1
+        return judged(*args, **kwargs)
+
+    service.parts.pusher.consider = counted
+    await until(lambda: count >= number)
+    service.parts.pusher.consider = judged

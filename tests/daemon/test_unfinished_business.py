@@ -12,30 +12,14 @@ from tests.daemon.daemons import (
     held_back,
     in_force,
     made,
+    notices,
+    push_done,
+    ticks,
     until,
 )
 from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
 
 pytestmark = pytest.mark.virtual_time
-
-
-def notices(service, kind):
-    return [notice.text for notice in service.snapshot().notices if notice.kind == kind]
-
-
-async def ticks(service, number):
-    """Let the service judge so many times."""
-    count = 0
-    judged = service.parts.pusher.consider
-
-    def counted(*args, **kwargs):
-        nonlocal count
-        count += 1
-        return judged(*args, **kwargs)
-
-    service.parts.pusher.consider = counted
-    await until(lambda: count >= number)
-    service.parts.pusher.consider = judged
 
 
 async def crashed_in_the_middle(document, vehicle):
@@ -49,12 +33,6 @@ async def crashed_in_the_middle(document, vehicle):
     await asyncio.gather(task, return_exceptions=True)
     vehicle.mute_after_sets = None
     vehicle.sets.clear()
-
-
-async def pushed(service, vehicle):
-    convinced(service, WANTED)
-    await until(lambda: service.snapshot().push.can_roll_back == (1,))
-    assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
 
 
 async def test_an_open_write_of_another_vehicle_is_said_once_and_waits(document, daemon, port):
@@ -107,7 +85,7 @@ async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, da
 
 async def test_what_a_reboot_has_kept_stays(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         vehicle.sets.clear()
         vehicle.reboot()
         await until(lambda: notices(service, "push_stored"))
@@ -118,7 +96,7 @@ async def test_what_a_reboot_has_kept_stays(document, daemon, port):
 async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = in_force(vehicle)
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         vehicle.parameters["INS_ACCSCAL_Y"] = before[1]  # was not stored
         vehicle.reboot()
         await until(lambda: notices(service, "push_not_stored"))
@@ -133,7 +111,7 @@ async def test_what_a_reboot_has_lost_in_part_is_undone_altogether(document, dae
 async def test_a_way_back_that_a_reboot_has_lost_is_said_and_offered_again(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = in_force(vehicle)
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         values = in_force(vehicle)
         await until(lambda: service.snapshot().push.state == "idle")
         await service.rollback((1,))
@@ -150,7 +128,7 @@ async def test_a_way_back_that_a_reboot_has_lost_is_said_and_offered_again(docum
 async def test_of_values_found_worse_a_way_back_that_was_lost_is_gone_again(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = in_force(vehicle)
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         values = in_force(vehicle)
         push = service.parts.pusher
         transaction = push._ledger.in_force(1).transaction
@@ -175,7 +153,7 @@ async def test_a_reboot_while_the_daemon_was_off_is_audited_at_its_start(documen
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         async with daemon(document) as service:
-            await pushed(service, vehicle)
+            await push_done(service, vehicle)
         for name, value in zip(SIX, before, strict=True):
             vehicle.parameters[name] = value
         vehicle.sets.clear()
@@ -195,7 +173,7 @@ async def test_what_somebody_has_set_before_our_eyes_stays_whatever_comes(
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         async with daemon(document) as service:
-            await pushed(service, vehicle)
+            await push_done(service, vehicle)
             await service.reject((1,))
         document["push"] |= push
         async with daemon(document) as service:
@@ -230,7 +208,7 @@ async def test_what_a_reboot_in_a_silence_has_lost_is_nobodys_will(document, dae
     async with daemon(document) as service, Vehicle(port) as vehicle:
         vehicle.boot_ms = 1000.0
         before = in_force(vehicle)
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         await service.reject((1,))
         await until(lambda: service.parts.parameters.complete)
         await ticks(service, 20)
@@ -262,7 +240,7 @@ async def test_what_nobody_has_seen_come_is_asked_and_put_back_when_a_person_say
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         async with daemon(document) as service:
-            await pushed(service, vehicle)
+            await push_done(service, vehicle)
         vehicle.parameters["INS_ACCSCAL_Y"] = before[1]  # lost, or set: nobody was there
         vehicle.sets.clear()
         document["push"]["policy"] = policy
@@ -288,7 +266,7 @@ async def test_with_a_person_to_be_asked_even_what_a_reboot_has_lost_is_asked(
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         async with daemon(document) as service:
-            await pushed(service, vehicle)
+            await push_done(service, vehicle)
         document["push"]["approval"] = True
         async with daemon(document) as again:
             await until(lambda: notices(again, "push_stored"))
@@ -303,7 +281,7 @@ async def test_with_a_person_to_be_asked_even_what_a_reboot_has_lost_is_asked(
 
 async def test_what_somebody_has_set_since_is_not_touched_by_an_audit(document, daemon, port):
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        await pushed(service, vehicle)
+        await push_done(service, vehicle)
         await service.reject((1,))
         vehicle.sets.clear()
         vehicle.parameters["INS_ACCSCAL_Y"] = 1.03125
@@ -326,94 +304,3 @@ async def test_a_daemon_started_in_flight_waits_for_the_landing(document, daemon
             assert in_force(vehicle) == before
             vehicle.armed, vehicle.landed = False, True
             await until(lambda: service.snapshot().push.can_roll_back == (1,))
-
-
-async def test_a_proposal_outlives_the_service(document, daemon, port):
-    document["push"]["approval"] = True
-    async with Vehicle(port) as vehicle:
-        async with daemon(document) as service:
-            convinced(service, WANTED, effects=("gps_latency",))
-            await until(lambda: service.snapshot().push.approval_needed)
-            (proposed,) = service.snapshot().push.proposals
-            diagnosis = service.snapshot().diagnosis
-        async with daemon(document) as again:
-            await until(lambda: again.snapshot().push.approval_needed)
-            (resumed,) = again.snapshot().push.proposals
-            assert resumed.changes == proposed.changes
-            assert resumed.held_back.keys() == {"approval", "unconfirmed"}
-            assert again.snapshot().diagnosis == diagnosis
-            found = [line for line in again.snapshot().journal if line.kind == "found"]
-            assert len(found) == 1, "it was made once"
-            await again.approve((1,))
-            await until(lambda: again.snapshot().push.can_roll_back == (1,))
-            assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
-
-
-async def test_what_the_diagnosis_forbids_it_forbids_after_a_restart(document, daemon, port):
-    async with Vehicle(port) as vehicle:
-        async with daemon(document) as service:
-            convinced(service, WANTED, missing="the antenna is elsewhere")
-            await until(lambda: "physics_missing" in held_back(service))
-        async with daemon(document) as again:
-            await until(lambda: "physics_missing" in held_back(again))
-            await until(lambda: held_back(again).keys() == {"physics_missing", "unconfirmed"})
-            assert vehicle.sets == []
-
-
-async def test_a_diagnosis_is_of_one_sensor_and_of_no_other(document, daemon, port):
-    async with Vehicle(port) as vehicle:
-        async with daemon(document) as service:
-            vehicle.armed = True
-            convinced(service, WANTED)
-            await until(lambda: held_back(service).keys() == {"armed"})
-        vehicle.armed = False
-        vehicle.parameters["INS_ACC_ID"] = 4711.0
-        async with daemon(document) as again:
-            await until(lambda: again.parts.parameters.complete)
-            await ticks(again, 20)
-            assert again.snapshot().push.proposals == ()
-            assert vehicle.sets == []
-
-
-@pytest.mark.slow
-async def test_a_new_flight_ends_what_was_kept(document, daemon, port):
-    async with Vehicle(port) as vehicle:
-        async with daemon(document) as service:
-            vehicle.armed = True
-            convinced(service, WANTED)
-            await until(lambda: held_back(service).keys() == {"armed"})
-        async with daemon(document) as again:  # the vehicle is flying when it starts
-            await until(lambda: again.snapshot().link.armed)
-            await until(lambda: again.parts.parameters.complete)
-            vehicle.armed = False
-            await until(lambda: again.snapshot().link.armed is False)
-            await ticks(again, 20)
-            assert vehicle.sets == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", ["rejected", "rolled back"])
-async def test_what_a_person_has_refused_stays_refused_after_a_restart(document, daemon, port, how):
-    async with Vehicle(port) as vehicle:
-        before = in_force(vehicle)
-        async with daemon(document) as service:
-            if how == "rejected":
-                vehicle.armed = True
-                convinced(service, WANTED)
-                await until(lambda: service.snapshot().push.proposals)
-                await service.reject((1,))
-            else:
-                await pushed(service, vehicle)
-                await until(lambda: service.snapshot().link.armed is False)
-                await service.rollback(())
-                await until(lambda: service.snapshot().push.can_roll_back == ())
-        vehicle.armed = False
-        async with daemon(document) as again:
-            await until(lambda: "refused" in held_back(again))
-            await ticks(again, 20)
-            assert in_force(vehicle) == before
-            await again.approve((1,))
-            await until(lambda: again.snapshot().push.can_roll_back == (1,))
-        async with daemon(document) as third:
-            await until(lambda: third.parts.parameters.complete)
-            assert third.parts.journal.refusals() == {}

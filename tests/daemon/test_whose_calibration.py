@@ -8,9 +8,16 @@ import asyncio
 import pytest
 
 from onboard.push.entries import Planned
-from tests.daemon.daemons import calibration, convinced, until
+from tests.daemon.daemons import (
+    calibration,
+    convinced,
+    held_back,
+    in_force,
+    push_done,
+    ticks,
+    until,
+)
 from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
-from tests.daemon.test_unfinished_business import held_back, in_force, ticks
 
 pytestmark = pytest.mark.virtual_time
 WANTED = calibration()
@@ -232,9 +239,7 @@ async def test_a_system_id_that_is_set_while_the_service_runs_is_followed(
 ):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         vehicle.board = board
-        before = in_force(vehicle)
-        convinced(service, WANTED)
-        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        before = await push_done(service, vehicle)
         await until(lambda: service.snapshot().push.state == "idle")
         vehicle.sets.clear()
         vehicle.rename(7)
@@ -260,9 +265,7 @@ async def test_a_board_with_another_system_id_is_known_again_if_it_says_which_it
 ):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         vehicle.board = board
-        before = in_force(vehicle)
-        convinced(service, WANTED)
-        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        before = await push_done(service, vehicle)
         await until(lambda: service.snapshot().push.state == "idle")
         vehicle.stop_talking()
         async with Vehicle(port, system=7, parameters=vehicle.parameters) as renamed:

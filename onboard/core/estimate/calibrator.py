@@ -172,11 +172,8 @@ class Calibrator:
 
     def _may_forget(self, block: Block) -> bool:
         """Whether an accelerometer may be begun anew; that HIGHRES_IMU came goes with it."""
-        receivers = {s.receiver for s in block.others if isinstance(s, GpsFix)}
-        known = {self._trust.receiver} - {None}
-        names = {s.name for s in block.others if isinstance(s, ParameterValue)}
-        told = names & {*OF_ACCELEROMETER, "AHRS_ORIENTATION"}
-        return bool(told) or len(receivers | known) > 1
+        told = block.parameters & {*OF_ACCELEROMETER, "AHRS_ORIENTATION"}
+        return bool(told) or len(block.receivers | ({self._trust.receiver} - {None})) > 1
 
     def go_through(self, block: Block) -> Iterator[tuple[Sample | None, float, tuple[Event, ...]]]:
         """Take a block that is admitted, to the end.

@@ -47,7 +47,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 
 KNOWN_ALIKE = 1.0 - 1e-6
-"""Share of what is known of a number, at the most, that may be an error alike in all flights."""
+"""Share of what is known of a number, at the most, that may be an error alike in all flights: what
+is left of it must not be rounding [bound]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S
 from onboard.core.inputs.limits import HIGHRES_S
 from onboard.core.inputs.range_checks import attitudes_possible, imu_possible
-from onboard.core.inputs.samples import AttitudeSample, ImuSample, ImuSource, Sample
+from onboard.core.inputs.samples import (
+    AttitudeSample,
+    GpsFix,
+    ImuSample,
+    ImuSource,
+    ParameterValue,
+    Sample,
+)
 from onboard.core.maths.arrays import Array
 
 Places: TypeAlias = NDArray[np.int64]
@@ -150,6 +157,16 @@ class Block:
             and self.attitude.is_plain
             and not back.any()
         )
+
+    @property
+    def receivers(self) -> frozenset[int]:
+        """Receivers whose fixes are in it."""
+        return frozenset(s.receiver for s in self.others if isinstance(s, GpsFix))
+
+    @property
+    def parameters(self) -> frozenset[str]:
+        """Names of parameters that are reported in it."""
+        return frozenset(s.name for s in self.others if isinstance(s, ParameterValue))
 
     @property
     def first_imu(self) -> float:

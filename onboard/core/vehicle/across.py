@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import SIDE, UP
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.instruments import told_by
@@ -28,9 +29,6 @@ from onboard.core.vehicle.limits import ROUNDS, SETTLED
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.windows import Windows, windows_of
-
-SIDE, UP = 1, 2
-"""Body axes of the two."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,9 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gusts import signed_square
 
+AHEAD, SIDE, UP = 0, 1, 2
+"""Axes of the body: x, y, z."""
+
 
 class Air:
     """What effects read and change on the way from a flight to a predicted force.

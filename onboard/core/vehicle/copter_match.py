@@ -34,7 +34,13 @@ from onboard.core.vehicle.effects.voltage_sag import VoltageSag
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import AMBIGUOUS, APART, FEWEST_FLIGHTS, RECEIVER_M_S
+from onboard.core.vehicle.limits import (
+    AMBIGUOUS,
+    APART,
+    FEWEST_FLIGHTS,
+    MOST_BEYOND,
+    RECEIVER_M_S,
+)
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, held_out, likelier, matched
 from onboard.core.vehicle.model import ForceModel
@@ -62,9 +68,6 @@ RIVAL_FORMS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 """Where an effect was found, another form of the model; see :func:`_better`."""
 NOTHING_SHOWN = "this flight would have shown no effect at any plausible size"
-MOST_BEYOND = 3
-"""Laws that no effect has, and are let in one after the other; with more the model is another
-one [cost]."""
 
 
 def match_copter(

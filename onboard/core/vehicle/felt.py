@@ -24,7 +24,8 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
-from onboard.core.vehicle.across import SIDE, UP, Rows, across, side_places, whitened_axis
+from onboard.core.vehicle.across import Rows, across, side_places, whitened_axis
+from onboard.core.vehicle.air import AHEAD, SIDE, UP
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.drag import Drag
@@ -39,7 +40,7 @@ from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel
 from onboard.core.vehicle.windows import windows_of
 
-AHEAD, SENSED, NONE = 0, -1, -1
+SENSED, NONE = -1, -1
 """Places of the axes: a plane with throttle and airspeed has x, y, z and the sensor."""
 STEPS = 25
 """Steps at the most: what is left is nearly linear [cost]."""
@@ -67,7 +68,7 @@ class Felt:
 def felt_by(fit: Fit) -> Felt | None:
     """The fit with drag and thrust found anew; None where there is nothing to find them by."""
     model = fit.model
-    if model.axes != (AHEAD, 1, UP, 3):
+    if model.axes != (AHEAD, SIDE, UP, 3):
         return None
     mine = _told_ahead(model)
     theta = _balanced(model, fit.theta)

@@ -15,15 +15,14 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.air import AHEAD, UP
 from onboard.core.vehicle.effects.lift import Lift
-from onboard.core.vehicle.felt import AHEAD, Felt
+from onboard.core.vehicle.felt import Felt
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.model import GUST
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
 
-UP = 2
-"""Body axis along which a wing feels air that rises."""
 LEAST_SLOPE = 1e-6
 """1/s: a force that no gust changes tells nothing of gusts [physics]."""
 

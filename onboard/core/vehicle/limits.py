@@ -188,6 +188,11 @@ m/s [data sheet]."""
 ANOTHER_MASS: Final = 1.0
 """Of the logarithm: no vehicle flies with a third or with three times its mass [physics]."""
 
+# Laws that no effect has (copter_match, plane_match).
+
+MOST_BEYOND: Final = 3
+"""Of them that are let in one after the other; with more the model is another one [cost]."""
+
 # What is shown (flown_alone, curves).
 
 ALONE_S: Final = 10.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.agreement import told_alone
+from onboard.core.vehicle.air import SIDE
 from onboard.core.vehicle.airframe_file import numbers_of_file
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -17,7 +18,7 @@ from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import FEWEST_STEPS, RECEIVER_M_S
+from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
 from onboard.core.vehicle.noise import rms
@@ -27,13 +28,8 @@ from onboard.core.vehicle.plane_curves import plane_curves
 from onboard.core.vehicle.records import Difference, VehicleMatch
 from onboard.core.vehicle.structure import structures
 
-MOST_BEYOND = 3
-"""Laws that no effect has, and are let in one after the other; with more the model is another
-one [cost]."""
 LEAST_INDUCED = 0.01
 """Of the file's induced drag, that a file may have where there is none [use]."""
-SIDE = 1
-"""Body axis of the side force."""
 MANOEUVRES = {
     e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, SideForce, WindProfile)
 }

@@ -16,6 +16,7 @@ HELICOPTERS = (6.0, 11.0, 13.0)
 """FRAME_CLASS of what has a swash plate, whose servos have the numbers of motors."""
 THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
 FLAP_FUNCTIONS = (3, 2)
+"""SERVOn_FUNCTION of flaps that go by themselves, and of those that a pilot sets."""
 
 
 @dataclass(frozen=True, slots=True)

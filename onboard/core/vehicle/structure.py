@@ -16,7 +16,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
-from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.air import AHEAD, SIDE, UP, Air
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.effects.beyond import LAWS, Beyond, Law
 from onboard.core.vehicle.effects.effect import Effect
@@ -25,14 +25,14 @@ from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
 from onboard.core.vehicle.fit import Fit, Slopes, inflation_of, slopes_at, summed
-from onboard.core.vehicle.gust_errors import UP, rising
+from onboard.core.vehicle.gust_errors import rising
 from onboard.core.vehicle.limits import FALSE_ALARM, RECEIVER_M_S, SURE
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.places import FORCE
 
 ASKED = "asked"
 """Name of what is asked about, while it is."""
-LEVEL = (0, 1)
+LEVEL = (AHEAD, SIDE)
 """Axes along which a wind that changes is asked whether it matters."""
 
 

@@ -33,7 +33,7 @@ LARGEST = 4_000_000
 SAVE_S = 300.0
 """Between two writes to the disk; SD cards wear."""
 BOARDS_KEPT = 64
-"""Boards whose charts are kept, as many as there are sums of; the oldest give way."""
+"""Boards whose charts are kept, as many as there are sums of; the oldest give way [cost]."""
 BACK_S = 1.0
 """Trusted time that went back by more: the estimates have begun anew."""
 

@@ -12,22 +12,11 @@ from onboard.core.vehicle.flight import History
 from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
-from onboard.core.vehicle.plane_match import match_plane
 from onboard.core.vehicle.several import joined
 from tests.core.vehicle.flights import STEP, G, plane_flight
+from tests.core.vehicle.planes import SIGMA, matched, names
 
 pytestmark = pytest.mark.slow
-SIGMA = np.array([0.003, 0.003, 0.01])
-
-
-def matched(flight):
-    match = match_plane(flight, PlaneAirframe(), SIGMA)
-    assert match is not None
-    return match
-
-
-def names(match):
-    return {d.name for d in match.effects}
 
 
 def test_the_nominal_plane_is_clean_whichever_way_its_airspeed_is_reckoned():
@@ -337,94 +326,3 @@ def test_several_flights_keep_their_commands_apart():
     together = Air(joined(flights))
     model.act(together, [0.2])
     assert together.commands == pytest.approx(np.concatenate(alone), abs=1e-9)
-
-
-def upwards(flight, coefficient):
-    """A force across the flow, by the pressure of still air."""
-    q = 0.5 * flight.rho**2 / 1.225 * np.sum(flight.v_b**2, axis=1) * 0.45 / 2.0
-    alpha = np.arctan2(flight.v_b[:, 2], flight.v_b[:, 0])
-    flight.f_b[:, 0] += q * coefficient(alpha) * np.sin(alpha)
-    flight.f_b[:, 2] -= q * coefficient(alpha) * np.cos(alpha)
-    return flight
-
-
-def test_lift_that_bends_is_no_air_and_its_line_is_told():
-    flight = plane_flight(seed=41, angles=0.04)
-    bent = upwards(flight, lambda alpha: -40.0 * (alpha + 0.03) ** 2)
-    match = matched(bent)
-    assert "no line over the angle of attack" in match.note
-    assert "turbulence" not in names(match)
-    assert not match.explained
-    assert match.numbers["lift.c_lift_a"].real == pytest.approx(6.9, rel=0.2)
-
-
-def test_a_wind_that_is_another_one_higher_up_is_no_gust():
-    flight = plane_flight(seed=42, reading=1.0)
-    climbed = np.linspace(0.0, 200.0, len(flight))
-    blown = 0.02 * (climbed - climbed.mean())
-    flight.height[:] += climbed
-    flight.v_n[:, 0] += blown
-    flight.v_b[:] = np.einsum("nij,nj->ni", flight.R_bn, flight.v_n)
-    match = matched(flight)
-    assert not {"turbulence", "lift", "drag", "side_force"} & names(match)
-    assert "the wind" in match.note
-
-
-def test_an_airspeed_that_is_off_by_as_much_at_every_speed_has_no_other_scale():
-    flight = plane_flight(seed=43, reading=1.0)
-    flight.airspeed[:] += 1.5
-    match = matched(flight)
-    assert names(match) == set()
-    assert "reads off by as much at every speed" in match.note
-    assert not match.explained
-
-
-@pytest.mark.parametrize("seed", [51, 52, 53])
-@pytest.mark.parametrize("reading", [None, 1.0])
-def test_gusts_repeat_with_nothing_that_a_plane_does(seed, reading):
-    match = matched(plane_flight(seed=seed, wind=(3.0, 1.0), gusts=0.5, reading=reading))
-    assert "repeats" not in match.note
-    assert not {"lift", "side_force"} & names(match)
-    for effect in match.effects:
-        if effect.name == "turbulence" and reading is None:
-            # Known no better than the side force that shows it.
-            assert abs(effect.values["rms"].real - 0.5) < 2.0 * effect.values["rms"].sigma
-
-
-def test_a_plane_that_hardly_slips_shows_no_side_force_and_its_wind_is_right():
-    """A force of none fits what there is of sideslip, whatever the force is, in any wind across."""
-    flight = plane_flight(seed=44, wind=(0.0, 4.0))
-    still = flight.v_b - np.einsum("nij,j->ni", flight.R_bn, [0.0, 4.0, 0.0])
-    still[:, 1] = 0.0
-    flight.v_n[:] = np.einsum("nji,nj->ni", flight.R_bn, still)
-    flight.v_n[:, 1] += 4.0
-    noise = np.random.default_rng(1).normal(0.0, 0.02, flight.v_n.shape)
-    flight.v_b[:] = np.einsum("nij,nj->ni", flight.R_bn, flight.v_n + noise)
-    flight.commands[:, 1] = 0.0
-    flight.f_b[:, 1] = np.random.default_rng(2).normal(0.0, 0.02, len(flight))
-    match = matched(flight)
-    assert "side_force" not in names(match)
-    assert "side_force" in {n.name for n in match.not_testable}
-    assert match.wind.east == pytest.approx(4.0, abs=0.2)
-
-
-def test_without_outputs_nothing_is_said_of_the_side_force():
-    """A rudder that nobody recorded goes with the sideslip."""
-    flight = replace(plane_flight(seed=45, c_y_b=-0.4), commands=np.zeros((2400, 0)))
-    match = matched(flight)
-    assert "side_force" not in names(match)
-    assert "no rudder output" in {n.name: n.why for n in match.not_testable}["side_force"]
-
-
-def test_a_file_may_have_no_induced_drag():
-    """What is told as none is not handed back as what the file had before."""
-    flight = plane_flight(seed=46)
-    alpha = np.arctan2(flight.v_b[:, 2], flight.v_b[:, 0])
-    lift = 0.56 + 6.9 * alpha
-    flight = upwards(flight, lambda alpha: 0.0 * alpha)
-    q = 0.5 * flight.rho**2 / 1.225 * np.sum(flight.v_b**2, axis=1) * 0.45 / 2.0
-    flight.f_b[:, 0] += q * lift**2 * PlaneAirframe().induced * np.cos(alpha)
-    flight.f_b[:, 2] += q * lift**2 * PlaneAirframe().induced * np.sin(alpha)
-    match = matched(flight)
-    assert names(match) == {"drag"}
-    assert PlaneAirframe.of(match.frame).induced < 0.2 * PlaneAirframe().induced

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.air import AHEAD, SIDE, UP, Air
 from onboard.core.vehicle.effects.airspeed_scale import COLUMN
 from onboard.core.vehicle.effects.beyond import Law
 from onboard.core.vehicle.plane_airframe import ELEVATOR, FLAP, THROTTLE
@@ -122,27 +122,26 @@ def _read_off(air: Air) -> Array:
 
 
 READ_OFF = "the airspeed reads off by as much at every speed, and no setting makes that"
-AHEAD, SIDE, UP, SENSED = (0,), (1,), (2,), (COLUMN,)
 WINGS: Mapping[str, Law] = {
-    "bent": Law(_bent, 10.0, "1/rad^2", "of lift that is no line over the angle of attack", UP),
-    "polar": Law(_polar, 0.1, "1", "of drag that is least at another lift than none", AHEAD),
+    "bent": Law(_bent, 10.0, "1/rad^2", "of lift that is no line over the angle of attack", (UP,)),
+    "polar": Law(_polar, 0.1, "1", "of drag that is least at another lift than none", (AHEAD,)),
     "pitching": Law(
-        _pitching, 1.0, "m", "along the lift that goes with the rate of pitch", UP, answers=True
+        _pitching, 1.0, "m", "along the lift that goes with the rate of pitch", (UP,), answers=True
     ),
-    "slipping": Law(_slipping, 2.0, "1/rad^2", "along the lift that goes with sideslip", UP),
+    "slipping": Law(_slipping, 2.0, "1/rad^2", "along the lift that goes with sideslip", (UP,)),
     "rolling": Law(
-        _rolling, 0.5, "m", "to the side that goes with the rate of roll", SIDE, answers=True
+        _rolling, 0.5, "m", "to the side that goes with the rate of roll", (SIDE,), answers=True
     ),
     "yawing": Law(
-        _yawing, 0.5, "m", "to the side that goes with the rate of yaw", SIDE, answers=True
+        _yawing, 0.5, "m", "to the side that goes with the rate of yaw", (SIDE,), answers=True
     ),
-    "pulled_up": Law(_pulled_up, 0.1, "1", "upwards that goes with the throttle", UP),
-    "curved": Law(_curved, 1.0, "1", "of thrust that is no line over the throttle", AHEAD),
+    "pulled_up": Law(_pulled_up, 0.1, "1", "upwards that goes with the throttle", (UP,)),
+    "curved": Law(_curved, 1.0, "1", "of thrust that is no line over the throttle", (AHEAD,)),
     "by_elevator": Law(
-        _by_elevator, 0.5, "1", "along the lift that goes with the elevator", UP, answers=True
+        _by_elevator, 0.5, "1", "along the lift that goes with the elevator", (UP,), answers=True
     ),
-    "by_flap": Law(_by_flap, 0.5, "1", "along the lift that goes with the flaps", UP),
-    "read_off": Law(_read_off, 1.0, "m/s", READ_OFF, SENSED, sensed=True),
-    "flap_drag": Law(_flap_drag, 0.1, "1", "along the flow that goes with the flaps", AHEAD),
+    "by_flap": Law(_by_flap, 0.5, "1", "along the lift that goes with the flaps", (UP,)),
+    "read_off": Law(_read_off, 1.0, "m/s", READ_OFF, (COLUMN,), sensed=True),
+    "flap_drag": Law(_flap_drag, 0.1, "1", "along the flow that goes with the flaps", (AHEAD,)),
 }
 """Of low order in angles, rates and controls, and no effect's of a plane."""
