@@ -17,14 +17,19 @@ its supply are good for.  Of what falls by more the fit says how well it is know
 
 
 class VoltageSag(Effect):
-    """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds."""
+    """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds.
+
+    More is not to be had: a motor turns no faster than its voltage lets it, and less where its
+    load, which grows with the speed, takes from it.  What falls more has another cause beside.
+    """
 
     name = "voltage_sag"
     manoeuvre = "fly from a full battery to the warning, with full throttle now and then"
 
     def __init__(self, full_voltage: float) -> None:
         """Nominally a constant voltage (battCapacityAh 0)."""
-        super().__init__([Unknown("share", 0.0, 1.0, FLOOR, "1", doubt=0.005)])
+        share = Unknown("share", 0.0, 1.0, FLOOR, "1", doubt=0.005, most=1.0)
+        super().__init__([share])
         self.full_voltage = full_voltage
 
     def act(self, air: Air, values: Sequence[float]) -> None:
