@@ -2,9 +2,9 @@
 
 Commands, voltage, density, climb and drag along the axis are effects; so are numbers beside them
 for all that is linear or square in the climb.  What is left are laws of the flow across the rotors,
-of what lasts (motors that get warm), and of turning.  Each is taken without the part that effects could
-have made on this flight (a constant, the voltage's course, drag along the axis): the numbers that
-are told stay those of the effects that are nearest to it.
+of what lasts (motors that get warm), and of turning.  Each is taken without the part that effects
+could have made on this flight (a constant, the voltage's course, drag along the axis): the numbers
+that are told stay those of the effects that are nearest to it.
 """
 
 from __future__ import annotations

@@ -15,6 +15,9 @@ LEAST_FALL = 0.002
 """Relative scatter of the voltage without which it shows nothing: what a converter of 12 bits and
 its supply are good for.  Of what falls by more the fit says how well it is known [data sheet]."""
 
+HELD = "the voltage hardly changed"
+"""Why nothing is seen of it where the battery is as the nominal one."""
+
 
 class VoltageSag(Effect):
     """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds.
@@ -45,7 +48,7 @@ class VoltageSag(Effect):
         if air.volts is None:
             return "no battery voltage in the recording"
         if float(np.std(np.log(np.maximum(air.volts, 0.1)))) < LEAST_FALL:
-            return "the voltage hardly changed"
+            return HELD
         return ""
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
