@@ -21,6 +21,7 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.contradiction import Contradiction, contradiction
 from onboard.core.vehicle.copter import Outputs
 from onboard.core.vehicle.copter_match import match_copter
+from onboard.core.vehicle.effects.voltage_sag import HELD
 from onboard.core.vehicle.flight import Flight, flight_of
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.limits import APART, FEWEST_STEPS
@@ -118,6 +119,7 @@ def match(
     if simulation is not None:
         other = flown(simulation, progress=progress)
         simulated = vehicle_level(other, frame or {})
+        _refuse_incomparable(other, simulated, vehicle)
     sensors = sensor_differences(recording.diagnosis, other.diagnosis if other else None)
     if recording.derived:
         sensors = ()
@@ -139,7 +141,7 @@ def match(
         vehicle,
         simulated,
         settings_of(vehicle, sensors, effects, recording),
-        vehicle.not_testable,
+        _not_testable(vehicle, simulated),
         vehicle.frame,
         further,
     )
@@ -154,6 +156,24 @@ def _refuse_strangers(first: FlownRecording, others: Sequence[FlownRecording]) -
     refuse_copies(recordings)
     refuse_other_boards(recordings)
     refuse_one_flight_twice([track for flown_ in every for track in flown_.source.vehicle.tracks])
+
+
+def _refuse_incomparable(
+    other: FlownRecording, simulated: VehicleMatch, real: VehicleMatch
+) -> None:
+    """See that the simulation's recording is of such a vehicle, and says something of it.
+
+    Raises:
+        RecordingError: it does not; what nobody knows of it would pass for nominal.
+    """
+    kinds = {simulated.vehicle, real.vehicle}
+    if len(kinds) > 1 and kinds <= {*COPTERS, *PLANES}:
+        raise RecordingError(
+            f"{other.name}: is of a {simulated.vehicle}, not of a {real.vehicle}: there is nothing "
+            "to compare"
+        )
+    if real.series is not None and simulated.series is None:
+        raise RecordingError(f"{other.name}: {simulated.note}")
 
 
 def vehicle_level(
@@ -257,13 +277,16 @@ def _flight(
 
 
 def _apart(real: VehicleMatch, simulated: VehicleMatch) -> tuple[Difference, ...]:
-    """Effects of either that differ between the two by more than both uncertainties."""
+    """Effects of either that differ between the two by more than both uncertainties.
+
+    What one of the two cannot speak of is no difference.
+    """
     out = []
     for name in dict.fromkeys(d.name for d in (*real.effects, *simulated.effects)):
         ours = next((d for d in real.effects if d.name == name), None)
         theirs = next((d for d in simulated.effects if d.name == name), None)
         shown = ours or theirs
-        if shown is None:
+        if shown is None or _unknown(real, name) or _unknown(simulated, name):
             continue
         values: dict[str, Compared] = {}
         differs = False
@@ -294,6 +317,22 @@ def _apart(real: VehicleMatch, simulated: VehicleMatch) -> tuple[Difference, ...
                 )
             )
     return tuple(out)
+
+
+def _not_testable(real: VehicleMatch, simulated: VehicleMatch | None) -> tuple[NotTestable, ...]:
+    """What the recording could not have told, and what the simulation's could not."""
+    ours = {n.name for n in real.not_testable}
+    if simulated is None:
+        return real.not_testable
+    more = (n for n in simulated.not_testable if n.name not in ours and _unknown(simulated, n.name))
+    return (*real.not_testable, *(replace(n, why=f"in the simulation's: {n.why}") for n in more))
+
+
+def _unknown(match_: VehicleMatch, name: str) -> bool:
+    """Whether a recording could not have told this effect; a battery that holds is nominal."""
+    why = next((n.why for n in match_.not_testable if n.name == name), "")
+    told = any(key.startswith(f"{name}.") for key in match_.numbers)
+    return bool(why) and not told and not why.startswith(HELD)
 
 
 def _value(

@@ -56,7 +56,19 @@ def apart_of(a: Said, b: Said, level: float) -> Apart:
     heavier = _heavier(a, keys, x, masses[0])
     if abs(masses[0]) > ANOTHER_MASS or not _apart(a, keys, y - heavier, P + Q).by_chance(level):
         return found
+    # Within what matters a mass may pass for weaker rotors: the likelier of the two is told.
+    if _left(y - heavier, P + Q) > _left(y - x, P + Q, keys.index(found.worst or keys[0])):
+        return found
     return replace(found, masses=masses)
+
+
+def _left(off: Array, covariance: Array, free: int | None = None) -> float:
+    """Chi-square of differences (k,), of which one may be whatever is likeliest."""
+    weight = np.linalg.inv(covariance)
+    whole = float(off @ weight @ off)
+    if free is None:
+        return whole
+    return whole - float(weight[free] @ off) ** 2 / float(weight[free, free])
 
 
 def _apart(a: Said, keys: Sequence[Key], off: Array, covariance: Array) -> Apart:

@@ -37,9 +37,30 @@ def below_bounds(fit: Fit) -> tuple[str, ...]:
     return tuple(dict.fromkeys(out))
 
 
+def above_bounds(fit: Fit) -> tuple[str, ...]:
+    """Effects with an unknown above what it can be."""
+    unknowns = fit.model.unknowns
+    bounded = [k for k, u in enumerate(unknowns) if np.isfinite(u.most)]
+    out = []
+    for k in bounded:
+        far = float(fit.theta[k] - unknowns[k].most - unknowns[k].floor) / float(fit.sigma[k])
+        if far > 0.0 and 0.5 * survival(far**2, 1) < FALSE_ALARM / len(bounded):
+            out.append(fit.model.effect_of(k).name)
+    return tuple(dict.fromkeys(out))
+
+
 def below_sentence(names: tuple[str, ...]) -> str:
     """What a person is told of them; empty where there are none."""
+    return _sentence(names, "less than none")
+
+
+def above_sentence(names: tuple[str, ...]) -> str:
+    """The same of those that are above what they can be."""
+    return _sentence(names, "more than physics has")
+
+
+def _sentence(names: tuple[str, ...], what: str) -> str:
     if not names:
         return ""
     said = " and ".join(names)
-    return f"{said} would have to be less than none, so that something else acts there"
+    return f"{said} would have to be {what}, so that something else acts there"

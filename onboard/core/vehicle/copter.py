@@ -11,7 +11,8 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.air_density import AirDensity
-from onboard.core.vehicle.effects.beyond import LAWS, Beyond
+from onboard.core.vehicle.effects.beyond import Beyond
+from onboard.core.vehicle.effects.beyond_rotors import COPTERS
 from onboard.core.vehicle.effects.body_drag import BodyDrag
 from onboard.core.vehicle.effects.charge import Charge
 from onboard.core.vehicle.effects.effect import Effect
@@ -208,7 +209,6 @@ def copter_model(
         RotorDrag(frame, by_components=variant.by_components),
         BodyDrag(frame),
         *([own([OwnMotion(variant.moving) for _ in parts])] if variant.moving else []),
-        *(Beyond(key, LAWS[key]) for key in variant.beyond if key in LAWS),
         MotorLag(),
         ThrustCurve(frame),
         VoltageSag(full_voltage(flight, frame)),
@@ -217,6 +217,7 @@ def copter_model(
         *([ThrustChange(change, flight)] if change else []),
         GroundEffect(frame),
         Inflow(frame),
+        *(Beyond(key, COPTERS[key]) for key in variant.beyond if key in COPTERS),
         own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
     ]
     effects = tuple(e for e in everything if not e.missing(still))

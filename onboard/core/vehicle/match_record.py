@@ -12,7 +12,7 @@ from onboard.core.diagnosis.records import Ambiguity, NotTestable
 from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
-from onboard.core.vehicle.bounds import below_sentence
+from onboard.core.vehicle.bounds import above_sentence, below_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence, spoilt_by
 from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
@@ -85,7 +85,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
     spoilt = spoilt_by(beyond_of(m.model.effects))
     out = []
     for name in chosen.effects:
-        if name in m.below or name in spoilt:
+        if name in m.stand_ins or name in spoilt:
             continue
         without = tuple(n for n in chosen.effects if n != name)
         places = m.model.indices(name)
@@ -213,7 +213,7 @@ def numbers_of(m: Matched) -> dict[str, Compared]:
 
 def is_explained(m: Matched) -> bool:
     """Whether what is left is less than errors of the motion, or the gusts found, make."""
-    if m.remainders or m.chosen.suspected or m.below or beyond_of(m.model.effects):
+    if m.remainders or m.chosen.suspected or m.stand_ins or beyond_of(m.model.effects):
         return False
     unclear = m.model.unclear(m.fit.theta)
     gusts = _gusts(m) * m.fit.sensitivity
@@ -239,6 +239,7 @@ def note_of(m: Matched) -> str:
         *dict.fromkeys(m.model.effect(n).note for n in m.chosen.effects),
         suspected_sentence(m.chosen.suspected),
         below_sentence(m.below),
+        above_sentence(m.above),
         beyond_sentence(beyond_of(m.model.effects)),
         change_sentence(m),
         height_sentence(m),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.vehicle.bounds import at_bounds, below_bounds
+from onboard.core.vehicle.bounds import above_bounds, at_bounds, below_bounds
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -42,6 +42,7 @@ class Matched:
         remainders: spans that the model does not describe.
         left_out: spans, s since the start, that were not used.
         below: effects that would go below what they can be, and stand for something else.
+        above: the same of what cannot be so much.
         plain: the fit before what gusts did to it was taken out; the same where nothing was.
     """
 
@@ -55,6 +56,12 @@ class Matched:
     left_out: tuple[tuple[float, float], ...] = ()
     below: tuple[str, ...] = ()
     plain: Fit | None = None
+    above: tuple[str, ...] = ()
+
+    @property
+    def stand_ins(self) -> tuple[str, ...]:
+        """Effects that stand for something else, and have no name for it."""
+        return (*self.below, *self.above)
 
     @property
     def model(self) -> ForceModel:
@@ -92,6 +99,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         left_out(whole, done.kept),
         below,
         done.plain,
+        above_bounds(fit),
     )
 
 

@@ -18,7 +18,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.air import AHEAD, SIDE, UP, Air
 from onboard.core.vehicle.choices import Choices
-from onboard.core.vehicle.effects.beyond import LAWS, Beyond, Law
+from onboard.core.vehicle.effects.beyond import Beyond, Law
+from onboard.core.vehicle.effects.beyond_rotors import COPTERS
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.wind import Wind
@@ -46,7 +47,7 @@ class Structure:
 
 
 def structures(
-    fit: Fit, known: Sequence[str], laws: Mapping[str, Law] = LAWS, *, answering: bool = False
+    fit: Fit, known: Sequence[str], laws: Mapping[str, Law] = COPTERS, *, answering: bool = False
 ) -> tuple[Structure, ...]:
     """What repeats in the remainder of a fit, the strongest first.
 
@@ -64,7 +65,7 @@ def structures(
     if answering:
         every = {key: e for key, e in every.items() if not laws[key].answers}
     every[CHANGE] = WindChange(model.flight, name=ASKED)
-    if laws is not LAWS:
+    if laws is not COPTERS:
         every[HEIGHT] = WindByHeight(model.flight, name=ASKED)
     asked = {k: e for k, e in every.items() if k not in known and _acts(e, air)}
     slopes = slopes_at(model, fit.theta)

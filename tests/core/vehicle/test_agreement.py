@@ -104,6 +104,16 @@ def test_another_mass_is_told_as_one(ratio):
     assert other.masses is None
 
 
+def test_weaker_rotors_with_the_same_drag_are_no_mass():
+    """A smaller mass, and drag that is off by less than matters, would make the same of them."""
+    keys = said().keys
+    weaker = np.zeros(4)
+    weaker[keys.index(("thrust_scale", "log_ratio"))] = np.log(0.85)
+    aside = agreement_of([(said(0.0, 0.2 * FLOOR),), (said(weaker, 0.2 * FLOOR),)]).aside[0]
+    assert aside.mass is None
+    assert aside.name == "thrust_scale"
+
+
 def loaded(model, theta, ratio):
     out = theta.copy()
     for e in model.effects:

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter_match import match_copter
+from onboard.core.vehicle.effects.motor_lag import MotorLag
+from onboard.core.vehicle.flight import History
 from onboard.core.vehicle.signals import Signals
-from tests.core.vehicle.flights import copter_flight
+from tests.core.vehicle.flights import STEP, copter_flight
 
 pytestmark = pytest.mark.slow
 SIGMA = np.array([0.003, 0.003, 0.01])
@@ -181,3 +184,19 @@ def test_two_are_not_taken_for_a_third():
     """A battery that gives way and thrust that makes up for it look like another curve."""
     flight = copter_flight(ratio=1.25, volts=(12.6, 9.5), sag=1.0, seed=12)
     assert names(matched(flight)) == {"thrust_scale", "voltage_sag"}
+
+
+def test_motors_follow_through_steps_that_are_left_out():
+    """Settled anew at each cut they would have been where they were asked to be."""
+    flight = copter_flight(lag=0.2, seed=22)
+    whole = replace(flight, history=History(flight.commands, flight.piece))
+    kept = np.arange(len(flight)) % 15 > 1
+    flight = whole.kept(kept)
+    flight.piece[:] = np.cumsum(np.diff(flight.t, prepend=flight.t[0]) > 1.5 * STEP)
+    air = Air(flight)
+    MotorLag().act(air, [0.2])
+    through = Air(whole)
+    MotorLag().act(through, [0.2])
+    np.testing.assert_allclose(air.commands, through.commands[kept], atol=1e-12)
+    number = matched(flight).numbers["motor_lag.time_constant"]
+    assert number.real == pytest.approx(0.2, rel=0.05)

@@ -30,6 +30,7 @@ class Unknown:
         share: the same as a share of the value.
         within: by how much it may be off in an airframe that is nominal all the same.
         least: below which it cannot be.
+        most: above which it cannot be; a fit may go there, and is told that it did.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Unknown:
     share: float = 0.0
     within: float = 0.0
     least: float = -math.inf
+    most: float = math.inf
 
     def doubted(self, value: float, sigma: float) -> float:
         """A sigma of the fit with what the law is good for."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
+from onboard.core.vehicle.flight import History
 from onboard.core.vehicle.recursion import ahead, behind
 
 DELAY = "output_delay"
@@ -36,7 +37,9 @@ class MotorLag(Effect):
             return
         law = behind if values[0] >= 0.0 else ahead
         flight = air.flight
-        air.commands = law(air.commands, abs(values[0]), flight.piece, flight.step_s)
+        past = flight.history or History(air.commands, flight.piece)
+        late = law(past.commands, abs(values[0]), past.piece, flight.step_s)
+        air.commands = late if flight.history is None else late[flight.place]
 
     def missing(self, air: Air) -> str:
         """It takes outputs."""

@@ -15,16 +15,24 @@ LEAST_FALL = 0.002
 """Relative scatter of the voltage without which it shows nothing: what a converter of 12 bits and
 its supply are good for.  Of what falls by more the fit says how well it is known [data sheet]."""
 
+HELD = "the voltage hardly changed"
+"""Why nothing is seen of it where the battery is as the nominal one."""
+
 
 class VoltageSag(Effect):
-    """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds."""
+    """Thrust goes with ``(V / V_full)^(2 share)``: 1 of a motor, 0 of a battery that holds.
+
+    More is not to be had: a motor turns no faster than its voltage lets it, and less where its
+    load, which grows with the speed, takes from it.  What falls more has another cause beside.
+    """
 
     name = "voltage_sag"
     manoeuvre = "fly from a full battery to the warning, with full throttle now and then"
 
     def __init__(self, full_voltage: float) -> None:
         """Nominally a constant voltage (battCapacityAh 0)."""
-        super().__init__([Unknown("share", 0.0, 1.0, FLOOR, "1", doubt=0.005)])
+        share = Unknown("share", 0.0, 1.0, FLOOR, "1", doubt=0.005, most=1.0)
+        super().__init__([share])
         self.full_voltage = full_voltage
 
     def act(self, air: Air, values: Sequence[float]) -> None:
@@ -40,7 +48,7 @@ class VoltageSag(Effect):
         if air.volts is None:
             return "no battery voltage in the recording"
         if float(np.std(np.log(np.maximum(air.volts, 0.1)))) < LEAST_FALL:
-            return "the voltage hardly changed"
+            return HELD
         return ""
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
