@@ -43,16 +43,21 @@ def _tilting(signals: Signals) -> bool:
     return any(signals.parameters.get(name, 0.0) > 0.0 for name in TILTING)
 
 
-def carried(flight: Flight, signals: Signals) -> Mask:
-    """(n,) the steps in which rotors turn, or have just turned, or are about to."""
+def turning(signals: Signals) -> Array:
+    """(m,) moments of the outputs at which an upright rotor turns, s."""
     channels = rotors_of(signals)
     if not channels:
-        return np.zeros(len(flight), dtype=bool)
+        return np.zeros(0)
     get = signals.parameters.get
     low, high = get("Q_M_PWM_MIN", 1000.0), get("Q_M_PWM_MAX", 2000.0)
     most = np.max(np.nan_to_num(signals.outputs.x[:, channels]), axis=1)
-    turning = signals.outputs.t[most > low + TURNING * max(high - low, 1.0)]
-    return _near(flight.t, turning)
+    out: Array = signals.outputs.t[most > low + TURNING * max(high - low, 1.0)]
+    return out
+
+
+def carried(flight: Flight, signals: Signals) -> Mask:
+    """(n,) the steps in which rotors turn, or have just turned, or are about to."""
+    return _near(flight.t, turning(signals))
 
 
 def on_wings(flight: Flight, signals: Signals) -> tuple[Flight, float]:

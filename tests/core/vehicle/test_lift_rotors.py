@@ -30,7 +30,7 @@ MOSTLY = (80.0, 215.0)
 """The same of a flight that is more of a hover."""
 
 
-def turning(flight, *spans, parameters=FUNCTIONS, idle=1000.0):
+def spinning(flight, *spans, parameters=FUNCTIONS, idle=1000.0):
     """What a recording says of a plane whose four rotors turn in these spans."""
     t = np.arange(flight.t[0], flight.t[-1], STEP)
     outputs = np.full((len(t), 8), 1500.0)
@@ -55,12 +55,12 @@ def lifted(flight, start, end):
 
 def test_what_rotors_carry_is_left_out_with_the_time_in_which_they_run_up_and_down():
     flight = plane_flight(seconds=120.0)
-    mask = carried(flight, turning(flight, HOVER))
+    mask = carried(flight, spinning(flight, HOVER))
     assert mask[(flight.t > HOVER[0]) & (flight.t < HOVER[1])].all()
     start, end = flight.t[mask][[0, -1]]
     assert start == pytest.approx(HOVER[0] - RUN_DOWN_S, abs=2 * STEP)
     assert end == pytest.approx(HOVER[1] + RUN_DOWN_S, abs=2 * STEP)
-    wings, seconds = on_wings(flight, turning(flight, HOVER))
+    wings, seconds = on_wings(flight, spinning(flight, HOVER))
     assert seconds == pytest.approx(np.count_nonzero(mask) * STEP)
     # The memory of noise does not reach over what is left out.
     assert list(np.unique(wings.piece)) == [0, 1]
@@ -69,12 +69,12 @@ def test_what_rotors_carry_is_left_out_with_the_time_in_which_they_run_up_and_do
 @pytest.mark.parametrize("idle", [0.0, 1000.0, 1040.0])
 def test_rotors_that_stand_or_idle_carry_nothing(idle):
     flight = plane_flight(seconds=60.0)
-    assert on_wings(flight, turning(flight, idle=idle)) == (flight, 0.0)
+    assert on_wings(flight, spinning(flight, idle=idle)) == (flight, 0.0)
 
 
 def test_a_plane_without_rotors_is_on_its_wings():
     flight = plane_flight(seconds=60.0)
-    for signals in (Signals(kind="plane"), turning(flight, HOVER, parameters={})):
+    for signals in (Signals(kind="plane"), spinning(flight, HOVER, parameters={})):
         assert on_wings(flight, signals) == (flight, 0.0)
         assert not unseen(signals)
 
@@ -82,7 +82,7 @@ def test_a_plane_without_rotors_is_on_its_wings():
 @pytest.mark.parametrize("tilts", ["Q_TILT_ENABLE", "Q_TAILSIT_ENABLE"])
 def test_rotors_that_tilt_do_not_tell_when_they_carry(tilts):
     flight = plane_flight(seconds=60.0)
-    signals = turning(flight, HOVER, parameters={**FUNCTIONS, tilts: 1.0})
+    signals = spinning(flight, HOVER, parameters={**FUNCTIONS, tilts: 1.0})
     assert on_wings(flight, signals) == (flight, 0.0)
     assert not unseen(signals)
 
@@ -91,7 +91,7 @@ def test_rotors_that_tilt_do_not_tell_when_they_carry(tilts):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_hover_between_is_no_other_wing(seed):
     flight = lifted(plane_flight(seed=seed, wind=(2.0, -3.0), **HEAVY), *MOSTLY)
-    match = matched(on_wings(flight, turning(flight, MOSTLY))[0])
+    match = matched(on_wings(flight, spinning(flight, MOSTLY))[0])
     assert names(match) == {"wind", "lift", "side_force"}
     assert match.explained
     told = {"wind.north": 2.0, "wind.east": -3.0} | TOLD
@@ -140,20 +140,20 @@ def told(flight) -> Any:
 
 def test_it_is_said_how_long_rotors_carried_it(level):
     flight = plane_flight(seconds=120.0)
-    note = level(flight, turning(flight, HOVER)).note
-    wings, seconds = on_wings(flight, turning(flight, HOVER))
+    note = level(flight, spinning(flight, HOVER)).note
+    wings, seconds = on_wings(flight, spinning(flight, HOVER))
     left_out = f"upright rotors turned for {seconds:.0f} s, of which nothing is told"
     assert note == f"{len(wings)} steps; {left_out}"
-    assert level(flight, turning(flight)).note == f"{len(flight)} steps"
+    assert level(flight, spinning(flight)).note == f"{len(flight)} steps"
 
 
 def test_of_a_hover_and_of_rotors_that_nobody_saw_nothing_is_told(level):
     flight = plane_flight(seconds=60.0)
-    hover = turning(flight, (0.0, 1e3))
+    hover = spinning(flight, (0.0, 1e3))
     blind = Signals(parameters=FUNCTIONS, kind="plane")
     assert level(flight, hover).note == match_module.CARRIED
     assert level(flight, blind).note == match_module.UNSEEN
-    good = turning(flight)
+    good = spinning(flight)
     for signals, why in ((hover, match_module.CARRIED), (blind, match_module.UNSEEN)):
         with pytest.raises(RecordingError, match=why):
             level(flight, good, (flight, signals))
