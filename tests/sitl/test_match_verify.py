@@ -29,7 +29,6 @@ from sitl.recording import FlightSpec, write_tlog
 from tests.report.html_page import Page
 from tests.report.matches_by_hand import by_hand
 
-
 NO_SIGNALS = Signals(kind="plane")
 
 
