@@ -24,6 +24,7 @@ from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.voltage_sag import HELD
 from onboard.core.vehicle.flight import Flight, flight_of
 from onboard.core.vehicle.kind import kind_by_motion
+from onboard.core.vehicle.lift_rotors import on_wings, unseen
 from onboard.core.vehicle.limits import APART, FEWEST_STEPS
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -54,6 +55,10 @@ SAME: Final = 0.05
 DESCRIBING = ("lowest", "capacity", "rms_with_faster")
 """Numbers that tell of the flight, not of the vehicle."""
 NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
+CARRIED = (
+    "upright rotors turn nearly all the time, and of a plane that they carry there is no model"
+)
+UNSEEN = "the outputs of its upright rotors are not recorded: nobody knows when wings carry it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +195,7 @@ def vehicle_level(
     kind = recording.signals.kind or guessed_kind(recording.batches)
     airframe, plane = CopterAirframe.of(frame), PlaneAirframe.of(frame)
     pieces = motions(recording.batches, recording.sensors)
-    flight = _flight(recording, kind, airframe, pieces)
+    flight, carried_s = _flight(recording, kind, airframe, pieces)
     doubt = _doubt(recording, pieces)
     names = NAMES.get(kind, NAMES["copter"])
     why = ""
@@ -200,8 +205,10 @@ def vehicle_level(
         why = str(recording.disagreement)
     elif doubt.hopeless:
         why = str(doubt)
+    elif kind in PLANES and unseen(recording.signals):
+        why = UNSEEN
     elif flight is None or len(flight) < FEWEST_STEPS:
-        why = NOTHING
+        why = CARRIED if carried_s > 0.0 else NOTHING
     elif not kind:
         why = "the recording does not say what kind of vehicle it is"
     if why or flight is None:
@@ -214,7 +221,7 @@ def vehicle_level(
             return _doubted(match_copter(flight, recording.signals, airframe, sigma), doubt)
         found = match_plane(flight, plane, sigma)
         if found is not None:
-            return _doubted(found, doubt)
+            return _doubted(_told_of_rotors(found, carried_s), doubt)
         why = "it never flew faster than a plane stalls"
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         why = f"its numbers fit no model ({error})"
@@ -240,10 +247,13 @@ def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> 
         raise RecordingError(f"{recording.name}: {recording.disagreement}")
     its = recording.signals.kind or kind
     pieces = motions(recording.batches, recording.sensors)
-    flight = None if its != kind else _flight(recording, kind, airframe, pieces)
+    if its != kind:
+        raise RecordingError(f"{recording.name}: is of a {its}, not of a {kind}")
+    if kind in PLANES and unseen(recording.signals):
+        raise RecordingError(f"{recording.name}: {UNSEEN}")
+    flight, carried_s = _flight(recording, kind, airframe, pieces)
     if flight is None or len(flight) < FEWEST_STEPS:
-        why = NOTHING if its == kind else f"is of a {its}, not of a {kind}"
-        raise RecordingError(f"{recording.name}: {why}")
+        raise RecordingError(f"{recording.name}: {CARRIED if carried_s > 0.0 else NOTHING}")
     doubt = _doubt(recording, pieces)
     if doubt.hopeless:
         raise RecordingError(f"{recording.name}: {doubt}")
@@ -255,6 +265,16 @@ def _doubt(recording: FlownRecording, pieces: Sequence[Motion]) -> Contradiction
     return Contradiction() if recording.derived else contradiction([m.fixed for m in pieces])
 
 
+def _told_of_rotors(found: VehicleMatch, seconds: float) -> VehicleMatch:
+    """With what was left out in the note."""
+    left_out = f"upright rotors turned for {seconds:.0f} s, of which nothing is told"
+    return (
+        found
+        if not seconds
+        else replace(found, note="; ".join(filter(None, (found.note, left_out))))
+    )
+
+
 def _doubted(found: VehicleMatch, doubt: Contradiction) -> VehicleMatch:
     """With what it says of itself in the note."""
     note = "; ".join(s for s in (found.note, str(doubt)) if s)
@@ -263,7 +283,8 @@ def _doubted(found: VehicleMatch, doubt: Contradiction) -> VehicleMatch:
 
 def _flight(
     recording: FlownRecording, kind: str, airframe: CopterAirframe, pieces: Sequence[Motion]
-) -> Flight | None:
+) -> tuple[Flight | None, float]:
+    """What of it the models can speak of; how long rotors carried a plane beside that, s."""
     commands = Stream()
     if kind in COPTERS:
         outputs = Outputs.of(recording.signals, airframe)
@@ -271,9 +292,12 @@ def _flight(
     elif kind in PLANES:
         commands = plane_commands(recording.signals)
     if not pieces:
-        return None
+        return None, 0.0
     grounded = list(recording.grounded)
-    return flight_of(pieces, recording.signals, commands, grounded, recording.ground)
+    flight = flight_of(pieces, recording.signals, commands, grounded, recording.ground)
+    if flight is None or kind not in PLANES:
+        return flight, 0.0
+    return on_wings(flight, recording.signals)
 
 
 def _apart(real: VehicleMatch, simulated: VehicleMatch) -> tuple[Difference, ...]:

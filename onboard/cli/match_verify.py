@@ -12,6 +12,7 @@ from onboard.answers.flown_again import ARDUPILOT, BUILT_IN, FlownAgain, Part, f
 from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
+from onboard.core.vehicle.lift_rotors import turning
 from onboard.errors import RecordingError, UsageError
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ def verify(result: Match, recording: Path, ardupilot: Path | None = None) -> Flo
         )
     if result.vehicle.series is None:
         raise UsageError(f"--verify: {recording}: there is nothing to verify")
+    if result.vehicle.vehicle == "plane" and len(turning(result.real.signals)):
+        raise UsageError(f"--verify: {recording}: no simulator's plane has upright rotors")
     fly = _by_ardupilot if _has_ardupilot(result, ardupilot) else _by_built_in
     with tempfile.TemporaryDirectory() as folder:
         flown = fly(result, recording, Path(folder), ardupilot)

@@ -18,6 +18,7 @@ from onboard.cli.match_verify import air_of, altitude_of, as_sitl, craft_of
 from onboard.core.vehicle.atmosphere import density
 from onboard.core.vehicle.plane_airframe import MASS_KG, PlaneAirframe
 from onboard.core.vehicle.records import Compared, Difference
+from onboard.core.vehicle.signals import Signals, Stream
 from onboard.errors import UsageError
 from onboard.report.match import match_html
 from sitl.builtin.airframe.air import Air
@@ -27,6 +28,8 @@ from sitl.builtin.airframe.wing import Wing
 from sitl.recording import FlightSpec, write_tlog
 from tests.report.html_page import Page
 from tests.report.matches_by_hand import by_hand
+
+NO_SIGNALS = Signals(kind="plane")
 
 
 def course(seconds=60.0, ahead=0, force=(0.0, 0.0, -9.8)):
@@ -163,10 +166,10 @@ def flight(tmp_path, monkeypatch, no_ardupilot):
     told = {}
     monkeypatch.setattr(match_verify, "flown_again", lambda *_, **more: told.update(more) or told)
 
-    def ask(vehicle="copter", ardupilot=None):
+    def ask(vehicle="copter", ardupilot=None, signals=NO_SIGNALS):
         kind = SimpleNamespace(recordings=[SimpleNamespace(kind="dataflash")])
         result = SimpleNamespace(
-            real=SimpleNamespace(source=kind),
+            real=SimpleNamespace(source=kind, signals=signals),
             vehicle=SimpleNamespace(vehicle=vehicle, series=object()),
             frame={},
         )
@@ -174,6 +177,19 @@ def flight(tmp_path, monkeypatch, no_ardupilot):
 
     ask.flown = flown
     return ask
+
+
+def test_the_hover_of_a_quadplane_is_not_flown_by_a_plane(flight):
+    t = np.arange(0.0, 20.0, 0.1)
+    functions = {f"SERVO{k}_FUNCTION": 28.0 + k for k in range(5, 9)}
+    for us, refused in ((1450.0, True), (1000.0, False)):
+        outputs = np.column_stack([np.full((len(t), 4), 1500.0), np.full((len(t), 4), us)])
+        signals = Signals(outputs=Stream(t, outputs), parameters=functions, kind="plane")
+        if refused:
+            with pytest.raises(UsageError, match="no simulator's plane has upright rotors"):
+                flight("plane", signals=signals)
+        else:
+            assert flight("plane", signals=signals) == "built-in"
 
 
 def binary(folder, vehicle="copter"):

@@ -139,6 +139,13 @@ class Flight:
         R_bn[:, 2, 2] = 1.0
         return replace(self, R_bn=R_bn, v_b=np.einsum("nij,nj->ni", R_bn, self.v_n))
 
+    def cut(self, mask: Mask) -> Flight:
+        """The steps (n,) that are True; a piece ends where some between them are left out."""
+        out = self.kept(mask)
+        breaks = (np.diff(out.t) > 1.5 * out.step_s) | (np.diff(out.piece) != 0)
+        pieces = np.concatenate([[0], np.cumsum(breaks)])[: len(out)]
+        return replace(out, piece=pieces.astype(np.int64))
+
     def kept(self, mask: Mask) -> Flight:
         """The steps (n,) that are True."""
         cut = {name: getattr(self, name)[mask] for name in _BY_STEP}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -102,11 +101,7 @@ def unstalled(flight: Flight, frame: PlaneAirframe, winds: Array) -> Flight:
     speed = np.linalg.norm(u, axis=1)
     alpha = np.arctan2(u[:, 2], u[:, 0])
     good = (np.abs(alpha) < STALL_SHARE * frame.alpha_stall) & (speed > LEAST_AIRSPEED_M_S)
-    if good.all():
-        return flight
-    out = flight.kept(good)
-    breaks = (np.diff(out.t) > 1.5 * out.step_s) | (np.diff(out.piece) != 0)
-    return replace(out, piece=np.concatenate([[0], np.cumsum(breaks)]))
+    return flight if good.all() else flight.cut(good)
 
 
 def plane_model(
