@@ -8,8 +8,8 @@ the answers differ: by how many of their sigmas numbers are others, and names th
 Without a revision it is the last tag or, where there is none, the commit before the one that the
 working tree and ``main`` have in common.
 
-The flight is a simulated one, written by the working tree's simulator; ``--recordings FILE...`` adds
-logs.  What runs first of each is not counted: it compiles what it runs.
+The flight is a simulated one, written by the working tree's simulator; ``--recordings FILE...``
+adds logs.  What runs first of each is not counted: it compiles what it runs.
 """
 
 from __future__ import annotations

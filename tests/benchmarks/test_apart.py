@@ -44,7 +44,7 @@ def test_a_number_is_measured_by_the_sigma_that_stands_beside_it(change, where, 
     found = apart(answer(), now)
     assert [c.where for c in found.in_sigmas] == [where]
     assert found.in_sigmas[0].by == pytest.approx(by)
-    assert not (found.relative or found.came or found.went or found.said)
+    assert not any((found.relative, found.came, found.went, found.said))
 
 
 def test_the_largest_change_comes_first():
