@@ -152,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Cost and answers against another revision.")
     parser.add_argument("revision", nargs="?", help="of git; the last tag by default")
-    parser.add_argument("--pairs", type=int, default=3, help="of runs that are counted")
+    parser.add_argument("--pairs", type=int, default=5, help="of runs that are counted")
     parser.add_argument("--length", type=float, default=600.0, help="of the simulated flight, s")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     parser.add_argument("--recordings", nargs="+", type=Path, default=[], metavar="FILE")
