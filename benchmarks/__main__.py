@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from benchmarks import (
     accuracy,
+    against,
     cost,
     coverage,
     cramer_rao,
@@ -66,6 +67,10 @@ def main() -> None:
             lambda: matching.main(["--count", str(chosen.recordings)]),
         ),
         "explain_time": ("Time of an explanation", lambda: explain_time.main([])),
+        "against": (
+            "Cost and answers, against earlier code",
+            lambda: against.main(["--pairs", "3"]),
+        ),
         "real": ("Real flights, which nobody knows the truth about", lambda: real.main([])),
         "reading": ("Reading recordings, against other readers", lambda: reading.main([])),
         "cost": ("Cost of the estimator", lambda: cost.main([])),

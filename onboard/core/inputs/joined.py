@@ -17,15 +17,19 @@ def with_samples(batches: Sequence[Batch], changed: Callable[[Array, Array], Arr
     Args:
         batches: the flight.
         changed: times (n,), s, and raw force (n, 3) of samples that follow on each other, to that
-            force changed.
+            force changed; the very same array where nothing is.
     """
     made: dict[int, Segment] = {}
     for run in runs(batches):
         t, raw = joined(run)
         now = changed(t, raw)
+        if now is raw:
+            continue
         for s in (batch.segment for batch in run):
             made[id(s)] = replace(s, raw_s=now[np.searchsorted(t, s.t)])
-    return [replace(b, segment=made[id(b.segment)]) for b in batches]
+    return [
+        replace(b, segment=made[id(b.segment)]) if id(b.segment) in made else b for b in batches
+    ]
 
 
 def runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:

@@ -1,9 +1,19 @@
 """Single false samples are found where they are; what a vehicle feels is left as it is."""
 
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from onboard.core.inputs.limits import (
+    LEAST_SPREAD_M_S2,
+    NEAR_SAMPLES,
+    NEVER_SIGMAS,
+    SPREAD_SAMPLES,
+)
 from onboard.core.inputs.spikes import spikes_of
+from onboard.core.maths.medians import NORMAL_MEDIAN
 from tests.core.inputs.test_expected_force import STEP, T, batches, felt, manoeuvre
 
 SIZE = 9.8
@@ -51,3 +61,47 @@ def test_a_load_that_lasts_is_felt():
     raw = shaken(0.1)
     raw[3000:3005, 2] -= 2.0 * SIZE
     assert spikes_of(batches(raw)) is None
+
+
+def suspected_one_by_one(x):
+    """(n,) by its definition, sample after sample of one axis."""
+    n = len(x)
+    ends = np.pad(x, 2, mode="reflect", reflect_type="odd")
+    fours = [np.sort(ends[[i, i + 1, i + 3, i + 4]]) for i in range(n)]
+    far = np.array([abs(x[i] - (f[1] + f[2]) / 2.0) for i, f in enumerate(fours)])
+    around = np.empty(n)
+    for some in np.array_split(np.arange(n), n // SPREAD_SAMPLES):
+        around[some] = np.median(far[some])
+    out = np.zeros(n, dtype=bool)
+    for i, f in enumerate(fours):
+        spread = around[i]
+        if NEAR_SAMPLES <= i < n - NEAR_SAMPLES:
+            before, after = far[i - NEAR_SAMPLES : i], far[i + 1 : i + 1 + NEAR_SAMPLES]
+            spread = max(spread, np.median(before), np.median(after))
+        beyond = max(f[1] - x[i], x[i] - f[2], 0.0)
+        out[i] = beyond > NEVER_SIGMAS * max(spread / NORMAL_MEDIAN, LEAST_SPREAD_M_S2)
+    return out
+
+
+def test_a_flight_in_parts_is_looked_at_as_the_whole_of_it():
+    """Where one part ends and the next begins, and at either end of the flight, too."""
+    raw, _ = spiked(shaken(0.3), share=0.02, seed=5)
+    raw[[0, 1, -1], 0] += SIZE
+    found = spikes_of(batches(raw))
+    one_by_one = np.column_stack([suspected_one_by_one(x) for x in raw.T]).any(axis=1)
+    assert np.array_equal(np.round(found.t / STEP).astype(int), np.flatnonzero(one_by_one))
+
+
+def test_it_needs_room_for_the_samples_and_for_what_is_looked_at_at_once():
+    """A companion computer has little; all of it at once took fifteen times as much as samples."""
+    t = STEP * np.arange(60_000)
+    raw = np.random.default_rng(6).normal(size=(len(t), 3))
+    still = batches(shaken(0.3))[0]
+    segment = replace(still.segment, t=t, w_b=np.zeros_like(raw), raw_s=raw)
+    tracemalloc.start()
+    try:
+        spikes_of([replace(still, segment=segment)])
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 2 * raw.nbytes + 4e6
