@@ -17,13 +17,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import os
 import shutil
 import subprocess
-import sys
 import tarfile
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -31,7 +28,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.apart import Apart, Json, apart
-from benchmarks.explain_time import Cost, flown
+from benchmarks.explain_time import Cost, cost_of, flown
 
 HERE = Path(__file__).resolve().parents[1]
 COMMANDS = ("replay", "explain", "match")
@@ -92,20 +89,7 @@ def exported(revision: str, folder: Path) -> Path:
 
 def run(tree: Path, command: str, log: Path, out: Path) -> Cost:
     """A command of the programs in a folder, in a process of its own; its JSON goes to ``out``."""
-    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    began = time.perf_counter()
-    child = subprocess.Popen(  # noqa: S603 - ours
-        [sys.executable, "-m", "onboard", command, str(log), "--json", str(out)],
-        cwd=tree,
-        env=kept | {"PYTHONPATH": str(tree)},
-        stdout=subprocess.DEVNULL,
-    )
-    _, status, used = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode:
-        raise subprocess.CalledProcessError(child.returncode, command)
-    wall = time.perf_counter() - began
-    return Cost(used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024.0)
+    return cost_of(command, str(log), "--json", str(out), tree=tree)
 
 
 def compared(before: Path, now: Path, command: str, log: Path, pairs: int) -> Compared:

@@ -68,11 +68,18 @@ def cost(command: str, log: Path, runs: int) -> Cost:
 
 def _once(command: str, log: Path) -> Cost:
     files = [f"--{kind}={log.with_suffix(f'.{kind}')}" for kind in ("report", "json", "param")]
+    return cost_of(command, str(log), *files)
+
+
+def cost_of(command: str, *arguments: str, tree: Path | None = None) -> Cost:
+    """A command in a process of its own, with the programs of a folder; None: these."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     began = time.perf_counter()
     child = subprocess.Popen(  # noqa: S603 - ours
-        [sys.executable, "-m", "onboard", command, str(log), *files],
+        [sys.executable, "-m", "onboard", command, *arguments],
+        cwd=tree,
+        env=environment if tree is None else environment | {"PYTHONPATH": str(tree)},
         stdout=subprocess.DEVNULL,
-        env={k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"},
     )
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
