@@ -140,7 +140,10 @@ class Flight:
         return replace(self, R_bn=R_bn, v_b=np.einsum("nij,nj->ni", R_bn, self.v_n))
 
     def cut(self, mask: Mask) -> Flight:
-        """The steps (n,) that are True; a piece ends where some between them are left out."""
+        """The steps (n,) that are True; a piece ends where some between them are left out.
+
+        The noise's memory must not reach across.
+        """
         out = self.kept(mask)
         breaks = (np.diff(out.t) > 1.5 * out.step_s) | (np.diff(out.piece) != 0)
         pieces = np.concatenate([[0], np.cumsum(breaks)])[: len(out)]
@@ -203,12 +206,7 @@ def flight_of(
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
     )
-    flight = flight.kept(air)
-    # What was cut out divides a piece: the noise's memory must not reach across.
-    breaks = np.diff(flight.t) > 1.5 * flight.step_s
-    piece = np.concatenate([[0], np.cumsum(breaks | (np.diff(flight.piece) != 0))])
-    flight.piece[:] = piece
-    return flight
+    return flight.cut(air)
 
 
 def _before(battery: Stream, t: float) -> float:

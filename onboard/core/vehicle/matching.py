@@ -17,7 +17,6 @@ from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
-from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gust_errors import rising, turned_by_gusts
 from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING, RECEIVER_M_S
 from onboard.core.vehicle.model import ForceModel
@@ -143,7 +142,7 @@ def described(fit: Fit) -> tuple[Fit, Mask]:
         if np.array_equal(now, kept) or np.mean(~now) > MOST_OUTLYING:
             break
         kept = now
-        fit = likelier(replace(whole, flight=_cut(whole.flight, kept)), fit)
+        fit = likelier(replace(whole, flight=whole.flight.cut(kept)), fit)
     return fit, kept
 
 
@@ -208,12 +207,4 @@ def _inlying(residual: Array, part: NDArray[np.int64]) -> Mask:
         apart = np.abs(residual[mine] - np.median(residual[mine], axis=0))
         spread = 1.4826 * np.median(apart, axis=0)
         out[mine] = np.all(apart <= OUTLYING * np.maximum(spread, 0.02), axis=1)
-    return out
-
-
-def _cut(flight: Flight, kept: Mask) -> Flight:
-    """The flight without some steps; the noise's memory does not reach across."""
-    out = flight.kept(kept)
-    breaks = (np.diff(out.t) > 1.5 * out.step_s) | (np.diff(out.piece) != 0)
-    out.piece[:] = np.concatenate([[0], np.cumsum(breaks)])
     return out
