@@ -7,7 +7,6 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.limits import BLOCK_S, WINDOW_STEPS
-from onboard.core.vehicle.matching import _cut
 from onboard.core.vehicle.windows import windows_of
 from tests.core.vehicle.flights import copter_flight
 
@@ -23,7 +22,7 @@ def test_steps_behind_a_boundary_are_of_the_block_that_counts_them(over):
     kept[:shift] = False
     end = per_block + over
     kept[end : 2 * per_block + 3] = False
-    flight = _cut(whole, kept)
+    flight = whole.cut(kept)
     fit = fitted(copter_model(flight, CopterAirframe.of({}), np.full(3, 0.01)))
     windows = windows_of(flight)
     numbers = np.unique(fit.block)
