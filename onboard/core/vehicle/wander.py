@@ -146,7 +146,7 @@ def _tried(rows: _Rows, sums: tuple[Array, Array, float], wander: Wander) -> _Tr
     apart = np.zeros(len(b))
     apart[:m] = fit.model.nominal - fit.theta
     whole, towards = N + P, b + P @ apart
-    x: Array = np.linalg.solve(whole, towards)
+    x = np.asarray(np.linalg.solve(whole, towards), dtype=np.float64)
     chance = np.linalg.slogdet(whole)[1] - np.linalg.slogdet(P)[1]
     deviance = rest + float(apart @ P @ apart) - float(towards @ x) + float(chance)
     return _Trial(wander, deviance, x)
