@@ -11,6 +11,7 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.remainder import not_used, remainder_sentence, share_of
+from onboard.core.vehicle.signals import Stream
 from onboard.core.vehicle.touches import touched_spans
 from tests.core.vehicle.flights import copter_flight
 
@@ -70,3 +71,13 @@ def test_a_bounce_is_left_out():
 @pytest.mark.parametrize("but", [{"lowest": 8.0}, {"spike": 0.0}, {"noise": 2.0}])
 def test_what_is_high_or_smooth_or_shakes_all_the_time_is_no_bounce(but):
     assert touched_spans(*bounce(**but)) == []
+
+
+def test_a_straight_line_over_an_outage_is_no_measurement():
+    t = np.arange(0.0, 60.0, 0.1)
+    there = (t < 20.0) | (t > 30.0)
+    stream = Stream(t[there], np.ones((np.count_nonzero(there), 1)))
+    at = np.array([5.0, 19.5, 21.0, 29.0, 31.0, 59.0])
+    assert stream.known(at).tolist() == [True, True, False, False, True, True]
+    # A stream that is slow all the time has none.
+    assert Stream(t[::50], np.ones((len(t[::50]), 1))).known(at).all()
