@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.effects.slow_wind import Wander, covariance_of, nodes_of
+from onboard.core.vehicle.effects.slow_wind import Wander, covariance_of, may_wander, nodes_of
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.limits import RECEIVER_M_S
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, log_spread, whitened
@@ -104,7 +104,7 @@ def wander_of(fit: Fit) -> Wander | None:
     Args:
         fit: of everything else, with regressors that are not told from the past.
     """
-    if fit.model.flight.parts > 1:
+    if not may_wander(fit.model.flight):
         return None
     rows = _Rows.of(fit)
     best = _best(rows, fit.noise)

@@ -33,6 +33,11 @@ class Wander:
     time_s: float
 
 
+def may_wander(flight: Flight) -> bool:
+    """Whether it is asked of a flight: it is one, and nobody measured its wind."""
+    return flight.parts == 1 and not bool(np.isfinite(flight.measured_wind).any())
+
+
 def nodes_of(flight: Flight) -> Array:
     """(k,) s, at which the slow wind of a flight is told; straight lines between them."""
     lasted = float(flight.t[-1] - flight.t[0])
@@ -104,5 +109,5 @@ class SlowWind(Effect):
 
     def missing(self, air: Air) -> str:
         """It takes one flight, and a wind that nobody measured."""
-        alone = air.flight.parts == 1 and not air.flight.measured_wind.shape[1]
-        return "" if alone else "of several flights, or of a wind that was measured"
+        asked = may_wander(air.flight)
+        return "" if asked else "of several flights, or of a wind that was measured"
