@@ -26,7 +26,6 @@ from onboard.core.vehicle.effects.own_motion import OwnMotion
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
 from onboard.core.vehicle.effects.rotor_wind import RotorWind
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
-from onboard.core.vehicle.effects.slow_wind import SlowWind, Wander, doubt_of
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.thrust_tilt import ThrustTilt
@@ -71,7 +70,6 @@ class Variant:
         among: whether there are other flights of the vehicle, though one alone is looked at.
         beyond: what repeats with the motion, or with time, and is no effect's
             (:mod:`onboard.core.vehicle.structure`).
-        slow: how the wind wanders; None: it does not.
     """
 
     profile_top: float = TOP_M
@@ -82,7 +80,6 @@ class Variant:
     through: float = 0.0
     among: bool = False
     beyond: tuple[str, ...] = ()
-    slow: Wander | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,11 +196,9 @@ def copter_model(
         return Air(of, voltage_of(of))
 
     still = start(flight)
-    wanders = doubt_of(flight, variant.slow)
     everything: list[Effect] = [
-        own([Wind(sigma, wanders) for sigma in wind_sigmas(flight)]),
+        own([Wind(sigma) for sigma in wind_sigmas(flight)]),
         *([WindChange(flight)] if CHANGE in variant.beyond else []),
-        *([SlowWind(flight, variant.slow)] if variant.slow else []),
         own([WindProfile(variant.profile_top) for _ in parts]),
         *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),

@@ -31,7 +31,6 @@ from onboard.core.vehicle.effects.rotor_wind import PLAUSIBLE as THROUGH
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
-from onboard.core.vehicle.effects.wind_change import CHANGE
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import Flight
@@ -52,7 +51,6 @@ from onboard.core.vehicle.signals import Signals
 from onboard.core.vehicle.structure import structures
 from onboard.core.vehicle.sudden import CHANGES, change_of
 from onboard.core.vehicle.turbulence import turbulence_of
-from onboard.core.vehicle.wander import wander_of
 
 MANOEUVRES = {
     e.name: e.manoeuvre
@@ -113,9 +111,6 @@ def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, given: Var
     apart = _apart(flight, frame, force_sigma)
     plain = replace(given, moving=apart.moving, through=apart.through)
     variant, found = _with_change(flight, frame, force_sigma, plain)
-    if CHANGE not in given.beyond and (slow := wander_of(found.plain or found.fit)):
-        variant = replace(variant, slow=slow)
-        found = matched(copter_model(flight, frame, force_sigma, variant))
     seen = max(found.turbulence.rms, RECEIVER_M_S)
     answering = replace(variant, gusts=seen)
     fit = fitted(copter_model(flight, frame, force_sigma, answering))

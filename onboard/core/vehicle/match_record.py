@@ -31,12 +31,7 @@ from onboard.core.vehicle.records import (
     VehicleMatch,
 )
 from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
-from onboard.core.vehicle.wind_record import (
-    change_sentence,
-    height_sentence,
-    wander_sentence,
-    wind_of,
-)
+from onboard.core.vehicle.wind_record import change_sentence, height_sentence, wind_of
 
 PARTLY = "gusts hide a part of its numbers, and only the rest was tested"
 
@@ -120,7 +115,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
         )
     if m.turbulence.found:
         t = m.turbulence
-        value = {"rms": Compared(0.0, t.total, math.hypot(t.sigma, t.by_law), "m/s")}
+        value = {"rms": Compared(0.0, t.rms, math.hypot(t.sigma, t.by_law), "m/s")}
         if t.whole is not None:
             value["rms_with_faster"] = Compared(0.0, t.whole, t.whole_sigma, "m/s")
         out.append(Difference("turbulence", "vehicle", value, 0.0))
@@ -238,7 +233,6 @@ def note_of(m: Matched) -> str:
         above_sentence(m.above),
         beyond_sentence(beyond_of(m.model.effects)),
         change_sentence(m),
-        wander_sentence(m),
         height_sentence(m),
         remainder_sentence(m.remainders, m.unexplained),
         left_out_sentence(m.left_out),

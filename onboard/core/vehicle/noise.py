@@ -100,13 +100,6 @@ def _innovations(scaled: Array, rec: _Recursion, starts: Mask) -> Array:
     return out
 
 
-def log_spread(noise: AxisNoise, sensitivity: Array, step_s: float) -> float:
-    """Sum of the logarithms of what :func:`whitened` divides its rows by, m/s^2."""
-    rec = _recursion(step_s, noise.correlation_s, noise.white)
-    sizes = np.log(noise.size(sensitivity))
-    return float(np.sum(sizes)) + 0.5 * len(sizes) * math.log(rec.variance)
-
-
 @dataclass(frozen=True, slots=True)
 class Onsets:
     """Whitened columns (n, p), and what they are if a column is nothing before a row.

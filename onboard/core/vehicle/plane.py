@@ -22,7 +22,6 @@ from onboard.core.vehicle.effects.sensor_offset import SensorOffset
 from onboard.core.vehicle.effects.servo_lag import ServoLag
 from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
-from onboard.core.vehicle.effects.slow_wind import SlowWind, Wander, doubt_of
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
@@ -112,7 +111,6 @@ def plane_model(
     beyond: Sequence[str] = (),
     *,
     held: bool = False,
-    slow: Wander | None = None,
 ) -> ForceModel:
     """Every effect of a plane that this recording can speak of.
 
@@ -122,7 +120,6 @@ def plane_model(
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
         beyond: keys of what repeats with the motion, or with time, and is no effect's.
         held: whether the side force is the file's.
-        slow: how the wind wanders; None: it does not.
     """
     sensor = has_airspeed(flight)
 
@@ -130,11 +127,9 @@ def plane_model(
         return Air(of, columns=COLUMN + 1)
 
     still = start(flight)
-    wanders = doubt_of(flight, slow)
     everything: list[Effect] = [
-        own([Wind(sigma, wanders) for sigma in wind_sigmas(flight)]),
+        own([Wind(sigma) for sigma in wind_sigmas(flight)]),
         *([WindChange(flight)] if CHANGE in beyond else []),
-        *([SlowWind(flight, slow)] if slow else []),
         *([WindByHeight(flight)] if HEIGHT in beyond else []),
         own([WindProfile() for _ in range(flight.parts)]),
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -18,20 +16,17 @@ from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.side_force import SideForce
-from onboard.core.vehicle.effects.wind_change import CHANGE
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
-from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_curves import plane_curves
 from onboard.core.vehicle.records import Difference, VehicleMatch
 from onboard.core.vehicle.structure import structures
-from onboard.core.vehicle.wander import wander_of
 
 LEAST_INDUCED = 0.01
 """Of the file's induced drag, that a file may have where there is none [use]."""
@@ -79,10 +74,7 @@ def _found(
     if len(flying) >= FEWEST_STEPS and float(np.max(np.linalg.norm(winds, axis=1))) > 1.0:
         # What was stalled could only be told with the wind.
         found = matched(plane_model(flying, frame, force_sigma, beyond))
-    slow = None if CHANGE in beyond else wander_of(found.plain or found.fit)
-    if slow:
-        found = matched(plane_model(flying, frame, force_sigma, beyond, slow=slow))
-    found = _slipping(found, partial(plane_model, flying, frame, force_sigma, beyond, slow=slow))
+    found = _slipping(found, flying, frame, force_sigma, beyond)
     more = structures(
         found.plain or found.fit, beyond, WINGS, answering=found.fit.turned is not None
     )
@@ -92,7 +84,9 @@ def _found(
     return found
 
 
-def _slipping(found: Matched, model: Callable[..., ForceModel]) -> Matched:
+def _slipping(
+    found: Matched, flying: Flight, frame: PlaneAirframe, sigma: Array, beyond: tuple[str, ...]
+) -> Matched:
     """The same, but with the file's side force where the flight slips too little to tell it.
 
     Where sideslip is no more than errors of the velocity, a force of none fits whatever the force
@@ -102,10 +96,10 @@ def _slipping(found: Matched, model: Callable[..., ForceModel]) -> Matched:
     """
     if SideForce.name not in found.chosen.effects:
         return found
-    fit = likelier(model(held=True))
+    fit = likelier(plane_model(flying, frame, sigma, beyond, held=True))
     k = fit.model.axes.index(SIDE)
     slope = np.linalg.norm(fit.model.gust_slope(fit.theta)[:, k], axis=-1)
-    errors = math.hypot(RECEIVER_M_S, fit.model.flight.velocity_sigma)
+    errors = math.hypot(RECEIVER_M_S, flying.velocity_sigma)
     if rms(fit.residual[:, k]) > errors * rms(slope):
         return found
     return matched(fit.model, fit)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
-from onboard.core.vehicle.effects.slow_wind import SlowWind
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.limits import (
     APART,
@@ -49,7 +48,6 @@ class Turbulence:
             that is not known.
         whole_sigma: of it.
         by_law: sigma of the gusts by that of the side force that shows them, m/s.
-        slow: RMS of the slow ones, which are told of beside these as a wind that wanders, m/s.
     """
 
     rms: float
@@ -60,22 +58,14 @@ class Turbulence:
     whole: float | None = None
     whole_sigma: float = math.nan
     by_law: float = 0.0
-    slow: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """RMS with what the wind wanders by, m/s."""
-        return math.hypot(self.rms, self.slow)
 
     @property
     def largest(self) -> float:
-        """RMS of the gusts that are named, as large as they may be; else of the slow ones, m/s."""
+        """RMS of the gusts that are named, m/s, as large as they may be; none where none are."""
         if not self.found:
-            return self.slow
-        fast = self.rms + SURE * self.sigma
-        if self.whole is not None:
-            fast = max(fast, self.whole + SURE * self.whole_sigma)
-        return math.hypot(fast, self.slow)
+            return 0.0
+        slow = self.rms + SURE * self.sigma
+        return slow if self.whole is None else max(slow, self.whole + SURE * self.whole_sigma)
 
     @property
     def seen(self) -> bool:
@@ -98,12 +88,6 @@ class Turbulence:
 
 
 def turbulence_of(fit: Fit) -> Turbulence:
-    """Gusts by the noise of a fit, and the slow ones that it tells beside its noise."""
-    slow = next((e for e in fit.model.effects if isinstance(e, SlowWind)), None)
-    return replace(_fast(fit), slow=0.0 if slow is None else slow.wander.rms)
-
-
-def _fast(fit: Fit) -> Turbulence:
     """Gusts by how the lateral noise grows with the sensitivity to them.
 
     An airspeed sensor shows those along the flow directly: a plane's angles follow the gusts, so

@@ -8,8 +8,6 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.own import Own
-from onboard.core.vehicle.effects.slow_wind import SlowWind
-from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.effects.wind_change import WindChange
 from onboard.core.vehicle.effects.wind_height import WindByHeight
 from onboard.core.vehicle.effects.wind_profile import WindProfile
@@ -18,14 +16,9 @@ from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import WindEstimate
 
 
-def changing(m: Matched, kind: type[WindChange | SlowWind] = WindChange) -> Array | None:
-    """(n, 2) wind towards north and east at each step, m/s; None where it is one for all.
-
-    Args:
-        m: what was found.
-        kind: in which way it becomes another.
-    """
-    change = next((e for e in m.model.effects if isinstance(e, kind)), None)
+def changing(m: Matched) -> Array | None:
+    """(n, 2) wind towards north and east at each step, m/s; None where it is one for all."""
+    change = next((e for e in m.model.effects if isinstance(e, WindChange)), None)
     if change is None:
         return None
     mean = m.fit.theta[m.model.indices("wind")]
@@ -44,17 +37,6 @@ def change_sentence(m: Matched) -> str:
     return (
         f"the wind became another: towards north and east from {north:.1f} and {east:.1f} m/s to "
         f"{n:.1f} and {e:.1f}; its mean is told, and no setting makes it"
-    )
-
-
-def wander_sentence(m: Matched) -> str:
-    """What a person is told of a wind that wanders, where that makes it less sure than matters."""
-    slow = next((e for e in m.model.effects if isinstance(e, SlowWind)), None)
-    if slow is None or slow.wander.rms < FLOOR_M_S:
-        return ""
-    return (
-        f"the wind wanders by {slow.wander.rms:.1f} m/s within {slow.wander.time_s:.0f} s: a "
-        "constant one is told no better than its mean over this flight tells it"
     )
 
 
@@ -91,8 +73,7 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         if isinstance(law_of, WindProfile):
             factor = law_of.factor(m.model.start(flight), exponent)
     numbers, since = np.unique(fit.block), flight.since_start
-    slowly = changing(m, SlowWind)
-    changed = changing(m) if slowly is None else slowly
+    changed = changing(m)
     series, spread, when, heights, ekf, law = [], [], [], [], [], []
     for block, block_number in zip(fit.blocks, numbers, strict=True):
         mine = fit.block == block_number
@@ -121,14 +102,12 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         sigmas[1],
         float(np.mean(flight.height[its])) - flight.ground,
         exponent,
-        m.turbulence.total if m.turbulence.found else None,
+        m.turbulence.rms if m.turbulence.found else None,
         np.array(when),
         np.array(heights),
         np.array(series).reshape(-1, 2),
         np.array(spread).reshape(-1, 2),
         np.array(ekf).reshape(-1, 2),
         np.array(law).reshape(-1, 2),
-        0.0
-        if changed is None or slowly is not None
-        else math.sqrt(2.0) * rms(changed - np.mean(changed, axis=0)),
+        0.0 if changed is None else math.sqrt(2.0) * rms(changed - np.mean(changed, axis=0)),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from onboard.core.maths.arrays import Array
@@ -24,18 +23,16 @@ class Wind(ByStep):
     name = "wind"
     manoeuvre = "fly at two headings, or at two speeds, for a minute each"
 
-    def __init__(self, plausible: float = PLAUSIBLE_M_S, wanders: float = 0.0) -> None:
+    def __init__(self, plausible: float = PLAUSIBLE_M_S) -> None:
         """The nominal air stands still.
 
         Args:
             plausible: standard deviation of a component; of a wind that was measured, by how much
                 it may be off, m/s.
-            wanders: by how much the mean of the flight is off a constant one, m/s.
         """
-        doubt = math.hypot(DOUBT_M_S, wanders)
         super().__init__(
             [
-                Unknown(name, 0.0, plausible, FLOOR_M_S, "m/s", doubt=doubt)
+                Unknown(name, 0.0, plausible, FLOOR_M_S, "m/s", doubt=DOUBT_M_S)
                 for name in ("north", "east")
             ]
         )
