@@ -10,7 +10,8 @@ four samples around it, so the variance of what is missed is ``36 / 240`` of the
 and of white noise its variance is less than a third of what the samples' own random walk has.
 
 Noise is everywhere and is a level of its own (:mod:`onboard.core.filter.noise`); only what is in
-the tail of the misses of its own segment counts.
+the tail of the misses of its own segment counts.  Its sigma is that of three quarters of them: half
+of a segment may stand still, and a quarter of it be a flip.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from onboard.core.filter.limits import SUDDEN
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.medians import NORMAL_MEDIAN
+from onboard.core.maths.medians import NORMAL_THREE_QUARTERS
 
 NEIGHBOURS = (-2, -1, 1, 2)
 """Through which the cubic goes: samples before and after."""
@@ -46,7 +47,7 @@ def missed_between(segment: Segment, start: Array, end: Array) -> Array:
     if len(t) <= len(NEIGHBOURS):
         return out
     miss = misses(t, x)
-    typical = np.median(np.abs(miss), axis=0) / NORMAL_MEDIAN
+    typical = np.quantile(np.abs(miss), 0.75, axis=0) / NORMAL_THREE_QUARTERS
     where, axis = np.nonzero(np.abs(miss) > SUDDEN * typical)
     if not len(where):
         return out
