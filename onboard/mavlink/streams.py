@@ -5,6 +5,8 @@ not say which message it is about.  ArduPilot denies an interval that is too sho
 loop rate and an unknown message in the same words, hence the probe with a slow interval
 after a first denial, and then bisection for the fastest interval that is granted.  An
 answer is a promise only: rates are measured, and asked for again when they do not come.
+Where the parameters say that ATTITUDE is not always of the body, ATTITUDE_QUATERNION is asked for,
+too.
 """
 
 from __future__ import annotations
@@ -14,8 +16,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.inputs import views
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
+from onboard.mavlink.parameter_messages import number_meant
+
+BODY_ATTITUDE = "ATTITUDE_QUATERNION"
 
 LEGACY_GROUPS: dict[str, int] = {
     "RAW_IMU": 1,
@@ -196,6 +202,9 @@ class Streams:
             self._streams = {stream.number: stream for stream in map(_Stream, requests)}
         except KeyError as error:
             raise ValueError(f"no MAVLink message is called {error.args[0]}") from None
+        reported = self._streams.get(MESSAGE_IDS["ATTITUDE"])
+        self._body_rate = 0.0 if reported is None else reported.request.rate
+        self._view_parameters: dict[str, float] = {}
         self.legacy = False
         self._target: tuple[int, int] | None = None
         self._current: _Stream | None = None
@@ -210,11 +219,15 @@ class Streams:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The messages to be fed: COMMAND_ACK and all that are measured."""
-        return ("COMMAND_ACK", *(stream.request.name for stream in self._streams.values()))
+        """The messages to be fed: answers, parameters, and all that are or may be measured."""
+        measured = (stream.request.name for stream in self._streams.values())
+        return tuple(dict.fromkeys(("COMMAND_ACK", "PARAM_VALUE", *measured, BODY_ATTITUDE)))
 
     def start(self, system: int, component: int, now: float) -> None:
         """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
+        if self._target != (system, component):
+            self._view_parameters.clear()
+            self._follow_views(now)
         self._target = (system, component)
         self.legacy = False
         self._current = None
@@ -238,6 +251,12 @@ class Streams:
         stream = self._streams.get(message.get_msgId())
         if stream is not None:
             stream.count()
+            return ()
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+            if message.param_id in views.ASKED:
+                value = number_meant(float(message.param_value), message.param_type)
+                self._view_parameters[message.param_id] = value
+                self._follow_views(now)
             return ()
         if (
             message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
@@ -282,6 +301,18 @@ class Streams:
             )
             for stream in self._streams.values()
         )
+
+    def _follow_views(self, now: float) -> None:
+        """Ask for the body's attitude where ATTITUDE may be another one."""
+        wanted = self._body_rate and views.tells_views(self._view_parameters, over_mavlink=True)
+        number = MESSAGE_IDS[BODY_ATTITUDE]
+        if not wanted:
+            dropped = self._streams.pop(number, None)
+            if dropped is not None and dropped is self._current:
+                self._current = None
+        elif number not in self._streams:
+            self._streams[number] = _Stream(StreamRequest(BODY_ATTITUDE, self._body_rate))
+            self._streams[number].restart(now)
 
     def _answer(self, stream: _Stream, result: int, now: float) -> None:
         if result == mavlink.MAV_RESULT_IN_PROGRESS:
