@@ -38,8 +38,8 @@ class Context:
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
     widths at none and at full; ``attitude_from`` names the record of the attitude, ``of_view``
-    says whether it is not always the body's, and
-    ``lanes`` has the times (n,) and numbers (n,) of EKF3's primary lane; ``first_time`` (s) is given to records without a time that
+    says whether it is not always the body's, and ``lanes`` has the times (n,) and numbers (n,) of
+    EKF3's primary lane; ``first_time`` (s) is given to records without a time that
     stand before all others.
     """
 
