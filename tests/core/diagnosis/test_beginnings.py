@@ -1,6 +1,5 @@
 """Where a search for noise and timing begins: where a flight is likeliest without any effect."""
 
-import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
@@ -39,11 +38,3 @@ def test_effects_are_added_where_the_flight_is_likeliest_without(begun):
     assert start.moving == plain.moving
     assert start.scale == plain.scale
     assert start.antenna == plain.antenna
-
-
-@pytest.mark.slow
-def test_with_effects_nothing_is_far_from_there(begun):
-    """What the whole model finds of a flight that has none of them is what the small one found."""
-    (_, _, plain), (_, _, whole), *_ = begun
-    assert abs(whole.delay - plain.delay) < 0.01
-    assert np.abs(np.subtract(whole.scale, plain.scale)).max() < 0.01
