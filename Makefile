@@ -58,6 +58,7 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m pytest --collect-only -qq  # what tests import is there: seconds, not the whole of them
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks $(ARGS)

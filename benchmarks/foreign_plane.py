@@ -131,7 +131,8 @@ def flown(
             rows.append(_row(sim, t - SETTLED_S, place, rng, seldom=k % SELDOM == 0))
             trim.append((sim["aero/alpha-rad"], sim["fcs/elevator-cmd-norm"]))
     speed = math.sqrt(2.0 * sim["aero/qbar-psf"] * PSF / (rho := _density(sim)))
-    return Flown(np.array(rows), *np.array(trim).T, _mass(sim), rho, speed)
+    alpha, elevator = np.array(trim).T
+    return Flown(np.array(rows), alpha, elevator, _mass(sim), rho, speed)
 
 
 def _mass(sim: Simulator) -> float:

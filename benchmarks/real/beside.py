@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.estimate.engine import Engine
+from onboard.core.diagnosis.examination import Examination
 from onboard.core.estimate.mean_force import SIX, mean_columns
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
@@ -33,7 +33,7 @@ class Beside:
 NOTHING = Beside(np.zeros(3), np.zeros((3, 3)))
 
 
-def beside(engine: Engine, faster_m_s: float, until: float) -> Beside:
+def beside(engine: Examination, faster_m_s: float, until: float) -> Beside:
     """What an engine's effects push, on the mean over flight faster than that, until a time, s."""
 
     def flown(batch: Batch, t: Array) -> Mask:

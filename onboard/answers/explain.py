@@ -102,4 +102,5 @@ def explain(
     given = recorded.answer(imu) if known else unanswered(source.vehicle.unanswered(imu))
     if (apart := recorded.contradiction(imu)) is not None:
         given = no_answer(given, apart, distinct([r.path for r in source.recordings]))
-    return Explanation(given, source, recorded.parameters, flown.notes)
+    chosen = (f"{r.path.name}: {note}" for r in source.recordings for note in r.notes)
+    return Explanation(given, source, recorded.parameters, (*flown.notes, *chosen))

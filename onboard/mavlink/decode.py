@@ -33,6 +33,7 @@ class Decoder:
         "SCALED_IMU2",
         "SCALED_IMU3",
         "ATTITUDE",
+        "ATTITUDE_QUATERNION",
         "GPS_RAW_INT",
         "GPS2_RAW",
         "VIBRATION",
@@ -69,6 +70,11 @@ class Decoder:
     def refused(self) -> dict[str, int]:
         """What could not be used, and how often, by name."""
         return self._readings.refused
+
+    @property
+    def tells_views(self) -> bool:
+        """Whether ATTITUDE is of other axes in hover than in forward flight."""
+        return self._readings.tells_views
 
     @property
     def source(self) -> tuple[int, int] | None:

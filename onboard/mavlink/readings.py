@@ -10,6 +10,9 @@ import math
 from collections.abc import Callable
 from typing import TypeAlias
 
+import numpy as np
+
+from onboard.core.inputs import views
 from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
@@ -26,6 +29,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.core.maths.frames import euler_from_rotation, rotation_from_quaternion
 from onboard.mavlink.bootclock import BootClock
 from onboard.mavlink.dialect import Message, mavlink
 from onboard.mavlink.parameter_messages import number_meant
@@ -47,6 +51,8 @@ NO_POSITION_FIX = 1
 DETECTED = 3
 """GPS_JAMMING_STATE and GPS_SPOOFING_STATE: detected and not mitigated."""
 ON_GROUND, LANDED_UNKNOWN = 1, 0
+BODY_KEPT_S = 3.0
+"""s after an ATTITUDE_QUATERNION for which ATTITUDE is not asked: what a link delays [physics]."""
 NOTHING: Samples = ()
 
 
@@ -61,6 +67,8 @@ class Readings:
         self.refused: dict[str, int] = {}
         self._clock = clock
         self._has_battery_status = False
+        self._view_parameters: dict[str, float] = {}
+        self._body_attitude = -math.inf
 
     def of(self, name: str) -> Callable[[Message], Samples]:
         """How the messages of this name are read."""
@@ -122,7 +130,27 @@ class Readings:
         t = self._clock.seconds_ms(m.time_boot_ms)
         if not (math.isfinite(m.roll) and math.isfinite(m.pitch) and math.isfinite(m.yaw)):
             return self._refuse("ATTITUDE: not finite")
+        if self.tells_views and 0.0 <= t - self._body_attitude < BODY_KEPT_S:
+            return NOTHING
         return (AttitudeSample(t, m.roll, m.pitch, m.yaw),)
+
+    def _attitude_quaternion(self, m: Message) -> Samples:
+        """Of the body always: used where ATTITUDE is not."""
+        if not self.tells_views:
+            return NOTHING
+        t = self._clock.seconds_ms(m.time_boot_ms)
+        q = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
+        size = float(np.linalg.norm(q))
+        if not 0.5 < size < 2.0:  # none yet, or damaged: its length is one
+            return self._refuse("ATTITUDE_QUATERNION: no rotation")
+        self._body_attitude = t
+        roll, pitch, yaw = map(float, euler_from_rotation(rotation_from_quaternion(q)))
+        return (AttitudeSample(t, roll, pitch, yaw, turned=True),)
+
+    @property
+    def tells_views(self) -> bool:
+        """Whether ATTITUDE is of other axes in hover than in forward flight."""
+        return views.tells_views(self._view_parameters, over_mavlink=True)
 
     # Satellite navigation
 
@@ -247,4 +275,6 @@ class Readings:
         value = number_meant(float(m.param_value), m.param_type)
         if not math.isfinite(value):
             return self._refuse("PARAM_VALUE: not finite")
+        if m.param_id in views.ASKED:
+            self._view_parameters[m.param_id] = value
         return (ParameterValue(m.param_id, value, self._clock.latest),)

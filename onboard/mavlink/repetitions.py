@@ -53,7 +53,7 @@ def _stream(sample: Sample) -> Key | None:
     if isinstance(sample, ImuSample):  # asked of every sample: this is much faster than a pattern
         return "imu", sample.imu, sample.source._value_
     if isinstance(sample, AttitudeSample):
-        return "attitude", 0, ""
+        return "attitude", int(sample.turned), ""
     # Without a fix the stamp stays that of the last one.
     if isinstance(sample, GpsFix) and sample.fix_type >= FIX_3D:
         return "gps", sample.receiver, ""

@@ -5,6 +5,8 @@ not say which message it is about.  ArduPilot denies an interval that is too sho
 loop rate and an unknown message in the same words, hence the probe with a slow interval
 after a first denial, and then bisection for the fastest interval that is granted.  An
 answer is a promise only: rates are measured, and asked for again when they do not come.
+Where the parameters say that ATTITUDE is not always of the body, ATTITUDE_QUATERNION is asked for,
+too.
 """
 
 from __future__ import annotations
@@ -12,10 +14,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 
+from onboard.core.inputs import views
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
+from onboard.mavlink.one_stream import Stream, StreamRequest, StreamState
+from onboard.mavlink.parameter_messages import number_meant
+
+__all__ = ["DEFAULT_STREAMS", "StreamRequest", "StreamState", "StreamStatus", "Streams"]
+
+BODY_ATTITUDE = "ATTITUDE_QUATERNION"
 
 LEGACY_GROUPS: dict[str, int] = {
     "RAW_IMU": 1,
@@ -34,31 +42,6 @@ LEGACY_GROUPS: dict[str, int] = {
     "WIND": 12,
 }
 """MAV_DATA_STREAM that carries each message on firmware which has only REQUEST_DATA_STREAM."""
-
-
-class StreamState(Enum):
-    """Where one message is in the negotiation, for people to read."""
-
-    WAITING = "waiting"
-    ASKED = "asked"
-    GRANTED = "granted"
-    FLOWING = "flowing"
-    SLOW = "slow"
-    SILENT = "silent"
-    UNSUPPORTED = "unsupported"
-
-
-@dataclass(frozen=True, slots=True)
-class StreamRequest:
-    """A message that is wanted at a rate (Hz)."""
-
-    name: str
-    rate: float
-
-    @property
-    def interval_ms(self) -> int:
-        """The interval to ask for, whole ms."""
-        return max(1, round(1000.0 / self.rate))
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,97 +73,6 @@ DEFAULT_STREAMS = (
 )
 
 
-class _Stream:
-    """The negotiation of one message: which intervals were denied, which one was granted.
-
-    ``ladder`` holds the intervals to choose from, fastest first; all up to ``denied`` are
-    known to be too fast, and ``granted`` is the fastest one accepted, which is also the one
-    in force, since a denial changes nothing.
-    """
-
-    def __init__(self, request: StreamRequest) -> None:
-        self.request = request
-        self.number = MESSAGE_IDS[request.name]
-        wanted = request.interval_ms
-        self.ladder = (wanted, *(step for step in limits.LADDER_MS if step > wanted))
-        self.restart(0.0)
-
-    def restart(self, now: float) -> None:
-        """Forget what was agreed: the autopilot has."""
-        self.state = StreamState.WAITING
-        self.denied = -1
-        self.granted: int | None = None
-        self.due: float | None = now
-        self.measured: float | None = None
-        self.again = 0
-        self.rechecked = False
-        self._since = now
-        self._count = 0
-
-    @property
-    def granted_ms(self) -> int | None:
-        """The interval in force, ms."""
-        return None if self.granted is None else self.ladder[self.granted]
-
-    def choose(self, too_fast: int) -> int | None:
-        """The rung of the ladder to ask for next, None when there is nothing left to ask.
-
-        ``too_fast`` is an interval (ms) that the autopilot denied for another message that
-        it does know: the limit is its loop rate, the same for all.
-        """
-        last = len(self.ladder) - 1
-        if self.granted is not None:
-            between = (self.denied + self.granted) // 2
-            return between if between > self.denied else None
-        if self.denied < 0:
-            fast = [rung for rung, step in enumerate(self.ladder) if step <= too_fast]
-            self.denied = min(fast[-1], last - 1) if fast else -1
-            return self.denied + 1
-        return last if self.denied < last else None
-
-    def count(self) -> None:
-        """One message came."""
-        self._count += 1
-
-    def measure(self, now: float) -> None:
-        """When the window of measurement is over: take the rate and judge it."""
-        elapsed = now - self._since
-        expected = 1e3 / (self.granted_ms or self.request.interval_ms)
-        if elapsed < max(limits.RATE_WINDOW_S, 4.0 / expected):
-            return
-        self.measured = self._count / elapsed
-        self._begin_window(now)
-        if self.granted is None or self.state is StreamState.ASKED:
-            return
-        if self.measured >= limits.RATE_SHORTFALL * expected:
-            self.state, self.again, self.due = StreamState.FLOWING, 0, None
-        elif self.due is None:
-            self.ask_later(now, StreamState.SLOW if self.measured else StreamState.SILENT)
-
-    def settle(self, now: float, rung: int) -> None:
-        """An interval was granted: measure what comes of it."""
-        self.granted = rung
-        self.due = None
-        self.state = StreamState.GRANTED
-        self._begin_window(now)
-
-    def give_up(self, now: float) -> None:
-        """Even the slowest interval was denied: there is no such message, unless we misheard."""
-        self.state = StreamState.UNSUPPORTED
-        self.due = None if self.rechecked else now + limits.RECHECK_S
-        self.rechecked = True
-        self.denied = -1
-
-    def ask_later(self, now: float, state: StreamState) -> None:
-        """Ask again, the later the oftener it did not help."""
-        self.state = state
-        self.due = now + limits.AGAIN_S[min(self.again, len(limits.AGAIN_S) - 1)]
-        self.again += 1
-
-    def _begin_window(self, now: float) -> None:
-        self._since, self._count = now, 0
-
-
 class Streams:
     """Gets the requested messages flowing and keeps them so; a link participant.
 
@@ -193,12 +85,15 @@ class Streams:
 
     def __init__(self, requests: Iterable[StreamRequest] = DEFAULT_STREAMS) -> None:
         try:
-            self._streams = {stream.number: stream for stream in map(_Stream, requests)}
+            self._streams = {stream.number: stream for stream in map(Stream, requests)}
         except KeyError as error:
             raise ValueError(f"no MAVLink message is called {error.args[0]}") from None
+        reported = self._streams.get(MESSAGE_IDS["ATTITUDE"])
+        self._body_rate = 0.0 if reported is None else reported.request.rate
+        self._view_parameters: dict[str, float] = {}
         self.legacy = False
         self._target: tuple[int, int] | None = None
-        self._current: _Stream | None = None
+        self._current: Stream | None = None
         self._rung = 0
         self._asked_at = 0.0
         self._asks = 0
@@ -210,11 +105,15 @@ class Streams:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The messages to be fed: COMMAND_ACK and all that are measured."""
-        return ("COMMAND_ACK", *(stream.request.name for stream in self._streams.values()))
+        """The messages to be fed: answers, parameters, and all that are or may be measured."""
+        measured = (stream.request.name for stream in self._streams.values())
+        return tuple(dict.fromkeys(("COMMAND_ACK", "PARAM_VALUE", *measured, BODY_ATTITUDE)))
 
     def start(self, system: int, component: int, now: float) -> None:
         """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
+        if self._target != (system, component):
+            self._view_parameters.clear()
+            self._follow_views(now)
         self._target = (system, component)
         self.legacy = False
         self._current = None
@@ -238,6 +137,12 @@ class Streams:
         stream = self._streams.get(message.get_msgId())
         if stream is not None:
             stream.count()
+            return ()
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+            if message.param_id in views.ASKED:
+                value = number_meant(float(message.param_value), message.param_type)
+                self._view_parameters[message.param_id] = value
+                self._follow_views(now)
             return ()
         if (
             message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
@@ -283,7 +188,19 @@ class Streams:
             for stream in self._streams.values()
         )
 
-    def _answer(self, stream: _Stream, result: int, now: float) -> None:
+    def _follow_views(self, now: float) -> None:
+        """Ask for the body's attitude where ATTITUDE may be another one."""
+        wanted = self._body_rate and views.tells_views(self._view_parameters, over_mavlink=True)
+        number = MESSAGE_IDS[BODY_ATTITUDE]
+        if not wanted:
+            dropped = self._streams.pop(number, None)
+            if dropped is not None and dropped is self._current:
+                self._current = None
+        elif number not in self._streams:
+            self._streams[number] = Stream(StreamRequest(BODY_ATTITUDE, self._body_rate))
+            self._streams[number].restart(now)
+
+    def _answer(self, stream: Stream, result: int, now: float) -> None:
         if result == mavlink.MAV_RESULT_IN_PROGRESS:
             self._asked_at = now
             return
@@ -306,7 +223,7 @@ class Streams:
         else:
             stream.ask_later(now, StreamState.WAITING)
 
-    def _refine(self, stream: _Stream, now: float) -> None:
+    def _refine(self, stream: Stream, now: float) -> None:
         """After a yes or a no: is there another interval to ask for?"""
         if stream.choose(0) is not None:
             # Before any other stream, which can then profit from the limit found here.
@@ -331,7 +248,7 @@ class Streams:
         self._rung = rung if rung is not None else stream.granted or 0
         return self._ask(stream, now)
 
-    def _ask(self, stream: _Stream, now: float) -> Sequence[Message]:
+    def _ask(self, stream: Stream, now: float) -> Sequence[Message]:
         if self._target is None:
             return ()
         stream.state = StreamState.ASKED
@@ -357,7 +274,7 @@ class Streams:
         for stream in self._streams.values():
             stream.restart(now)
 
-    def _ask_legacy(self, stream: _Stream, now: float) -> Sequence[Message]:
+    def _ask_legacy(self, stream: Stream, now: float) -> Sequence[Message]:
         """REQUEST_DATA_STREAM for the group that carries the message, at its fastest rate."""
         group = LEGACY_GROUPS.get(stream.request.name)
         if group is None or self._target is None:

@@ -18,7 +18,12 @@ from onboard.recordings.dataflash_columns import block_of, samples_in_order
 from onboard.recordings.dataflash_context import GPS_NAMES, Context, Floats, context_of
 from onboard.recordings.dataflash_formats import parse_format
 from onboard.recordings.dataflash_index import DataflashIndex, index_dataflash
-from onboard.recordings.dataflash_records import CONVERTERS, IMU_NAMES, NEEDED
+from onboard.recordings.dataflash_records import (
+    ATTITUDE_NAMES,
+    CONVERTERS,
+    IMU_NAMES,
+    NEEDED,
+)
 from onboard.recordings.dataflash_walk import FMT_LENGTH, MAGIC
 from onboard.recordings.recording import Recording, because_of, damage_notes, elapsed_s
 
@@ -27,6 +32,12 @@ Integers = NDArray[np.int64]
 BLOCK = 4096
 """Records converted at a time: bounds the memory, whatever the length of the log [cost]."""
 WANTED = frozenset(CONVERTERS) | {"GPA"}
+
+
+OF_VIEW = (
+    "in its hovering modes ATT is not the body's attitude, and there is no XKF1, which always is: "
+    "set EK3_LOG_LEVEL to 0, or fly it forward"
+)
 
 
 def is_dataflash(head: bytes) -> bool:
@@ -65,6 +76,8 @@ def open_dataflash(path: Path) -> Recording:
     t = _times(index, imu_slots)
     with np.errstate(all="ignore"):  # damaged bytes make any number
         context = context_of(index, float(t[0]))
+    unused = {*ATTITUDE_NAMES} - {context.attitude_from}
+    usable = frozenset(k for k in usable if index.formats[k].name not in unused)
 
     def read() -> Iterator[Sample]:
         return _samples(index, usable, context)
@@ -80,6 +93,7 @@ def open_dataflash(path: Path) -> Recording:
         counts=index.counts(),
         read=read,
         damage=damage,
+        notes=(OF_VIEW,) if context.of_view else (),
         gather=gather,
     )
 

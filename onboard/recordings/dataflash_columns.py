@@ -15,8 +15,13 @@ from onboard.core.inputs.blocks import NO_ATTITUDE, AttitudeColumns, Block, ImuC
 from onboard.core.inputs.samples import Sample
 from onboard.recordings.dataflash_batch import Batch
 from onboard.recordings.dataflash_context import Context
-from onboard.recordings.dataflash_inertial import attitude_angles, imu_numbers, imu_rows
-from onboard.recordings.dataflash_records import ATTITUDE_NAME, CONVERTERS, IMU_NAMES
+from onboard.recordings.dataflash_inertial import (
+    attitude_angles,
+    attitude_rows,
+    imu_numbers,
+    imu_rows,
+)
+from onboard.recordings.dataflash_records import ATTITUDE_NAMES, CONVERTERS, IMU_NAMES
 
 Batches: TypeAlias = Sequence[tuple[Places, Batch]]
 """Records of one format each, and where they stand."""
@@ -43,13 +48,14 @@ def block_of(batches: Batches, context: Context) -> Block:
     imus = [
         c for rows, batch in batches if batch.form.name in IMU_NAMES for c in _imus(rows, batch)
     ]
-    attitudes = [(rows, batch) for rows, batch in batches if batch.form.name == ATTITUDE_NAME]
+    attitudes = [(rows, batch) for rows, batch in batches if batch.form.name in ATTITUDE_NAMES]
     in_columns = {*IMU_NAMES}
     attitude = NO_ATTITUDE
     if len(attitudes) == 1:
-        in_columns.add(ATTITUDE_NAME)
+        in_columns.update(ATTITUDE_NAMES)
         rows, batch = attitudes[0]
-        attitude = AttitudeColumns(rows, batch.t, attitude_angles(batch))
+        its = attitude_rows(batch, context)
+        attitude = AttitudeColumns(rows[its], batch.t[its], attitude_angles(batch)[its])
     others = [(rows, batch) for rows, batch in batches if batch.form.name not in in_columns]
     in_order = tuple(sorted(imus, key=lambda columns: columns.places.item(0)))
     return Block(in_order, attitude, *samples_in_order(others, context))

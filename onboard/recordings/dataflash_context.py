@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs.views import tells_views
 from onboard.recordings.dataflash_formats import Format, Records
 from onboard.recordings.dataflash_index import DataflashIndex
 
@@ -20,6 +21,7 @@ LONGEST_WAIT_S = 1.0
 """ArduPilot's correction of a message's time takes off half a second at the most (max_lag_ms in
 JitterCorrection.h): what is further off is damaged, or of a receiver that has just been found."""
 EKF2 = 2.0
+ATTITUDE, EKF3_ATTITUDE = "ATT", "XKF1"
 MOTOR_FUNCTIONS = frozenset((*range(33, 41), *range(82, 86), 70))
 """SERVOn_FUNCTION of motors 1 ... 12, and of a plane's throttle."""
 CHANNELS = 14
@@ -35,7 +37,9 @@ class Context:
     s; ``vertical_speed`` says whether it
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
-    widths at none and at full; ``first_time`` (s) is given to records without a time that
+    widths at none and at full; ``attitude_from`` names the record of the attitude, ``of_view``
+    says whether it is not always the body's, and ``lanes`` has the times (n,) and numbers (n,) of
+    EKF3's primary lane; ``first_time`` (s) is given to records without a time that
     stand before all others.
     """
 
@@ -46,6 +50,9 @@ class Context:
     ekf_status_from: str
     motor_channels: tuple[str, ...]
     motor_range_us: tuple[float, float]
+    attitude_from: str
+    of_view: bool
+    lanes: Series
     first_time: float
 
 
@@ -53,6 +60,8 @@ def context_of(index: DataflashIndex, first_time: float) -> Context:
     """Look through the records that say it."""
     counts, parameters = index.counts(), _parameters(index)
     message_time = {n: _plausible(x) for n, x in _beside_fixes(index, "SMS", 1e3).items()}
+    # As ATT is it where ATT is of the body, minus AHRS_TRIM too (NavEKF3_core::getEulerAngles).
+    views, by_ekf3 = tells_views(parameters, over_mavlink=False), counts.get(EKF3_ATTITUDE, 0) > 0
     return Context(
         speed_accuracy=_beside_fixes(index, "SAcc", 1.0),
         message_time=message_time,
@@ -61,6 +70,9 @@ def context_of(index: DataflashIndex, first_time: float) -> Context:
         ekf_status_from=_ekf_status(parameters, counts),
         motor_channels=() if counts.get("CTUN") else _motor_channels(parameters),
         motor_range_us=_motor_range(parameters),
+        attitude_from=EKF3_ATTITUDE if views and by_ekf3 else ATTITUDE,
+        of_view=views and not by_ekf3,
+        lanes=_lanes(index),
         first_time=first_time,
     )
 
@@ -133,6 +145,20 @@ def _ekf_status(parameters: Mapping[str, float], counts: Mapping[str, int]) -> s
     if chosen is None:
         return "XKF4" if counts.get("XKF4") else "NKF4"
     return "NKF4" if chosen == EKF2 else "XKF4"
+
+
+def _lanes(index: DataflashIndex) -> Series:
+    """The primary lane, as the records of all lanes say it."""
+    parts = [
+        (form.numbers(records, "TimeUS") / 1e6, form.numbers(records, "PI"))
+        for form, records in index.all_of("XKF4")
+        if form.has("TimeUS", "PI")
+    ]
+    if not parts:
+        return np.zeros(0), np.zeros(0)
+    t, lane = (np.concatenate(values) for values in zip(*parts, strict=True))
+    order = np.argsort(t, kind="stable")
+    return t[order], lane[order]
 
 
 def _motor_channels(parameters: Mapping[str, float]) -> tuple[str, ...]:

@@ -57,11 +57,25 @@ def imu(batch: Batch, _context: Context) -> Converted:
 
 
 def attitude_angles(batch: Batch) -> Floats:
-    """Roll, pitch and yaw (n, 3) of ATT records, rad."""
+    """Roll, pitch and yaw (n, 3) of ATT or XKF1 records, rad."""
     columns = (batch.form.numbers(batch.records, c) for c in ("Roll", "Pitch", "Yaw"))
     return np.radians(np.column_stack(tuple(columns)))
 
 
-def attitude(batch: Batch, _context: Context) -> Converted:
-    """ATT."""
-    return samples_of(AttitudeSample, batch.t.tolist(), *attitude_angles(batch).T.tolist())
+def attitude_rows(batch: Batch, context: Context) -> NDArray[np.bool_]:
+    """(n,) whether records of an attitude are of the lane that flies."""
+    t, lane = context.lanes
+    if not batch.form.has("C") or not len(t):
+        return np.ones(len(batch.t), dtype=bool)
+    last = np.clip(np.searchsorted(t, batch.t, side="right") - 1, 0, None)
+    its: NDArray[np.bool_] = np.array(batch.integers("C")) == lane[last]
+    return its
+
+
+def attitude(batch: Batch, context: Context) -> Converted:
+    """ATT, or XKF1 where ATT is not of the body (see :mod:`onboard.core.inputs.views`)."""
+    samples: list[Sample | None] = []
+    samples += samples_of(AttitudeSample, batch.t.tolist(), *attitude_angles(batch).T.tolist())
+    for k in np.flatnonzero(~attitude_rows(batch, context)).tolist():
+        samples[k] = None
+    return samples

@@ -27,7 +27,9 @@ from onboard.core.inputs.samples import (
 from onboard.recordings.bulk import samples_of
 from onboard.recordings.dataflash_batch import Batch, Converted, Converter
 from onboard.recordings.dataflash_context import (
+    ATTITUDE,
     CHANNELS,
+    EKF3_ATTITUDE,
     GPS_NAMES,
     Context,
     Floats,
@@ -279,11 +281,11 @@ FIRMWARE = {
     "Blimp": "airship",
 }
 IMU_NAMES = ("IMU", "IMU2", "IMU3")
-ATTITUDE_NAME = "ATT"
+ATTITUDE_NAMES = (ATTITUDE, EKF3_ATTITUDE)
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     **dict.fromkeys(IMU_NAMES, (imu,)),
     **dict.fromkeys(GPS_NAMES, (gps,)),
-    ATTITUDE_NAME: (attitude,),
+    **dict.fromkeys(ATTITUDE_NAMES, (attitude,)),
     "VIBE": (vibration,),
     "CTUN": (throttle,),
     "RCOU": (motors, outputs),
@@ -302,7 +304,7 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
 NEEDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(IMU_NAMES, ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")),
     **dict.fromkeys(GPS_NAMES, ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")),
-    ATTITUDE_NAME: ("Roll", "Pitch", "Yaw"),
+    **dict.fromkeys(ATTITUDE_NAMES, ("Roll", "Pitch", "Yaw")),
     "VIBE": ("VibeX", "VibeY", "VibeZ"),
     "ARSP": ("Airspeed",),
     "XKF2": ("VWN", "VWE"),

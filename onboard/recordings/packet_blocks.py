@@ -53,6 +53,8 @@ class PacketBlocks:
         """
         if self._decoder.source is None:
             return None  # nothing is taken before the first heartbeat
+        if self._decoder.tells_views:
+            return None  # which attitudes are used depends on the others
         head = headers(self._data, at)
         columns = _Columns(len(at))
         for kind in np.unique(head.kind).tolist():

@@ -18,10 +18,11 @@ def shown(*calibrations: object, autopilot: str = "ardupilot", **about: object) 
     recording = Recording(
         Path("a-flight-with-a-rather-long-name.tlog"), "tlog", autopilot, 261.2, {}, iter, **about
     )
-    console = Console(file=io.StringIO(), width=80)
+    out = io.StringIO()
+    console = Console(file=out, width=80)
     for part in replay_report(Replay((recording,), tuple(map(unanswered, calibrations)), {})):
         console.print(part)
-    return console.file.getvalue()
+    return out.getvalue()
 
 
 def test_it_fits_into_eighty_columns():

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,6 +19,7 @@ from onboard.core.inputs.samples import (
     Throttle,
     Vibration,
 )
+from onboard.core.maths.frames import rotation_from_euler, rotation_from_quaternion
 from onboard.mavlink.codec import Codec
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import MESSAGE_IDS, mavlink
@@ -275,3 +277,50 @@ def test_any_content_of_any_message_decodes_or_is_refused(data):
         if isinstance(sample, GpsFix):
             assert math.isfinite(sample.v_n)
             assert math.isfinite(sample.v_e)
+
+
+class TestBodyAttitude:
+    """A tailsitter's ATTITUDE is of a view in hover, ATTITUDE_QUATERNION of the body always."""
+
+    @staticmethod
+    def parameter(name, value):
+        kind = mavlink.MAV_PARAM_TYPE_REAL32
+        return mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
+
+    @staticmethod
+    def quaternion(ms, *q):
+        return mavlink.MAVLink_attitude_quaternion_message(ms, *q, 0.0, 0.0, 0.0)
+
+    @pytest.fixture
+    def tailsitter(self, decoder):
+        decode(decoder, self.parameter("Q_ENABLE", 1.0))
+        decode(decoder, self.parameter("Q_TAILSIT_ENABLE", 1.0))
+        return decoder
+
+    @given(st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
+    def test_it_is_the_same_rotation(self, q):
+        decoder = Decoder()
+        decode(decoder, heartbeat())
+        decode(decoder, self.parameter("Q_ENABLE", 1.0))
+        decode(decoder, self.parameter("Q_TAILSIT_ENABLE", 1.0))
+        unit = np.array(q) / np.linalg.norm(q)
+        (sample,) = decode(decoder, self.quaternion(10_000, *unit))
+        assert sample.turned
+        made = rotation_from_euler(sample.roll, sample.pitch, sample.yaw)
+        np.testing.assert_allclose(made, rotation_from_quaternion(unit), atol=2e-6)
+
+    def test_the_view_is_left_out_while_the_body_is_told(self, tailsitter):
+        assert decode(tailsitter, attitude(10_020))  # better than nothing
+        up = math.sqrt(0.5)
+        assert decode(tailsitter, self.quaternion(10_040, up, 0.0, up, 0.0))[0].turned
+        assert decode(tailsitter, attitude(10_060)) == ()
+        assert decode(tailsitter, attitude(14_000))
+
+    def test_what_is_no_rotation_is_refused(self, tailsitter):
+        assert decode(tailsitter, self.quaternion(10_040, 0.0, 0.0, 0.0, 0.0)) == ()
+        assert decode(tailsitter, self.quaternion(10_060, math.nan, 0.0, 0.0, 1.0)) == ()
+        assert tailsitter.refused == {"ATTITUDE_QUATERNION: no rotation": 2}
+
+    def test_others_tell_it_by_angles(self, decoder):
+        assert decode(decoder, self.quaternion(10_040, 1.0, 0.0, 0.0, 0.0)) == ()
+        assert not decode(decoder, attitude(10_060))[0].turned

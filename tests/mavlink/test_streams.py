@@ -198,3 +198,33 @@ def test_a_message_that_the_dialect_lacks_is_the_programmers_error():
 def test_at_most_ten_different_intervals_by_default():
     """ArduPilot has ten buckets; an eleventh interval is put into the nearest."""
     assert len({request.interval_ms for request in DEFAULT_STREAMS}) <= 10
+
+
+def parameter(name, value):
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    message = mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
+    return received(message)
+
+
+def test_the_body_s_attitude_is_asked_for_where_another_one_is_told():
+    w = world([("ATTITUDE", 50.0), ("RAW_IMU", 50.0)])
+    w.run(5.0)
+    assert "ATTITUDE_QUATERNION" not in w.autopilot.intervals
+    for name in ("Q_ENABLE", "Q_TAILSIT_ENABLE"):
+        w.exchange(w.streams.feed(parameter(name, 1.0), w.now))
+    w.run(15.0)
+    assert w.autopilot.intervals["ATTITUDE_QUATERNION"] == w.autopilot.intervals["ATTITUDE"]
+    assert w.states()["ATTITUDE_QUATERNION"] is StreamState.FLOWING
+    w.exchange(w.streams.feed(parameter("Q_ENABLE", 0.0), w.now))
+    assert "ATTITUDE_QUATERNION" not in w.states()
+
+
+def test_another_vehicle_is_not_asked_for_it():
+    w = world([("ATTITUDE", 50.0)])
+    for name in ("Q_ENABLE", "Q_TAILSIT_ENABLE"):
+        w.exchange(w.streams.feed(parameter(name, 1.0), w.now))
+    assert "ATTITUDE_QUATERNION" in w.states()
+    w.streams.start(1, 1, w.now)  # a reboot
+    assert "ATTITUDE_QUATERNION" in w.states()
+    w.streams.start(2, 1, w.now)
+    assert "ATTITUDE_QUATERNION" not in w.states()

@@ -20,7 +20,13 @@ class TelemetryWriter:
     def __bytes__(self) -> bytes:
         return bytes(self.data)
 
-    def add(self, message: object, system: int = 1, component: int = 1, version: int = 2) -> None:
+    def add(
+        self,
+        message: mavlink.MAVLink_message,
+        system: int = 1,
+        component: int = 1,
+        version: int = 2,
+    ) -> None:
         key = system, component
         packer = self.packers.setdefault(key, mavlink.MAVLink(None, system, component))
         self.stamp_us += 1000

@@ -25,7 +25,7 @@ def test_columns_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match="not those of"):
         samples_of(AttitudeSample, [1.0], [1.0], [1.0])
     with pytest.raises(ValueError, match="not those of"):
-        samples_of(AttitudeSample, *[[1.0]] * 5)
+        samples_of(AttitudeSample, *[[1.0]] * 6)
 
 
 def test_the_collector_is_left_as_it_was():

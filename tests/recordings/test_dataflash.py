@@ -224,3 +224,41 @@ def test_log_without_inertial_records_is_refused(tmp_path):
     log.add("PARM", 5, "INS_ACCOFFS_X", 0.0, 0.0)
     with pytest.raises(RecordingError, match="IMU"):
         open_recording(saved(tmp_path, log))
+
+
+def tailsitter_log(*, with_body: bool) -> DataflashWriter:
+    """Nose up, which ATT calls level; the EKF's first lane is wrong and the second one flies."""
+    log = modern_log()
+    log.format(20, "XKF4", "QBHB", "TimeUS,C,SS,PI")
+    log.format(21, "XKF1", "QBccC", "TimeUS,C,Roll,Pitch,Yaw")
+    for name in ("Q_ENABLE", "Q_TAILSIT_ENABLE"):
+        log.add("PARM", 5_000_000, name, 1.0, 0.0)
+    for k in range(40):
+        t = 5_000_000 + 100_000 * k
+        for lane, pitch in ((0, 70.0), (1, 87.5)):
+            log.add("XKF4", t, lane, 831, 1)
+            if with_body:
+                log.add("XKF1", t, lane, 1.5, pitch, 350.0)
+    return log
+
+
+def test_the_attitude_is_the_body_s_where_att_is_of_a_view(tmp_path):
+    path = saved(tmp_path, tailsitter_log(with_body=True))
+    told = of_type(path, AttitudeSample)
+    assert len(told) == 40
+    for sample in told:
+        angles = (sample.roll, sample.pitch, sample.yaw)
+        assert np.degrees(angles) == pytest.approx((1.5, 87.5, 350.0), abs=1e-3)
+    recording = open_recording(path)
+    assert recording.notes == ()
+    assert recording.gather is not None
+    (block,) = recording.gather()
+    np.testing.assert_array_equal(block.attitude.t, [s.t for s in told])
+    np.testing.assert_array_equal(block.attitude.angles, [(s.roll, s.pitch, s.yaw) for s in told])
+
+
+def test_it_is_said_where_the_log_has_the_view_s_only(tmp_path):
+    path = saved(tmp_path, tailsitter_log(with_body=False))
+    assert len(of_type(path, AttitudeSample)) == 50
+    (note,) = open_recording(path).notes
+    assert "XKF1" in note

@@ -145,8 +145,12 @@ class _Asked:
         """The flight with its own noise and timing, which are looked for from those of ``start``.
 
         Else from those of the accelerometer beside it: it has flown the same flight with the same
-        receiver, and a search takes a third of the passes from there.
+        receiver, and a search takes a third of the passes from there.  Else from where they are
+        likeliest with nothing but scale, offset and timing: with every effect at once, a search
+        that knows nothing yet is led away by what effects make up for, and does not come back.
         """
+        if start is None and self.beside is None:
+            start = self.plain(batches)
         made = Examination(
             self.engine,
             self.testable,
@@ -158,6 +162,14 @@ class _Asked:
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
         return made.with_noise()
+
+    def plain(self, batches: Sequence[Batch]) -> Examination:
+        """The flight without any effect, noise and timing at their likeliest; no sums."""
+        made = Examination(
+            self.engine, (), t0=self.t0, batches=batches, carried=self.carried, traced=False
+        )
+        made.tune()
+        return made
 
 
 def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:

@@ -23,7 +23,7 @@ def measured(R_nb: Array, epoch: Epoch, v_down: float, turned: Array) -> Array:
 
 def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     """See :func:`onboard.core.filter.kernel.predict`."""
-    loops.predict(carried, R_nb, step.duration, step.moved, step.columns, *process)
+    loops.predict(carried, R_nb, step.duration, step.moved, step.columns, step.missed, *process)
 
 
 def whiten(carried: Array, z: Array, reading: Reading, noise: Array) -> Whitening:

@@ -31,12 +31,14 @@ class Step:
             by, (3, 3), m/s per rad/s.
         columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
             nothing is known, column 0 is zero.
+        missed: (6,) variances of what the samples miss: of velocity, (m/s)^2, and turn, rad^2.
     """
 
     duration: float
     turn: Array
     moved: Array
     columns: Array
+    missed: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +49,14 @@ class Steps:
     turn: Array
     moved: Array
     columns: Array
+    missed: Array
 
     def __len__(self) -> int:
         return len(self.duration)
 
     def __getitem__(self, k: int) -> Step:
-        return Step(float(self.duration[k]), self.turn[k], self.moved[k], self.columns[k])
+        duration = float(self.duration[k])
+        return Step(duration, self.turn[k], self.moved[k], self.columns[k], self.missed[k])
 
 
 def steps(
@@ -64,6 +68,7 @@ def steps(
     columns: Array,
     columns_to_end: Array,
     columns_turn: Array,
+    missed: Array,
 ) -> Steps:
     """K steps of prediction from their integrals.
 
@@ -76,6 +81,7 @@ def steps(
         columns: (K, 3, m) as ``force``, per unit of each of the m unknowns.
         columns_to_end: (K, 3, m) as ``force_to_end``.
         columns_turn: (K, 3, m) the turn that they add, rad per unit.
+        missed: (K, 6) as in :class:`Step`.
     """
     K, _, m = columns.shape
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
@@ -87,7 +93,7 @@ def steps(
     stack[:, 0:3, 1:] = arm @ columns_turn - columns
     stack[:, 3:6, 1:] = columns_to_end
     stack[:, 6:9, 1:] = -columns_turn
-    return Steps(duration, np.ascontiguousarray(turn), moved, stack)
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed)
 
 
 @dataclass(frozen=True, slots=True)

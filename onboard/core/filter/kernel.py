@@ -35,6 +35,7 @@ from onboard.core.filter.state import (
     RATE,
     STATES,
     H,
+    V,
 )
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import prefer_compiled, preferred
@@ -177,6 +178,9 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     var += process.after
     carried[:, :MEASURED, :m1] += stack_to_ned(R_nb, step.columns)
     carried[:, :MEASURED, 0] += process.fall
+    if step.missed.any():
+        P[:, 0, V, V] += (R_nb * step.missed[:3]) @ R_nb.T
+        P[:, 0, PSI, PSI] += (R_nb * step.missed[3:]) @ R_nb.T
     if P.shape[1] > 1:
         P[:, 1:, :3, :3] += step.duration * R_nb.T[:, :, None] * R_nb.T[:, None, :]
 

@@ -154,6 +154,13 @@ information are those of before [cost]."""
 SHARES: Final = (0.0, 0.25, 0.5)
 """Shares of a step that are tried beside the whole of it, in case it was too long [cost]."""
 
+# What samples miss (missed).
+
+SUDDEN: Final = 4.9
+"""Sigmas of the misses of a segment past which a sample is no noise but something sudden
+[probability: 1e-6 of a Gaussian's; what noise is taken for it costs less than a third of its own
+random walk]."""
+
 # Noise in the regressors (regressor_noise).
 
 NOISE_MEAN_S: Final = 0.05

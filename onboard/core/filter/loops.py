@@ -50,6 +50,17 @@ def _drive(R_nb: Array, stack: Array, carried: Array) -> None:
                 row[c] += f * from_[c]
 
 
+@part
+def _spread(R_nb: Array, var: Array, first: int, P: Array) -> None:
+    """Add three variances along body axes, from ``first`` on, to a covariance in NED."""
+    for k in range(3):
+        x = var[first + k]
+        if x > 0.0:
+            for i in range(3):
+                for j in range(3):
+                    P[i, j] += x * R_nb[i, k] * R_nb[j, k]
+
+
 @compiled("void(f8[:,:], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1])")
 def measured(
     R_nb: Array, stack: Array, along: Array, v_down: float, turned: Array, z: Array
@@ -112,7 +123,7 @@ def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1],"
     " f8[:,::1], f8[:,::1])"
 )
 def predict(
@@ -121,6 +132,7 @@ def predict(
     duration: float,
     moved: Array,
     stack: Array,
+    missed: Array,
     fall: Array,
     decay: Array,
     swing: Array,
@@ -150,6 +162,8 @@ def predict(
             _from_the_right(F, decay[b], swing[b], C[:, at : at + STATES])
         for i in range(STATES):
             C[i, m1 + i] += after[b, i]
+        _spread(R_nb, missed, 0, C[0:3, m1 : m1 + 3])
+        _spread(R_nb, missed, 3, C[4:7, m1 + 4 : m1 + 7])
         _drive(R_nb, stack, C)
         for i in range(MEASURED):
             C[i, 0] += fall[i]

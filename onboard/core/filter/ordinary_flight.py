@@ -128,6 +128,7 @@ class OrdinaryFlight:
             steps.turn,
             steps.moved,
             steps.columns,
+            steps.missed,
             epochs.latitude,
             self._ends,
             self._offered,

@@ -119,9 +119,9 @@ def _note(
 
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
-    " f8[:,:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1], i8[::1],"
-    " f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1],"
-    " f8[::1], f8, i8, i8,"
+    " f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1],"
+    " i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1],"
+    " f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -135,6 +135,7 @@ def run(
     turn: Array,
     moved: Array,
     columns: Array,
+    missed: Array,
     latitude: Array,
     ends: Index,
     offered: Index,
@@ -172,10 +173,11 @@ def run(
         most: epochs to take.
         symmetry: updates after which covariances are made symmetric.
         theta: (m,) estimate.
-        duration: (K,), turn, moved and columns as in :class:`~..innovations.Steps`.
+        duration: (K,), turn, moved, columns and missed as in :class:`~..innovations.Steps`.
         turn: see there.
         moved: see there.
         columns: see there.
+        missed: see there.
         latitude: (n,) rad.
         ends: (K,) the epoch at the end of each step; -1: none.
         offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
@@ -222,6 +224,7 @@ def run(
             turn[k],
             moved[k],
             columns[k],
+            missed[k],
             latitude[max(e, 0)],
             theta,
             walk,

@@ -242,7 +242,7 @@ class Assembly:
             w_b,
             raw_s,
             t_attitude,
-            _attitude(angles, parameters, over_mavlink=self.streams.over_mavlink),
+            _attitude(angles, parameters, self.streams),
             parameters.R_bs,
             slow,
             parameters.lever_arm(imu),
@@ -337,13 +337,15 @@ def _with_rates(
     return imu, rows
 
 
-def _attitude(angles: Array, parameters: ParametersInForce, *, over_mavlink: bool) -> Attitudes:
+def _attitude(angles: Array, parameters: ParametersInForce, streams: Streams) -> Attitudes:
     """Attitude of the accelerometer's body axes from the reported angles (k, 3), rad."""
+    if streams.turned:
+        return ReportedAttitude(angles, parameters.trim, turned=True)
     # Firmware that has trims but no choice of EKF is older than the EKFs.
     old = "AHRS_TRIM_X" in parameters.values and "AHRS_EKF_TYPE" not in parameters.values
     if old or parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
         return ReportedAttitude(angles, parameters.trim, by_dcm=True)
     pitch_trim = 0.0
-    if over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
+    if streams.over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
         pitch_trim = float(np.deg2rad(parameters.get("PTCH_TRIM_DEG", default=0.0)))
     return ReportedAttitude(angles, parameters.trim, pitch_trim)

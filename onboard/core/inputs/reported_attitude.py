@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Vector3
-from onboard.core.maths.frames import untrimmed_rotation, untrimmed_rotation_dcm
+from onboard.core.maths.frames import (
+    untrimmed_rotation,
+    untrimmed_rotation_dcm,
+    untrimmed_rotation_quaternion,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +25,14 @@ class ReportedAttitude:
         trim: the autopilot's, rad.
         pitch_trim: see :func:`~onboard.core.maths.frames.untrimmed_rotation`.
         by_dcm: whether DCM reports it, not an EKF.
+        turned: whether the trim was taken off by turning the body; no pitch trim is, then.
     """
 
     angles: Array
     trim: Vector3
     pitch_trim: float = 0.0
     by_dcm: bool = False
+    turned: bool = False
 
     def __len__(self) -> int:
         return len(self.angles)
@@ -34,6 +40,8 @@ class ReportedAttitude:
     def __getitem__(self, some: slice | NDArray[np.bool_]) -> Array:
         """(j, 3, 3) body axes of the accelerometer to NED of those chosen."""
         roll, pitch, yaw = self.angles[some].T
+        if self.turned:
+            return untrimmed_rotation_quaternion(roll, pitch, yaw, self.trim)
         if self.by_dcm:
             return untrimmed_rotation_dcm(roll, pitch, yaw, self.trim)
         return untrimmed_rotation(roll, pitch, yaw, self.trim, self.pitch_trim)

@@ -44,12 +44,16 @@ class ImuSample:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSample:
-    """The autopilot's attitude solution (rad), as reported: ArduPilot's is minus AHRS_TRIM."""
+    """The autopilot's attitude solution (rad), as reported: ArduPilot's is minus AHRS_TRIM.
+
+    ``turned`` says that the trim was taken off by turning the body, not angle by angle.
+    """
 
     t: float
     roll: float
     pitch: float
     yaw: float
+    turned: bool = False
 
 
 FIX_3D = 3

@@ -51,12 +51,13 @@ class Streams:
     Attributes:
         imus: inertial samples by accelerometer.
         recorded: the recorded attitude as reported: roll, pitch, yaw, rad.
+        turned: whether its trim was taken off by turning the body.
         slow: signals that only a diagnosis looks at, by name.
         fixes: of the receiver that is watched.
         over_mavlink: whether inertial samples came by MAVLink, not from a log.
     """
 
-    __slots__ = ("_R_bs", "_passing", "fixes", "imus", "over_mavlink", "recorded", "slow")
+    __slots__ = ("_R_bs", "_passing", "fixes", "imus", "over_mavlink", "recorded", "slow", "turned")
 
     def __init__(self) -> None:
         self.imus: dict[int, ImuTrack] = {}
@@ -64,6 +65,7 @@ class Streams:
         self.slow: dict[str, SlowTrack] = {}
         self.fixes = FixTrack()
         self.over_mavlink = False
+        self.turned = False
         self._R_bs: tuple[float, Array | None] = (0.0, None)
         self._passing: _Passing | None = None
 
@@ -78,7 +80,7 @@ class Streams:
     def continued_by(self, block: Block) -> bool:
         """Whether a plain block has nothing that would be refused for what is here."""
         times = block.attitude.t
-        if len(times) and not times.item(0) > self.recorded.last:
+        if len(times) and (self.turned or not times.item(0) > self.recorded.last):
             return False
         for columns in block.kept:
             track = self.imus.get(columns.imu)
@@ -132,6 +134,9 @@ class Streams:
 
     def attitude(self, sample: AttitudeSample) -> None:
         """Take a recorded attitude."""
+        if sample.turned is not self.turned:
+            # All that is kept has its trim taken off in one way.
+            self.recorded, self.turned = SlowTrack(), sample.turned
         angles = (sample.roll, sample.pitch, sample.yaw)
         # All three exactly zero: an estimator that has not begun.
         if angles != (0.0, 0.0, 0.0):

@@ -224,3 +224,15 @@ def untrimmed_rotation_dcm(
     """
     result: Array = rotation_from_euler(roll, pitch, yaw) @ rotation_from_euler(*trim)
     return result
+
+
+def untrimmed_rotation_quaternion(
+    roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike, trim: Vector3 = (0.0, 0.0, 0.0)
+) -> Array:
+    """The same of the MAVLink message ATTITUDE_QUATERNION, its quaternion as angles.
+
+    There the trim is a rotation vector of the body: ``R_reported = R_nb exp(-trim x)``
+    (``_get_quaternion`` in AP_AHRS.cpp).
+    """
+    result: Array = rotation_from_euler(roll, pitch, yaw) @ rotation_from_vector(trim)
+    return result

@@ -10,6 +10,7 @@ import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from onboard.core.inputs import views
 from onboard.core.inputs.parameters import receiver_names
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.pushing import limits
@@ -50,10 +51,9 @@ KNOWLEDGE = (
         for name in names
     ),
     *(f"INS_POS{imu}_{axis}" for imu in IMUS for axis in "XYZ"),
-    "FLIGHT_OPTIONS",
-    "PTCH_TRIM_DEG",
+    *sorted(views.ASKED),
 )
-"""Good to have, in a recording too; under one of two names, by version; the last two of planes."""
+"""Good to have, in a recording too; under one of two names, by version; the last ones of planes."""
 NEEDED = frozenset((*REQUIRED, *MEANING, *KNOWLEDGE))
 
 

@@ -54,7 +54,8 @@ def turned(rng):
 
 def step_of(rng, m):
     shapes = ((3, 3), (3,), (3,), (3, 3), (3, m), (3, m), (3, m))
-    return steps(np.array([0.2]), *(0.3 * rng.normal(size=(1, *s)) for s in shapes))[0]
+    integrals = (0.3 * rng.normal(size=(1, *s)) for s in shapes)
+    return steps(np.array([0.2]), *integrals, rng.uniform(0.0, 0.1, size=(1, 6)))[0]
 
 
 def process_of(rng, members):
@@ -108,6 +109,8 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     P[:, 0] += first
     P = F[:, None] @ P @ np.swapaxes(F, -1, -2)[:, None] + grown
     P[:, 0] += then
+    P[:, 0, :3, :3] += R @ np.diag(step.missed[:3]) @ R.T
+    P[:, 0, 4:7, 4:7] += R @ np.diag(step.missed[3:]) @ R.T
     X = F @ X
     X[:, :MEASURED] += kernel.stack_to_ned(R, step.columns)
     X[:, :MEASURED, 0] += process.fall

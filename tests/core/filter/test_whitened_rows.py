@@ -165,6 +165,8 @@ LEVELS = NoiseLevels(
 ACCELERATION = np.array([0.0, 4.0, 0.0])
 """That the moment's jitter is multiplied by; one axis, for the filter takes axes one by one."""
 DT, SUB = 0.01, 10
+BLOW_EVERY, BLOW_SIGMA = 7, np.array([0.2, 0.1, 0.3, 0.02, 0.01, 0.03])
+"""Steps; and what their samples miss: m/s and rad, body axes."""
 START_SIGMA = 0.02
 
 
@@ -235,7 +237,11 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         keep = np.exp(-T / COLOUR_TIME_S)
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
         wander += levels.height_walk * np.sqrt(T) * normal()
-        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], np.zeros((3, 1)))
+        missed = BLOW_SIGMA if k % BLOW_EVERY == 0 else np.zeros(6)
+        v = v + R @ P.T @ (missed[:3] * normal(size=3))
+        R = R @ P.T @ rotation_from_vector(missed[3:] * normal(size=3)) @ P
+        no_turn = np.zeros((3, 1))
+        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], no_turn, missed**2)
         step = steps(np.array([T]), *(x[None] for x in integrals))[0]
         filter_.predict(step, theta, 0.0)
         made = filter_.update(epoch((k + 1) * T), theta, Covariance(np.zeros((1, 1))))

@@ -8,7 +8,13 @@ import pytest
 from onboard.core.inputs.reported_attitude import ReportedAttitude
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.compiling import prefer_compiled, preferred
-from onboard.core.maths.frames import untrimmed_rotation, untrimmed_rotation_dcm
+from onboard.core.maths.frames import (
+    euler_from_rotation,
+    rotation_from_euler,
+    rotation_from_vector,
+    untrimmed_rotation,
+    untrimmed_rotation_dcm,
+)
 
 TRIM = (0.02, -0.03, 0.0)
 
@@ -49,3 +55,11 @@ def test_between_samples_it_is_that_of_the_matrices(angles, count):
     as_matrices, also_near = replace(segment, R_attitude=reported[:]).attitude_at(at, 0.03)
     np.testing.assert_array_equal(R, as_matrices)
     np.testing.assert_array_equal(near, also_near)
+
+
+def test_a_quaternion_s_trim_is_a_turn_of_the_body(angles):
+    trim = (0.1, -0.15, 0.0)
+    body = rotation_from_euler(*angles.T)
+    told = euler_from_rotation(body @ rotation_from_vector(-np.array(trim)))
+    reported = ReportedAttitude(np.stack(told, axis=-1), trim, turned=True)
+    np.testing.assert_allclose(reported[:], body, atol=1e-12)

@@ -99,7 +99,7 @@ def through(apart: float, count: int = 7) -> list[tuple[np.ndarray, object]]:
 
 def matched_beside_the_others(every: list[tuple[np.ndarray, object]]) -> VehicleMatch:
     """With the winds of all flights measured but of the first."""
-    told = [f if k == 0 else measured(f, *w, 0.1) for k, (w, f) in enumerate(every)]
+    told = [f if k == 0 else measured(f, w[0], w[1], 0.1) for k, (w, f) in enumerate(every)]
     sigmas = np.tile(SIGMA, (len(every), 1))
     return match_copter(joined(told), Signals(kind="copter"), CopterAirframe(), sigmas)
 
