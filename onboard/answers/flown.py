@@ -41,6 +41,7 @@ from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
+from onboard.core.vehicle.touches import joined, touched_spans
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
@@ -149,6 +150,8 @@ class Flown:
                     wings=kind == "plane",
                 )
             self.ground = float(np.percentile(lasting_height(t, height), 0.5))
+            if self.grounded and self.kind == "copter":
+                self.grounded = joined([*self.grounded, *self._touched(t, v, height)])
         step = _averaged_over(self._kept)
         for sample in with_landings(_slower(self._kept, step), self.grounded):
             self.recorded.feed(sample)
@@ -165,6 +168,13 @@ class Flown:
             return None
         rows = np.array(turned)
         return lifted & (scatter_near(t, rows[:, 0], rows[:, 1:]) > STILL_RATE_RAD_S)
+
+    def _touched(self, t: Array, v_n: Array, height: Array) -> list[tuple[float, float]]:
+        """Bounces, s, by fixes (n,) and what the accelerometer felt."""
+        felt = np.array([(s.t, *s.f_b) for s in self._kept if isinstance(s, ImuSample)])
+        if not len(felt):
+            return []
+        return touched_spans(t, v_n, height, self.ground, felt[:, 0], felt[:, 1:])
 
     def answer(self, imu: int) -> Answer:
         """What the sensor level says."""

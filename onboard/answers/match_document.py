@@ -114,6 +114,7 @@ class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
     verdict: str
     note: str
     flight_s: float | None
+    unexplained_share: float
     effects: list[MatchedEffectDocument]
     wind: WindDocument | None
     mismatch: dict[str, HeldOutDocument]
@@ -145,6 +146,7 @@ def match_document(match: Match, verified: FlownAgain | None = None) -> MatchDoc
         verdict=match.verdict.value,
         note=vehicle.note,
         flight_s=finite(vehicle.seconds),
+        unexplained_share=vehicle.unexplained,
         effects=[_effect(d) for d in match.effects],
         wind=None if vehicle.wind is None else _wind(vehicle.wind),
         others=[

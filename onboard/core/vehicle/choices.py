@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.fit import BlockSums, Fit
-from onboard.core.vehicle.limits import FOLDS, SURE, TESTABLE
+from onboard.core.vehicle.limits import APART, FOLDS, SURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,10 @@ class Choices:
         """Whether one of these unknowns (places) is off also without any two blocks in a row.
 
         What is of the vehicle is there all the time, what is of the air for a while (a gust front)
-        is not.  Only flight that would show the difference is a witness against it.
+        is not.  A witness against it is flight that does not show the difference, and that the two
+        blocks contradict: that a part of a flight shows it less surely than all of it is no news.
+        By how much two blocks move a number by chance is the difference of the variances without
+        them and with them (J. A. Hausman, *Econometrica* 46, 1978).
 
         Args:
             effects: that are free.
@@ -105,24 +109,36 @@ class Choices:
         """
         f, blocks = self.fit, self.fit.blocks
         lasts = set(places)
+        free = self._free(effects)
+        by_all = self._spread(self._N, free)
         for i in range(len(blocks) - 1):
             N, b, _ = _sum(blocks[i : i + 2])
-            x, free = self._at(effects, self._N - N, self._b - b)
-            rest = (self._N - N + np.diag(f.prior))[np.ix_(free, free)]
-            plain = np.sqrt(np.diag(np.linalg.inv(rest)) * f.inflation[free])
-            sigmas = dict(zip(free, plain.tolist(), strict=True))
+            x, _ = self._at(effects, self._N - N, self._b - b)
+            sigmas = self._spread(self._N - N, free)
             for k in tuple(lasts):
                 unknown = f.model.unknowns[k]
                 apart = abs(f.theta[k] + x[k] - unknown.nominal)
-                told = abs(f.theta[k] + whole.x[k] - unknown.nominal) > TESTABLE * sigmas[k]
-                if told and apart < unknown.floor + SURE * sigmas[k]:
+                moved = abs(whole.x[k] - x[k])
+                chance = math.sqrt(max(sigmas[k] ** 2 - by_all[k] ** 2, 0.0))
+                if moved > APART * chance and apart < unknown.floor + SURE * sigmas[k]:
                     lasts.discard(k)
         return bool(lasts)
+
+    def _free(self, effects: Sequence[str]) -> list[int]:
+        """Places of what is free with these effects."""
+        return sorted({i for n in (*effects, "") for i in self.fit.model.indices(n)})
+
+    def _spread(self, N: Array, free: list[int]) -> dict[int, float]:
+        """Inflated sigmas of the free unknowns by sums (m, m), by place."""
+        f = self.fit
+        information = (N + np.diag(f.prior))[np.ix_(free, free)]
+        plain = np.sqrt(np.diag(np.linalg.inv(information)) * f.inflation[free])
+        return dict(zip(free, plain.tolist(), strict=True))
 
     def _at(self, effects: Sequence[str], N: Array, b: Array) -> tuple[Array, list[int]]:
         """Unknowns about the fit's by these sums, and which of them are free."""
         f = self.fit
-        free = sorted({i for n in (*effects, "") for i in f.model.indices(n)})
+        free = self._free(effects)
         x = self._nominal.copy()
         x[free] = 0.0
         full_N, full_b = N + np.diag(f.prior), b + f.prior * self._nominal

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.atmosphere import density
 from onboard.core.vehicle.limits import CONTACT_M_S2, STEP_S
-from onboard.core.vehicle.signals import Signals, Stream
+from onboard.core.vehicle.signals import COVERED, Signals, Stream
 from onboard.core.vehicle.spans import inside
 from onboard.core.vehicle.trajectory import Motion
 
@@ -180,7 +180,7 @@ def flight_of(
         return None
     joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
-    air = ~inside(joined["t"], grounded) & ~hit
+    air = ~inside(joined["t"], grounded) & ~hit & (joined["known"] > 0.0)
     if not air.any():
         return None
     flight = Flight(
@@ -237,10 +237,18 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
         *(signals.outputs, commands, signals.battery, signals.airspeed),
         *(signals.ekf_wind, signals.measured_wind),
     )
+    # Speed through the air and commands are no straight lines over an outage.
+    needed = [commands] if signals.kind == "copter" else [commands, signals.airspeed]
+    there = [s.known(m.t) for s in needed]
+    absent = [s for s, known in zip(needed, there, strict=True) if np.mean(known) <= COVERED]
+    outages = [~known for known in there if np.mean(known) > COVERED]
+    lost = np.any(outages, axis=0) if outages else np.zeros(len(m.t), dtype=bool)
     outputs, orders, battery, airspeed, wind, measured = (
-        mean(s.at(m.t)) if s.covers(m.t) else np.zeros((n, 0)) for s in streams
+        mean(s.at(m.t)) if s.covers(m.t) and not any(s is of for of in absent) else np.zeros((n, 0))
+        for s in streams
     )
     return {
+        "known": (mean(lost.astype(np.float64)) == 0.0).astype(np.float64),
         "t": m.t[0] + (steps + 0.5) * STEP_S,
         "piece": np.full(n, float(number)),
         "f_b": mean(m.f_b),

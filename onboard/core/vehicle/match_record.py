@@ -17,7 +17,6 @@ from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence, spoilt_by
 from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
-from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.matching import Matched, left_by
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
@@ -74,6 +73,7 @@ def vehicle_match(
         series=series_of(m),
         seconds=len(m.model.flight) * m.model.flight.step_s,
         explained=is_explained(m),
+        unexplained=m.unexplained,
         note=note_of(m),
     )
 
@@ -216,21 +216,12 @@ def is_explained(m: Matched) -> bool:
     if m.remainders or m.chosen.suspected or m.stand_ins or beyond_of(m.model.effects):
         return False
     unclear = m.model.unclear(m.fit.theta)
-    gusts = _gusts(m) * m.fit.sensitivity
+    gusts = m.turbulence.largest * m.fit.sensitivity
     return all(
         rms(m.held[:, k]) < math.hypot(rms(unclear[:, k]), rms(gusts[:, k]))
         for k, axis in enumerate(m.model.axes)
         if axis in FORCE
     )
-
-
-def _gusts(m: Matched) -> float:
-    """RMS of the gusts that are named, m/s, as large as they may be; none where none are."""
-    air = m.turbulence
-    if not air.found:
-        return 0.0
-    slow = air.rms + SURE * air.sigma
-    return slow if air.whole is None else max(slow, air.whole + SURE * air.whole_sigma)
 
 
 def note_of(m: Matched) -> str:
@@ -243,7 +234,7 @@ def note_of(m: Matched) -> str:
         beyond_sentence(beyond_of(m.model.effects)),
         change_sentence(m),
         height_sentence(m),
-        remainder_sentence(m.remainders),
+        remainder_sentence(m.remainders, m.unexplained),
         left_out_sentence(m.left_out),
     )
     return "; ".join(s for s in said if s)

@@ -22,7 +22,13 @@ from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING,
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import likelihood
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
-from onboard.core.vehicle.remainder import Remainder, left_out, remainders
+from onboard.core.vehicle.remainder import (
+    Remainder,
+    left_out,
+    not_used,
+    remainders,
+    share_of,
+)
 from onboard.core.vehicle.turbulence import Turbulence, turbulence_of
 from onboard.core.vehicle.windows import windows_of
 
@@ -42,6 +48,7 @@ class Matched:
         left_out: spans, s since the start, that were not used.
         below: effects that would go below what they can be, and stand for something else.
         above: the same of what cannot be so much.
+        unexplained: share of the flight in the remainders.
         plain: the fit before what gusts did to it was taken out; the same where nothing was.
     """
 
@@ -56,6 +63,7 @@ class Matched:
     below: tuple[str, ...] = ()
     plain: Fit | None = None
     above: tuple[str, ...] = ()
+    unexplained: float = 0.0
 
     @property
     def stand_ins(self) -> tuple[str, ...]:
@@ -87,6 +95,9 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
     choices = Choices(fit)
     chosen = choose(choices)
     nominal = model.measured() - model.predicted(model.nominal)
+    of_all = replace(model, flight=whole)
+    spans = not_used(of_all, fit, done.kept, done.turbulence.largest)
+    left = (*remainders(of_all, fit), *spans)
     return Matched(
         fit,
         choices,
@@ -94,11 +105,12 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         left_by(choices, chosen.effects),
         nominal,
         done.turbulence,
-        remainders(replace(model, flight=whole), fit),
+        left,
         left_out(whole, done.kept),
         below,
         done.plain,
         above_bounds(fit),
+        share_of(left, whole),
     )
 
 

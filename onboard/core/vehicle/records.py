@@ -178,6 +178,7 @@ class VehicleMatch:
         series: forces over time.
         seconds: of flight that was used.
         explained: whether what is left is within what the sensors explain.
+        unexplained: share of the flight in spans that no effect describes.
         note: a sentence for the reader; may be empty.
         shown: whether this flight would have shown any effect.
     """
@@ -199,5 +200,6 @@ class VehicleMatch:
     series: ForceSeries | None = None
     seconds: float = 0.0
     explained: bool = True
+    unexplained: float = 0.0
     note: str = ""
     shown: bool = True

@@ -7,6 +7,7 @@ lasts ten seconds.  So the finished model is asked about every block, those that
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from onboard.core.vehicle.limits import (
     BLOCK_S,
     FALSE_ALARM,
     MARGIN_S,
+    OUTLYING,
     TOLD_S,
 )
 from onboard.core.vehicle.model import ForceModel
@@ -97,6 +99,44 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     return _joined(found)
 
 
+def not_used(whole: ForceModel, fit: Fit, kept: Mask, gusts: float) -> tuple[Remainder, ...]:
+    """Spans that the fit left out, and that neither errors of the motion nor gusts make.
+
+    A fit leaves out what is far from it by the scatter of the whole flight.  Gusts are felt more
+    where a vehicle is fast, so that a span is only of the air if gusts as large as those of the
+    flight would be as rarely so far off there as a step that is left out: past :data:`OUTLYING`.
+
+    Args:
+        whole: the model with the whole flight.
+        fit: of what was not left out.
+        kept: (n,) steps that it used.
+        gusts: RMS that they may have, m/s.
+    """
+    flight = whole.flight
+    out = ~kept & ~near_ground(flight)
+    residual = whole.measured() - whole.predicted(fit.theta)
+    bound = np.hypot(whole.unclear(fit.theta), OUTLYING * gusts * whole.sensitivity(fit.theta))
+    t, found = flight.since_start, []
+    edges = (np.diff(t[out]) > TOLD_S) | (np.diff(flight.part[out]) != 0)
+    for span in np.split(np.flatnonzero(out), np.flatnonzero(edges) + 1):
+        if len(span) * flight.step_s < TOLD_S:
+            continue
+        ends = float(t[span[0]]), float(t[span[-1]]) + flight.step_s
+        for k, axis in enumerate(whole.axes):
+            force = rms(residual[span, k])
+            if axis in FORCES and force > rms(bound[span, k]):
+                found.append(Remainder(*ends, AXES[axis], force, int(flight.part[span[0]])))
+    return tuple(found)
+
+
+def share_of(found: Sequence[Remainder], flight: Flight) -> float:
+    """Share of a flight that is in one of these spans at least."""
+    t, inside = flight.since_start, np.zeros(len(flight), dtype=bool)
+    for r in found:
+        inside |= (flight.part == r.part) & (t >= r.start_s) & (t <= r.end_s)
+    return float(np.mean(inside))
+
+
 def near_ground(flight: Flight) -> Mask:
     """(n,) steps within :data:`MARGIN_S` of where the vehicle may have touched the ground.
 
@@ -132,8 +172,8 @@ def left_out(flight: Flight, kept: Mask) -> tuple[tuple[float, float], ...]:
     return tuple((a, b) for a, b in out if b - a >= TOLD_S)
 
 
-def remainder_sentence(found: tuple[Remainder, ...]) -> str:
-    """What a person is told of them; empty where there are none."""
+def remainder_sentence(found: tuple[Remainder, ...], share: float) -> str:
+    """What a person is told of them, which are such a share of it; empty where there are none."""
     if not found:
         return ""
     worst = sorted(found, key=lambda r: -r.force * (r.end_s - r.start_s))
@@ -142,7 +182,11 @@ def remainder_sentence(found: tuple[Remainder, ...]) -> str:
         for r in sorted(worst[:MOST_TOLD], key=lambda r: (r.part, r.start_s))
     ]
     more = f" and {len(worst) - MOST_TOLD} more" if len(worst) > MOST_TOLD else ""
-    return f"no effect describes the force at {', '.join(said)}{more}"
+    percent = f"{100.0 * share:.0f} %" if share >= 0.01 else "less than 1 %"
+    return (
+        f"no effect describes the force at {', '.join(said)}{more}: {percent} of the flight is not "
+        "explained"
+    )
 
 
 def _of(r: Remainder) -> str:

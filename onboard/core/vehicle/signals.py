@@ -7,8 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.limits import LONGEST_SPAN_S
 
+COVERED = 0.8
+"""Share of a flight that a stream must be there for, to be used [cost]."""
+SLOWER = 4.0
+"""Times the usual distance of two samples, past which a slow stream has an outage [probability: of
+telemetry that loses a fifth of its messages three in a row are lost once in a hundred]."""
 EMPTY = np.zeros(0)
 MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
 """SERVOn_FUNCTION of motors 1 to 12."""
@@ -41,7 +47,17 @@ class Stream:
         if len(self) < 2 or len(t) == 0:
             return False
         inside = (t >= self.t[0] - 1.0) & (t <= self.t[-1] + 1.0)
-        return bool(np.mean(inside) > 0.8)
+        return bool(np.mean(inside) > COVERED)
+
+    def known(self, t: Array) -> Mask:
+        """(m,) whether times are not in an outage: a straight line over one is no measurement."""
+        if len(self) < 2:
+            return np.zeros(len(t), dtype=bool)
+        apart = np.diff(self.t)
+        longest = max(LONGEST_SPAN_S, SLOWER * float(np.median(apart)))
+        before = np.clip(np.searchsorted(self.t, t, "right") - 1, 0, len(apart) - 1)
+        out: Mask = apart[before] <= longest
+        return out
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,14 @@ class Turbulence:
     by_law: float = 0.0
 
     @property
+    def largest(self) -> float:
+        """RMS of the gusts that are named, m/s, as large as they may be; none where none are."""
+        if not self.found:
+            return 0.0
+        slow = self.rms + SURE * self.sigma
+        return slow if self.whole is None else max(slow, self.whole + SURE * self.whole_sigma)
+
+    @property
     def seen(self) -> bool:
         """Whether it is more than chance."""
         return survival(self.evidence, 1) < FALSE_ALARM
