@@ -25,8 +25,8 @@ from onboard.core.maths.medians import NORMAL_THREE_QUARTERS
 
 NEIGHBOURS = (-2, -1, 1, 2)
 """Samples before and after through which the cubic goes: as many as the curve that is integrated
-leans on [physics; at 25 Hz a swing of 2 Hz misses it by a hundredth of its size, and a straight line
-through two by an eighth]."""
+leans on [physics: at 25 Hz a swing of 2 Hz misses it by a hundredth of its size, and a straight
+line through two by an eighth]."""
 OF_A_JUMP = 36.0 / 240.0
 """Variance of what is missed of a jump over the sum of its squared misses and ``h^2``
 [physics: 1 / 12 over (1 + 9 + 9 + 1) / 36]."""
