@@ -32,6 +32,7 @@ class Step:
         columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
             nothing is known, column 0 is zero.
         missed: (6,) variances of what the samples miss: of velocity, (m/s)^2, and turn, rad^2.
+        shaken: (3,) integral of the squared distance of the force from its mean, (m/s^2)^2 s.
     """
 
     duration: float
@@ -39,6 +40,7 @@ class Step:
     moved: Array
     columns: Array
     missed: Array
+    shaken: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +52,15 @@ class Steps:
     moved: Array
     columns: Array
     missed: Array
+    shaken: Array
 
     def __len__(self) -> int:
         return len(self.duration)
 
     def __getitem__(self, k: int) -> Step:
         duration = float(self.duration[k])
-        return Step(duration, self.turn[k], self.moved[k], self.columns[k], self.missed[k])
+        made = self.turn[k], self.moved[k], self.columns[k], self.missed[k], self.shaken[k]
+        return Step(duration, *made)
 
 
 def steps(
@@ -69,6 +73,7 @@ def steps(
     columns_to_end: Array,
     columns_turn: Array,
     missed: Array,
+    shaken: Array,
 ) -> Steps:
     """K steps of prediction from their integrals.
 
@@ -82,6 +87,7 @@ def steps(
         columns_to_end: (K, 3, m) as ``force_to_end``.
         columns_turn: (K, 3, m) the turn that they add, rad per unit.
         missed: (K, 6) as in :class:`Step`.
+        shaken: (K, 3) likewise.
     """
     K, _, m = columns.shape
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
@@ -93,7 +99,7 @@ def steps(
     stack[:, 0:3, 1:] = arm @ columns_turn - columns
     stack[:, 3:6, 1:] = columns_to_end
     stack[:, 6:9, 1:] = -columns_turn
-    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed)
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, shaken)
 
 
 @dataclass(frozen=True, slots=True)
