@@ -115,7 +115,7 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "heading_walk": (5e-5, 0.03),
     "attitude_white": (3e-5, 0.03),
     "jitter": (3e-4, 0.2),
-    "shake": (1e-3, 0.5),
+    "shake": (1e-3, 1.0),
 }
 """Floors and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
@@ -131,9 +131,9 @@ timing, interpolation and filters are modelled to the last digit.  A gyroscope's
 3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
 [physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
 time between two fixes, five a second being the fewest that ArduPilot flies with [physics].
-Of what shakes a vehicle no more is unknown than if each sample stood for nothing but its moment:
-the variance of the force times the time between two samples, of which there are at least four a
-second; a millisecond's square root of it is nothing beside any walk [physics].
+What is not known of a force that shakes is at most as large as it shakes, and the same for no
+longer than the second that its mean is of; a millisecond's square root is nothing beside any walk
+[physics].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 

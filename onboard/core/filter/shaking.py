@@ -4,9 +4,10 @@ Vibration, gusts and a controller at the edge of its gain shake a vehicle faster
 stream has samples.  What the autopilot had averaged, or had not, between two samples is then not
 what a curve through them has: samples of something that scatters with a variance of ``s^2`` and is
 another one at the next sample, a time ``h`` later, leave ``s^2 h^2`` of the velocity unknown at
-each, ``s^2 h`` a second.  How much of what is seen is of this kind is a level that the flight tells
-(``shake`` of :class:`~onboard.core.filter.noise.NoiseLevels`: its square is at most ``h``); when
-there is much of it and when there is none, the samples tell.
+each, ``s^2 h`` a second; and what a sensor or a filter makes of the shaking goes on for longer than
+a sample.  How much that is, is a level that the flight tells (``shake`` of
+:class:`~onboard.core.filter.noise.NoiseLevels`: its square is the time for which all that is seen
+of the shaking is in error); when there is much of it and when there is none, the samples tell.
 
 That a walk which is the same all along the flight does not do: two accelerometers of one board part
 by 0.0004 m/s in two calm seconds of a flight and by 0.07 in two shaken ones.
