@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.inputs import views
 from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
@@ -53,6 +54,12 @@ INERTIAL = {
 }
 """Inertial messages: their time field, which is the first, and its ticks per second."""
 HEARTBEAT_LENGTH = 9
+PARAMETER = np.dtype([("value", "<f4"), ("count_and_index", "<u4"), ("id", "S16")])
+"""PARAM_VALUE without its type, which ArduPilot does not heed: all are sent as floats."""
+OF_VIEW = (
+    "in its hovering modes ATTITUDE is not the body's attitude, and there is no "
+    "ATTITUDE_QUATERNION, which always is: ask for it while recording, or fly it forward"
+)
 BLOCK = 2048
 """Packets decoded at a time: bounds the memory, whatever the length of the log [cost]."""
 TOGETHER = 65536
@@ -118,7 +125,7 @@ def open_tlog(path: Path) -> Recording:
         counts={mavlink.mavlink_map[kind].msgname: n for kind, n in sorted(vehicle.counts.items())},
         read=read,
         damage=damage,
-        notes=notes,
+        notes=notes + _of_view(data, vehicle),
         gather=gather,
     )
 
@@ -209,6 +216,21 @@ def _choose(
             f"{flying[ranked[0]].imu_messages} inertial messages, not system {others}"
         )
     return ranked[0], tuple(notes)
+
+
+def _of_view(data: Bytes, vehicle: _Vehicle) -> tuple[str, ...]:
+    """What to say about an attitude that is not the body's while it hovers."""
+    counts = vehicle.counts
+    if mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION in counts or not len(vehicle.reports):
+        return ()
+    octets = np.frombuffer(data, np.uint8)
+    told = payloads(octets, headers(octets, vehicle.reports), PARAMETER.itemsize)
+    names, values = (told.view(PARAMETER)[name][:, 0] for name in ("id", "value"))
+    asked = np.isin(names, [name.encode() for name in views.ASKED])
+    last = {
+        n.decode(): v for n, v in zip(names[asked].tolist(), values[asked].tolist(), strict=True)
+    }
+    return (OF_VIEW,) if views.tells_views(last, over_mavlink=True) else ()
 
 
 def _decoder(source: Source, vehicle: _Vehicle) -> Decoder:

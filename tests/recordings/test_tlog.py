@@ -205,3 +205,22 @@ def test_flight_at_rest_feels_gravity_upwards(recordings):
     for name in ("a01", "b01"):
         first = of_type(recordings / "sitl" / f"{name}.tlog", ImuSample)[:100]
         assert sum(s.f_b[2] for s in first) / 100 == pytest.approx(-9.8, abs=0.5)
+
+
+def test_an_attitude_that_is_not_the_bodys_in_hover_is_said(tmp_path):
+    """Of a tailsitter, whose ATTITUDE is turned by 90 degrees there, unless the other one is sent."""
+
+    def notes(*named, quaternion=False):
+        log = telemetry(seconds=2)
+        for name, value in named:
+            parameter(log, name, value)
+        if quaternion:
+            log.add(mavlink.MAVLink_attitude_quaternion_message(10_000, 1, 0, 0, 0, 0, 0, 0))
+        return open_recording(saved(tmp_path, log)).notes
+
+    tailsitter = ((b"Q_ENABLE", 1.0), (b"Q_TAILSIT_ENABLE", 1.0))
+    (note,) = notes(*tailsitter)
+    assert "ATTITUDE_QUATERNION" in note
+    assert notes(*tailsitter, quaternion=True) == ()
+    assert notes(*tailsitter, (b"Q_ENABLE", 0.0)) == ()  # the last one counts
+    assert notes((b"INS_ACCOFFS_X", 0.25)) == notes() == ()
