@@ -227,10 +227,8 @@ def _of_view(data: Bytes, vehicle: _Vehicle) -> tuple[str, ...]:
     told = payloads(octets, headers(octets, vehicle.reports), PARAMETER.itemsize)
     names, values = (told.view(PARAMETER)[name][:, 0] for name in ("id", "value"))
     asked = np.isin(names, [name.encode() for name in views.ASKED])
-    last = {
-        n.decode(): v for n, v in zip(names[asked].tolist(), values[asked].tolist(), strict=True)
-    }
-    return (OF_VIEW,) if views.tells_views(last, over_mavlink=True) else ()
+    last = zip(names[asked].astype(str).tolist(), values[asked].tolist(), strict=True)
+    return (OF_VIEW,) if views.tells_views(dict(last), over_mavlink=True) else ()
 
 
 def _decoder(source: Source, vehicle: _Vehicle) -> Decoder:

@@ -208,7 +208,7 @@ def test_flight_at_rest_feels_gravity_upwards(recordings):
 
 
 def test_an_attitude_that_is_not_the_bodys_in_hover_is_said(tmp_path):
-    """Of a tailsitter, whose ATTITUDE is turned by 90 degrees there, unless the other one is sent."""
+    """Of a tailsitter, whose ATTITUDE is turned by 90 degrees there, if the other is not sent."""
 
     def notes(*named, quaternion=False):
         log = telemetry(seconds=2)
