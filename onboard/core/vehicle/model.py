@@ -38,6 +38,7 @@ class _Listed:
         least: (m,) below which they cannot be.
         places: of an effect's unknowns, by its name.
         owners: which effect each unknown is of.
+        acting: each effect with where its unknowns begin and end.
         directions: places of unknowns that are asked about at once: no step has more than one of
             them.  They are those of an effect that has numbers of its own in each of several
             flights.
@@ -49,6 +50,7 @@ class _Listed:
     least: Array
     places: dict[str, list[int]]
     owners: list[int]
+    acting: list[tuple[Effect, int, int]]
     directions: list[list[int]]
 
     @classmethod
@@ -56,9 +58,10 @@ class _Listed:
         """Those of some effects; with ``bounded=False`` they may be as little as they like."""
         unknowns = tuple(u for e in effects for u in e.unknowns)
         places: dict[str, list[int]] = {}
-        directions, at = [], 0
+        acting, directions, at = [], [], 0
         for effect in effects:
             n = len(effect.unknowns)
+            acting.append((effect, at, at + n))
             places.setdefault(effect.name, []).extend(range(at, at + n))
             stride = effect.count if isinstance(effect, Own) else n
             directions += [list(range(at + j, at + n, stride)) for j in range(stride)]
@@ -70,6 +73,7 @@ class _Listed:
             np.array([u.least if bounded else -math.inf for u in unknowns]),
             places,
             [k for k, e in enumerate(effects) for _ in e.unknowns],
+            acting,
             directions,
         )
 
@@ -169,11 +173,9 @@ class ForceModel:
         air = self.start(self.flight)
         if gust is not None:
             air.gust_n = gust
-        at = 0
-        for effect in self.effects:
-            n = len(effect.unknowns)
-            effect.act(air, theta[at : at + n].tolist())
-            at += n
+        values = theta.tolist()
+        for effect, begin, end in self._listed.acting:
+            effect.act(air, values[begin:end])
         return air
 
     def predicted(self, theta: Array, gust: Array | None = None) -> Array:
@@ -183,24 +185,19 @@ class ForceModel:
 
     def _stages(self, theta: Array, gust: Array | None = None) -> list[Air]:
         """The prediction before each effect: what an unknown changes begins with its effect."""
-        air, out, at = self.start(self.flight), [], 0
+        air, out, values = self.start(self.flight), [], theta.tolist()
         if gust is not None:
             air.gust_n = gust
-        for effect in self.effects:
+        for effect, begin, end in self._listed.acting:
             out.append(air.copied())
-            n = len(effect.unknowns)
-            effect.act(air, theta[at : at + n].tolist())
-            at += n
+            effect.act(air, values[begin:end])
         return out
 
     def _from(self, stages: Sequence[Air], number: int, theta: Array) -> Array:
         """(n, k) prediction at unknowns that differ from the stages' from this effect on."""
-        air, at = stages[number].copied(), 0
-        for k, effect in enumerate(self.effects):
-            n = len(effect.unknowns)
-            if k >= number:
-                effect.act(air, theta[at : at + n].tolist())
-            at += n
+        air, values = stages[number].copied(), theta.tolist()
+        for effect, begin, end in self._listed.acting[number:]:
+            effect.act(air, values[begin:end])
         out: Array = air.force_b[:, list(self.axes)]
         return out
 
