@@ -245,7 +245,7 @@ class ForceModel:
 
     def _spread(self, places: list[int], apart: Array, out: Array) -> None:
         """Put the differences (n, k) of some places, by their sizes, into (n, k, m) columns."""
-        for number, (j, size) in enumerate(zip(places, self.plausible[places], strict=True)):
+        for number, (j, size) in enumerate(zip(places, self._listed.plausible[places], strict=True)):
             mine = self.flight.part == number if len(places) > 1 else slice(None)
             out[mine, :, j] = apart[mine] / (DIFFERENCE * size)
 
@@ -255,7 +255,7 @@ class ForceModel:
         out, owners = np.zeros((*here.shape, len(theta))), self._listed.owners
         for places in self._listed.directions:
             there = theta.copy()
-            there[places] += DIFFERENCE * self.plausible[places]
+            there[places] += DIFFERENCE * self._listed.plausible[places]
             self._spread(places, self._from(stages, owners[places[0]], there) - here, out)
         return out
 
@@ -264,7 +264,7 @@ class ForceModel:
         out = []
         for j in places:
             step = np.zeros(len(theta))
-            step[j] = DIFFERENCE * self.plausible[j]
+            step[j] = DIFFERENCE * self._listed.plausible[j]
             apart = self.predicted(theta + step) - self.predicted(theta - step)
             out.append(0.5 * apart / step[j])
         return np.stack(out, axis=-1)
@@ -274,7 +274,7 @@ class ForceModel:
         stages, owners = self._stages(theta, gust), self._listed.owners
         out = np.zeros((len(self.flight), len(self.axes), len(theta)))
         for places in self._listed.directions:
-            h = DIFFERENCE * self.plausible[places]
+            h = DIFFERENCE * self._listed.plausible[places]
             up, down = theta.copy(), theta.copy()
             up[places] += h
             down[places] -= h
