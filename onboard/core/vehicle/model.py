@@ -245,7 +245,9 @@ class ForceModel:
 
     def _spread(self, places: list[int], apart: Array, out: Array) -> None:
         """Put the differences (n, k) of some places, by their sizes, into (n, k, m) columns."""
-        for number, (j, size) in enumerate(zip(places, self._listed.plausible[places], strict=True)):
+        for number, (j, size) in enumerate(
+            zip(places, self._listed.plausible[places], strict=True)
+        ):
             mine = self.flight.part == number if len(places) > 1 else slice(None)
             out[mine, :, j] = apart[mine] / (DIFFERENCE * size)
 
