@@ -1,12 +1,12 @@
 # Needs Python 3.11+, pip and make.
-# make setup | demo | test | docs | commands | simulate | landings | fuzz | check | bench | wheels | clean
+# make setup | demo | test | compiled | docs | commands | simulate | landings | fuzz | check | bench | wheels | clean
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 PIP    := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: setup demo test docs commands simulate landings fuzz check bench wheels format clean
+.PHONY: setup demo test compiled docs commands simulate landings fuzz check bench wheels format clean
 
 setup: $(STAMP)
 
@@ -25,6 +25,11 @@ demo: $(STAMP)
 # on disk, each process would spend seconds on compiling them anew.
 test: $(STAMP)
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
+
+# The loops that numba compiles, once: else each process of the first tests spends half a minute on
+# the same.
+compiled: $(STAMP)
+	$(BIN)/python -c "import onboard.core.filter.compiled, onboard.core.maths.loops"
 
 # Pushes under faults: 100,000 histories, each from its seed; ARGS="--seed 7" plays that one alone.
 simulate: $(STAMP)
@@ -58,7 +63,8 @@ check: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest --collect-only -qq  # what tests import is there: seconds, not the whole of them
+	# What tests import is there: seconds, not the whole of them, and what is compiled for it is kept.
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --collect-only -qq
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 from pathlib import Path
 
@@ -48,6 +49,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: (item.path not in slow, "web" not in item.path.parts))
+
+
+def pytest_collection_finish() -> None:
+    """What is there now stays: six thousand tests and all modules, half a million objects.
+
+    The collector of garbage would look through them again and again, a tenth of the time of tests
+    that make many objects.  What tests make is collected as ever.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:

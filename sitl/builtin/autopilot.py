@@ -126,9 +126,26 @@ class Autopilot:
         end = self.clock + seconds - 1e-9
         while self.clock < end:
             if self._supply.on:
-                self._loop()
+                self._idle(end)
+                if self.clock < end:
+                    self._loop()
             elif self._supply.back_by(end + 1e-9):
                 self._boot(self._supply.start)
+
+    def _idle(self, end: float) -> None:
+        """Loops in which nothing is to be done, up to ``end`` on :attr:`clock`: most of them."""
+        if self._orders or self._dirty_world or self.parameters.saving:
+            return
+        world, step, due = self.world.end, self.navigation.following, self.links.next_due
+        loops, now, left = self._loops, self.now, end - (self.clock - self.now)
+        while now < left:
+            then = (loops + 1) * self._period
+            if world < then + 2.0 or step <= then or due <= then * 1e3:
+                break
+            loops, now = loops + 1, then
+        if loops > self._loops:
+            self._loops = loops
+            self._time.tick(now)
 
     def _loop(self) -> None:
         while self._orders:

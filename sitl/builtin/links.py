@@ -101,6 +101,13 @@ class Links:
 
     # -- sending ---------------------------------------------------------------------------
 
+    @property
+    def next_due(self) -> float:
+        """Earliest boot time at which something is to be sent, ms; at once while a list goes."""
+        if any(link.listing is not None for link in self._links):
+            return -math.inf
+        return min((link.schedule.next_due for link in self._links), default=math.inf)
+
     def send_due(self, instant: Callable[[], Instant], period: float) -> None:
         """What is due in this main loop.
 

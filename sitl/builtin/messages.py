@@ -47,8 +47,8 @@ def _f(x: float) -> float:
 
 def _inertial(now: Instant, imu: int) -> list[int]:
     """Nine int16: milli-g, milli-rad/s, milli-gauss."""
-    accel, gyro = now.accel(imu), now.gyro(imu)
-    field = np.array(EARTH_FIELD_MG) @ now.piece.trajectory.R_nb[now.row]
+    accel, gyro = now.accel(imu).tolist(), now.gyro(imu).tolist()
+    field = (np.array(EARTH_FIELD_MG) @ now.piece.trajectory.R_nb[now.row]).tolist()
     return (
         [truncated(x * MILLI_G) for x in accel]
         + [truncated(x * 1000.0) for x in gyro]

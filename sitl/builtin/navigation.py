@@ -45,9 +45,14 @@ class Navigation:
         """Boot time up to which the filter has run, s."""
         return self._block * STEP
 
+    @property
+    def following(self) -> float:
+        """Boot time at which the next 40 ms are over, s."""
+        return (self._block + 1) * STEP
+
     def due(self, now: float) -> bool:
         """Whether the next 40 ms are over."""
-        return (self._block + 1) * STEP <= now
+        return self.following <= now
 
     def step(self, piece: Piece, row: int, now: float, corrections: Corrections) -> bool:
         """The next 40 ms; whether it is aligned then.

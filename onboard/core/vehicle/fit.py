@@ -153,11 +153,11 @@ def fitted(
         noise = tuple(AxisNoise(0.3) for _ in model.axes)
     else:
         sensitivity = model.sensitivity(theta)
+    windows = windows_of(model.flight)
     for turn in range(turns):
         theta = _settled(model, theta, prior, noise, sensitivity)
         residual = model.measured() - model.predicted(theta)
         sensitivity = model.sensitivity(theta)
-        windows = windows_of(model.flight)
         noise = tuple(
             fitted_noise(
                 windows.mean(residual[:, k]),

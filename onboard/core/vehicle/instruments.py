@@ -21,7 +21,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.limits import INSTRUMENT_WINDOWS, PATH_WINDOWS, THRUST_AXIS
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, whitened
-from onboard.core.vehicle.windows import windows_of
+from onboard.core.vehicle.windows import Windows, windows_of
 
 LEAST_TOLD = 1e-8
 """Singular values below this share of the largest tell nothing: the arithmetic's own [physics]."""
@@ -54,8 +54,9 @@ def whitened_residual(
     model: ForceModel, residual: Array, noise: Sequence[AxisNoise], sensitivity: Array
 ) -> list[Array]:
     """For each axis (r,): the whitened residual (n, k), m/s^2, of means over windows."""
+    windows = windows_of(model.flight)
     rows = (
-        _whitened(model, residual[:, k, None], its, sensitivity[:, k])
+        _whitened(windows, residual[:, k, None], its, sensitivity[:, k])
         for k, its in enumerate(noise)
     )
     return [made[:, 0] for made in rows]
@@ -80,7 +81,7 @@ def whitened_regressors(
         columns = jacobian[:, k]
         if sideways and level is not None:
             columns = np.hstack([columns, level[:, k]])
-        made = _whitened(model, columns, its, sensitivity[:, k])
+        made = _whitened(windows, columns, its, sensitivity[:, k])
         if instrumented:
             mine, other = made[:, :m], made[:, m:]
             before = (other, PATH_WINDOWS) if sideways else (mine, INSTRUMENT_WINDOWS)
@@ -89,9 +90,8 @@ def whitened_regressors(
     return out
 
 
-def _whitened(model: ForceModel, columns: Array, its: AxisNoise, sensitivity: Array) -> Array:
+def _whitened(windows: Windows, columns: Array, its: AxisNoise, sensitivity: Array) -> Array:
     """(r, j) means over windows of columns (n, j), whitened; ``sensitivity`` (n,) to gusts."""
-    windows = windows_of(model.flight)
     rows, sensitive = windows.mean(columns), windows.mean(sensitivity)
     return whitened(rows, its, sensitive, windows.piece, windows.length_s)
 

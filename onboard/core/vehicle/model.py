@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -28,6 +28,57 @@ Start: TypeAlias = Callable[[Flight], Air]
 
 
 @dataclass(frozen=True, slots=True)
+class _Listed:
+    """What effects say of their unknowns, as one list.
+
+    Attributes:
+        unknowns: m of all effects, in a row.
+        nominal: (m,) values of the nominal airframe.
+        plausible: (m,) prior standard deviations.
+        least: (m,) below which they cannot be.
+        places: of an effect's unknowns, by its name.
+        owners: which effect each unknown is of.
+        acting: each effect with where its unknowns begin and end.
+        directions: places of unknowns that are asked about at once: no step has more than one of
+            them.  They are those of an effect that has numbers of its own in each of several
+            flights.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    nominal: Array
+    plausible: Array
+    least: Array
+    places: dict[str, list[int]]
+    owners: list[int]
+    acting: list[tuple[Effect, int, int]]
+    directions: list[list[int]]
+
+    @classmethod
+    def of(cls, effects: Sequence[Effect], *, bounded: bool) -> _Listed:
+        """Those of some effects; with ``bounded=False`` they may be as little as they like."""
+        unknowns = tuple(u for e in effects for u in e.unknowns)
+        places: dict[str, list[int]] = {}
+        acting, directions, at = [], [], 0
+        for effect in effects:
+            n = len(effect.unknowns)
+            acting.append((effect, at, at + n))
+            places.setdefault(effect.name, []).extend(range(at, at + n))
+            stride = effect.count if isinstance(effect, Own) else n
+            directions += [list(range(at + j, at + n, stride)) for j in range(stride)]
+            at += n
+        return cls(
+            unknowns,
+            np.array([u.nominal for u in unknowns]),
+            np.array([u.plausible for u in unknowns]),
+            np.array([u.least if bounded else -math.inf for u in unknowns]),
+            places,
+            [k for k, e in enumerate(effects) for _ in e.unknowns],
+            acting,
+            directions,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class ForceModel:
     """What predicts the force of one flight.
 
@@ -47,16 +98,21 @@ class ForceModel:
     start: Start
     instrumented: tuple[int, ...] = ()
     bounded: bool = True
+    _listed: _Listed = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """List what is asked for at every step of a fit."""
+        object.__setattr__(self, "_listed", _Listed.of(self.effects, bounded=self.bounded))
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Of all effects, in a row."""
-        return tuple(u for e in self.effects for u in e.unknowns)
+        return self._listed.unknowns
 
     @property
     def nominal(self) -> Array:
         """(m,) values of the nominal airframe."""
-        return np.array([u.nominal for u in self.unknowns])
+        return self._listed.nominal.copy()
 
     def nominal_near(self, theta: Array) -> Array:
         """(m,) values that a nominal airframe may have, as near to ``theta`` (m,) as they are."""
@@ -67,12 +123,12 @@ class ForceModel:
     @property
     def plausible(self) -> Array:
         """(m,) prior standard deviations."""
-        return np.array([u.plausible for u in self.unknowns])
+        return self._listed.plausible.copy()
 
     @property
     def least(self) -> Array:
         """(m,) below which they cannot be."""
-        return np.array([u.least if self.bounded else -math.inf for u in self.unknowns])
+        return self._listed.least.copy()
 
     @property
     def levelled(self) -> ForceModel:
@@ -81,13 +137,7 @@ class ForceModel:
 
     def indices(self, name: str) -> list[int]:
         """Places of an effect's unknowns; empty if it is not in the model."""
-        out: list[int] = []
-        at = 0
-        for effect in self.effects:
-            if effect.name == name:
-                out += range(at, at + len(effect.unknowns))
-            at += len(effect.unknowns)
-        return out
+        return list(self._listed.places.get(name, ()))
 
     def effect(self, name: str) -> Effect:
         """The effect of this name, which is in the model."""
@@ -95,7 +145,7 @@ class ForceModel:
 
     def effect_of(self, place: int) -> Effect:
         """The effect that an unknown belongs to."""
-        return self.effects[self._owners[place]]
+        return self.effects[self._listed.owners[place]]
 
     def index(self, unknown: str) -> int:
         """Place of an unknown by its own name, of the first effect that has it.
@@ -123,11 +173,9 @@ class ForceModel:
         air = self.start(self.flight)
         if gust is not None:
             air.gust_n = gust
-        at = 0
-        for effect in self.effects:
-            n = len(effect.unknowns)
-            effect.act(air, theta[at : at + n].tolist())
-            at += n
+        values = theta.tolist()
+        for effect, begin, end in self._listed.acting:
+            effect.act(air, values[begin:end])
         return air
 
     def predicted(self, theta: Array, gust: Array | None = None) -> Array:
@@ -137,31 +185,21 @@ class ForceModel:
 
     def _stages(self, theta: Array, gust: Array | None = None) -> list[Air]:
         """The prediction before each effect: what an unknown changes begins with its effect."""
-        air, out, at = self.start(self.flight), [], 0
+        air, out, values = self.start(self.flight), [], theta.tolist()
         if gust is not None:
             air.gust_n = gust
-        for effect in self.effects:
+        for effect, begin, end in self._listed.acting:
             out.append(air.copied())
-            n = len(effect.unknowns)
-            effect.act(air, theta[at : at + n].tolist())
-            at += n
+            effect.act(air, values[begin:end])
         return out
 
     def _from(self, stages: Sequence[Air], number: int, theta: Array) -> Array:
         """(n, k) prediction at unknowns that differ from the stages' from this effect on."""
-        air, at = stages[number].copied(), 0
-        for k, effect in enumerate(self.effects):
-            n = len(effect.unknowns)
-            if k >= number:
-                effect.act(air, theta[at : at + n].tolist())
-            at += n
+        air, values = stages[number].copied(), theta.tolist()
+        for effect, begin, end in self._listed.acting[number:]:
+            effect.act(air, values[begin:end])
         out: Array = air.force_b[:, list(self.axes)]
         return out
-
-    @property
-    def _owners(self) -> list[int]:
-        """Which effect each unknown is of."""
-        return [k for k, e in enumerate(self.effects) for _ in e.unknowns]
 
     def gust_slope(self, theta: Array) -> Array:
         """(n, k, 3) change of the force by a gust towards north, east, down, 1/s."""
@@ -205,34 +243,21 @@ class ForceModel:
         out: Array = every[:, list(self.axes)]
         return out
 
-    @property
-    def _directions(self) -> list[list[int]]:
-        """Places of unknowns that are asked about at once: no step has more than one of them.
-
-        They are those of an effect that has numbers of its own in each of several flights.
-        """
-        out: list[list[int]] = []
-        at = 0
-        for effect in self.effects:
-            n = len(effect.unknowns)
-            stride = effect.count if isinstance(effect, Own) else n
-            out += [list(range(at + j, at + n, stride)) for j in range(stride)]
-            at += n
-        return out
-
     def _spread(self, places: list[int], apart: Array, out: Array) -> None:
         """Put the differences (n, k) of some places, by their sizes, into (n, k, m) columns."""
-        for number, (j, size) in enumerate(zip(places, self.plausible[places], strict=True)):
+        for number, (j, size) in enumerate(
+            zip(places, self._listed.plausible[places], strict=True)
+        ):
             mine = self.flight.part == number if len(places) > 1 else slice(None)
             out[mine, :, j] = apart[mine] / (DIFFERENCE * size)
 
     def steps(self, theta: Array) -> Array:
         """(n, k, m) derivatives by one-sided differences: good enough to step by."""
         here, stages = self.predicted(theta), self._stages(theta)
-        out, owners = np.zeros((*here.shape, len(theta))), self._owners
-        for places in self._directions:
+        out, owners = np.zeros((*here.shape, len(theta))), self._listed.owners
+        for places in self._listed.directions:
             there = theta.copy()
-            there[places] += DIFFERENCE * self.plausible[places]
+            there[places] += DIFFERENCE * self._listed.plausible[places]
             self._spread(places, self._from(stages, owners[places[0]], there) - here, out)
         return out
 
@@ -241,17 +266,17 @@ class ForceModel:
         out = []
         for j in places:
             step = np.zeros(len(theta))
-            step[j] = DIFFERENCE * self.plausible[j]
+            step[j] = DIFFERENCE * self._listed.plausible[j]
             apart = self.predicted(theta + step) - self.predicted(theta - step)
             out.append(0.5 * apart / step[j])
         return np.stack(out, axis=-1)
 
     def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
         """(n, k, m) derivatives by central differences, in air that also moves by ``gust``."""
-        stages, owners = self._stages(theta, gust), self._owners
+        stages, owners = self._stages(theta, gust), self._listed.owners
         out = np.zeros((len(self.flight), len(self.axes), len(theta)))
-        for places in self._directions:
-            h = DIFFERENCE * self.plausible[places]
+        for places in self._listed.directions:
+            h = DIFFERENCE * self._listed.plausible[places]
             up, down = theta.copy(), theta.copy()
             up[places] += h
             down[places] -= h

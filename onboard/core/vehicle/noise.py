@@ -27,6 +27,9 @@ from onboard.core.vehicle.limits import (
 )
 from onboard.core.vehicle.recursion import accumulated, starts_of
 
+AT_ONCE = 1 << 16
+"""Numbers that noise is tried on in one pass: half a megabyte, which a cache holds [cost]."""
+
 
 @dataclass(frozen=True, slots=True)
 class AxisNoise:
@@ -58,6 +61,11 @@ class _Recursion:
     decay: float
     variance: float
 
+    @property
+    def root(self) -> float:
+        """Standard deviation of e over that of y."""
+        return math.sqrt(self.variance)
+
 
 def _recursion(step_s: float, correlation_s: float, white: float) -> _Recursion:
     """The steady-state filter of a process of variance one."""
@@ -85,16 +93,22 @@ def whitened(
         step_s: s.
     """
     rec = _recursion(step_s, noise.correlation_s, noise.white)
-    return _innovations(rows / noise.size(sensitivity)[:, None], rec, starts_of(piece))
+    scaled = rows / noise.size(sensitivity)[:, None]
+    return _innovations(scaled, rec.phi, rec.decay, rec.root, starts_of(piece))
 
 
-def _innovations(scaled: Array, rec: _Recursion, starts: Mask) -> Array:
-    """(n, m) innovations over their standard deviation, of rows with a variance of one."""
-    root = math.sqrt(rec.variance)
+def _innovations(
+    scaled: Array, phi: float | Array, decay: float | Array, root: float | Array, starts: Mask
+) -> Array:
+    """(n, m) innovations over their standard deviation, of rows with a variance of one.
+
+    Numbers of the recursion are those of all columns, or (m,) of each.
+    """
     z = scaled.copy()
-    z[1:] -= rec.phi * scaled[:-1]
+    z[1:] -= phi * scaled[:-1]
     z[starts] = scaled[starts]
-    out: Array = accumulated(z, rec.decay, starts) / root
+    out: Array = accumulated(z, decay, starts)
+    out /= root
     # The first of a piece has nothing before it: it is as large as the process.
     out[starts] = scaled[starts]
     return out
@@ -145,13 +159,14 @@ def fitted_noise(
     """
     left = _Left(residual, sensitivity, starts_of(piece), step_s)
     levels = GUST_LEVELS if gusts else (0.0,)
-    grid = itertools.product(CORRELATION_S, WHITE_SHARES)
-    trials = [trial for tau, white in grid for trial in left.scored(levels, tau, white)]
-    _, noise = max(trials, key=_score)
+    grid = list(itertools.product(CORRELATION_S, WHITE_SHARES))
+    some = max(1, AT_ONCE // (len(levels) * len(residual)))
+    batches = (grid[k : k + some] for k in range(0, len(grid), some))
+    _, noise = max((trial for its in batches for trial in left.scored(levels, its)), key=_score)
     level = noise.gust * left.mean / noise.force
     if level > 0.0:
         near = (level, *(level * by for by in FINER_LEVELS))
-        _, noise = max(left.scored(near, noise.correlation_s, noise.white), key=_score)
+        _, noise = max(left.scored(near, [(noise.correlation_s, noise.white)]), key=_score)
     return noise
 
 
@@ -160,7 +175,7 @@ def gust_evidence(
 ) -> tuple[float, float]:
     """Twice the log-likelihood that a gust level adds, and that level, m/s."""
     left = _Left(residual, sensitivity, starts_of(piece), step_s)
-    none, *trials = left.scored((0.0, *GUST_LEVELS), noise.correlation_s, noise.white)
+    none, *trials = left.scored((0.0, *GUST_LEVELS), [(noise.correlation_s, noise.white)])
     score, trial = max(trials, key=_score)
     return 2.0 * (score - none[0]), trial.gust
 
@@ -179,7 +194,7 @@ def likelihood(
     even = np.ones(len(residual)) if sensitivity is None else sensitivity
     level = 0.0 if sensitivity is None else noise.gust * (float(np.mean(even)) or 1.0) / noise.force
     left = _Left(residual, even, starts_of(piece), step_s)
-    return left.scored((level,), noise.correlation_s, noise.white)[0][0]
+    return left.scored((level,), [(noise.correlation_s, noise.white)])[0][0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,25 +212,31 @@ class _Left:
         return float(np.mean(self.sensitivity)) or 1.0
 
     def scored(
-        self, levels: Sequence[float], tau: float, white: float
+        self, levels: Sequence[float], shapes: Sequence[tuple[float, float]]
     ) -> list[tuple[float, AxisNoise]]:
-        """For each gust level: the log-likelihood with the size profiled out, noise of that size.
+        """Log-likelihoods with the size profiled out, each with the noise of that size.
 
         Args:
             levels: of gusts that act by the mean sensitivity, over the force that is always there.
-            tau: of correlation, s.
-            white: share of white noise in the variance.
+            shapes: time of correlation, s, and share of white noise in the variance; with each of
+                them every level in turn, all in one pass over the residual.
         """
-        n, mean, out = len(self.residual), self.mean, []
-        units = [AxisNoise(1.0, level / mean, tau, white) for level in levels]
-        spread = np.column_stack([unit.size(self.sensitivity) for unit in units])
-        rec = _recursion(self.step_s, tau, white)
-        e = _innovations(self.residual[:, None] / spread, rec, self.starts)
-        log_spread = np.sum(np.log(spread), axis=0) + 0.5 * n * math.log(rec.variance)
-        for unit, square, log_its in zip(units, np.sum(e * e, axis=0), log_spread, strict=True):
-            size = max(math.sqrt(square / n), LEAST_NOISE_M_S2)
-            score = -n * math.log(size) - log_its - 0.5 * square / size**2
-            out.append((float(score), AxisNoise(size, size * unit.gust, tau, white)))
+        n, mean = len(self.residual), self.mean
+        sizes = [AxisNoise(1.0, level / mean).size(self.sensitivity) for level in levels]
+        spread = np.column_stack(sizes)
+        recs = [_recursion(self.step_s, tau, white) for tau, white in shapes]
+        of_each = [(rec.phi, rec.decay, rec.root) for rec in recs]
+        phi, decay, root = np.repeat(of_each, len(levels), axis=0).T
+        scaled = np.tile(self.residual[:, None] / spread, len(recs))
+        e = _innovations(scaled, phi, decay, root, self.starts)
+        squares = np.sum(e * e, axis=0).reshape(len(recs), -1)
+        log_spread, out = np.sum(np.log(spread), axis=0), []
+        for (tau, white), rec, its in zip(shapes, recs, squares, strict=True):
+            log_its = log_spread + 0.5 * n * math.log(rec.variance)
+            for level, square, log_size in zip(levels, its, log_its, strict=True):
+                size = max(math.sqrt(square / n), LEAST_NOISE_M_S2)
+                score = -n * math.log(size) - log_size - 0.5 * square / size**2
+                out.append((float(score), AxisNoise(size, size * (level / mean), tau, white)))
         return out
 
 

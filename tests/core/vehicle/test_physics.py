@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.gusts import positive_square, signed_square
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
-from onboard.core.vehicle.recursion import accumulated, behind, lagged
+from onboard.core.vehicle.recursion import Remembered, accumulated, ahead, behind, lagged
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
 from onboard.core.vehicle.spans import grounded_spans, inside, lasting_height
@@ -91,6 +92,44 @@ def test_recursions_are_those_of_a_loop():
         y = row + 0.83 * y
         slow.append(y)
     assert np.allclose(accumulated(z, 0.83), slow)
+
+
+def test_each_column_has_a_factor_of_its_own_and_a_piece_begins_anew():
+    z = np.random.default_rng(4).normal(size=(61, 3))
+    factors, starts = np.array([0.9, 0.0, 0.4]), np.zeros(61, dtype=bool)
+    starts[[0, 1, 17, 40]] = True
+    y, slow = np.zeros(3), []
+    for row, begins in zip(z, starts, strict=True):
+        y = row + (0.0 if begins else 1.0) * factors * y
+        slow.append(y)
+    np.testing.assert_allclose(accumulated(z, factors, starts), slow, atol=1e-11)
+
+
+@pytest.mark.parametrize("law", [behind, ahead])
+def test_what_is_remembered_is_what_the_law_says_of_this_question(law):
+    rng = np.random.default_rng(5)
+    ask = Remembered()
+    signals, pieces = rng.normal(size=(2, 50, 2)), np.zeros((2, 50), dtype=np.int64)
+    pieces[1, 20:] = 1
+    for signal, lag, piece, step in itertools.product(signals, (0.1, 0.3), pieces, (0.1, 0.2)):
+        for _ in range(2):
+            np.testing.assert_array_equal(
+                ask(law, signal, lag, piece, step), law(signal, lag, piece, step)
+            )
+    other = ahead if law is behind else behind
+    np.testing.assert_array_equal(
+        ask(other, signal, lag, piece, step), other(signal, lag, piece, step)
+    )
+
+
+@pytest.mark.parametrize("at_once", [1, 40_000])
+def test_noise_is_the_same_however_much_of_it_is_tried_at_once(monkeypatch, at_once):
+    rng = np.random.default_rng(6)
+    y, sensitivity = rng.normal(size=(2, 3000))
+    piece = np.repeat([0, 1, 2], 1000)
+    whole = fitted_noise(y, np.abs(sensitivity), piece, 0.5, gusts=True)
+    monkeypatch.setattr("onboard.core.vehicle.noise.AT_ONCE", at_once)
+    assert fitted_noise(y, np.abs(sensitivity), piece, 0.5, gusts=True) == whole
 
 
 def test_a_lag_shifts_a_ramp_by_its_time_constant():

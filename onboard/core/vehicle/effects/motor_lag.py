@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 from onboard.core.vehicle.flight import History
-from onboard.core.vehicle.recursion import ahead, behind
+from onboard.core.vehicle.recursion import Remembered, ahead, behind
 
 DELAY = "output_delay"
 """What a lag that is less than none is called: it is of the log, not of the motors."""
@@ -30,6 +30,7 @@ class MotorLag(Effect):
     def __init__(self) -> None:
         """Nominally none (slew_max 150/s is a hundredth of a second)."""
         super().__init__([Unknown("time_constant", 0.0, 0.1, FLOOR_S, "s", doubt=0.003)])
+        self._late = Remembered()
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Slow the commands down; outputs that are late are those of as much later."""
@@ -38,7 +39,7 @@ class MotorLag(Effect):
         law = behind if values[0] >= 0.0 else ahead
         flight = air.flight
         past = flight.history or History(air.commands, flight.piece)
-        late = law(past.commands, abs(values[0]), past.piece, flight.step_s)
+        late = self._late(law, past.commands, abs(values[0]), past.piece, flight.step_s)
         air.commands = late if flight.history is None else late[flight.place]
 
     def missing(self, air: Air) -> str:

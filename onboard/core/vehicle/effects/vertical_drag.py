@@ -25,9 +25,20 @@ def rotor_root(air: Air) -> Array:
     It is summed over the motors: those that share the thrust unevenly have less.  By mass it goes
     with the root of it, as the thrust of a heavier vehicle has grown with it.
     """
-    load = np.maximum(air.pull / STANDARD_GRAVITY, LEAST_PULL)
-    out: Array = air.evenness * np.sqrt(air.rho / SEA_LEVEL_DENSITY * load / air.mass)
-    return out
+    return _root_at(air, air.rho / SEA_LEVEL_DENSITY)
+
+
+def _root_at(air: Air, dense: Array) -> Array:
+    """(n,) :func:`rotor_root`, where the density over that at sea level (n,) is there already."""
+    load: Array = air.pull / STANDARD_GRAVITY
+    np.maximum(load, LEAST_PULL, out=load)
+    load *= dense
+    if not (isinstance(air.mass, float) and air.mass == 1.0):
+        load = load / air.mass
+    np.sqrt(load, out=load)
+    if air.commands is not None:
+        load *= air.evenness
+    return load
 
 
 class VerticalDrag(Effect):
@@ -48,9 +59,13 @@ class VerticalDrag(Effect):
         u = air.u_b[:, 2]
         still = 0.5 * air.rho * quadratic * air.square_b[:, 2] / air.mass
         measured = -air.flight.f_b[:, 2]
-        air.pull = measured
+        air.pull, dense = measured, air.rho / SEA_LEVEL_DENSITY
         for _ in range(TURNS):
-            air.pull = measured - linear * rotor_root(air) * u - still
+            drag = _root_at(air, dense)
+            drag *= linear
+            drag *= u
+            air.pull = measured - drag
+            air.pull -= still
         u = u + air.through
         still = -0.5 * air.rho * quadratic * air.square_through / air.mass
-        air.force_b[:, 2] -= linear * rotor_root(air) * u + still
+        air.force_b[:, 2] -= linear * _root_at(air, dense) * u + still
