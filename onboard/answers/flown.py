@@ -43,8 +43,8 @@ from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
-from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
-from onboard.core.vehicle.touches import joined, touched_spans
+from onboard.core.vehicle.spans import grounded_spans, joined, lasting_height, scatter_near
+from onboard.core.vehicle.touches import touched_spans
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
