@@ -1,11 +1,14 @@
 """A recording as a flight: where it was on the ground, and where the clock began anew."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from onboard.answers import flown as flown_module
 from onboard.answers.flown import Flown
+from onboard.answers.recorded import Recorded, unanswered
 from onboard.core.inputs.samples import (
     AttitudeSample,
     GpsFix,
@@ -98,6 +101,25 @@ def test_a_bounce_is_no_flight_to_either_level():
     fixes = np.concatenate([b.fixes.t for b in made.recorded.sampled(1)])
     assert np.any((fixes > 40.0) & (fixes < 55.0))
     assert not np.any(np.abs(fixes - 60.0) < 1.0)
+
+
+def test_the_vehicle_level_goes_on_without_what_the_sensor_level_calls_false(monkeypatch):
+    """Spikes in the samples and fixes that nobody believes would be gusts and drag."""
+    source = SimpleNamespace(recordings=[SimpleNamespace(derived=False)], vehicle=None)
+
+    def read(paths, reader, **_):
+        for sample in bounced():
+            reader.feed(sample)
+        reader.finish()
+        return source
+
+    def asked(recorded, imu):
+        recorded._sampled[imu] = recorded.sampled(imu)[:1]
+        return unanswered(recorded.calibrator.calibration(imu))
+
+    monkeypatch.setattr(flown_module, "read", read)
+    monkeypatch.setattr(Recorded, "answer", asked)
+    assert len(flown_module.flown("bounced.tlog").batches) == 1
 
 
 @pytest.mark.parametrize("but", [{"shaken": 0.0}, {"lowest": 8.0}])
