@@ -23,7 +23,7 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.mean_force import mean_force_sigma
-from onboard.core.estimate.misread import misread_of
+from onboard.core.estimate.misread import attitude_error, misread_of
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S
 from onboard.core.inputs.boot_time import NEXT_S, Boots
@@ -300,14 +300,14 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
     """
     c = diagnosis.calibration
     timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
-    misread = None
+    misread, tilt = None, np.zeros(3)
     if diagnosis.silent or engine is None:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
     else:
         scale, offset = np.array(c.scale), np.array(c.offset)
         sigma = _force_sigma(engine)
-        misread = misread_of(engine)
+        misread, tilt = misread_of(engine), attitude_error(engine)
     return Sensors(
         scale,
         offset,
@@ -317,6 +317,7 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
         timing.get("imu_delay_s", 0.0),
         np.array([g.value for g in c.gyro_scale]),
         misread,
+        tilt,
     )
 
 

@@ -56,6 +56,16 @@ class Misread:
         return out, segment
 
 
+def attitude_error(engine: Engine) -> Array:
+    """(3,) roll and pitch of the body, and heading, by which the recorded attitude is off, rad."""
+    solution, index = engine.solution(), engine.model.index
+    if solution is None:
+        return np.zeros(3)
+    out: Array = solution.theta[[index[n] for n in ("tilt_roll", "tilt_pitch", "heading")]]
+    out[2] += engine.point.heading
+    return out
+
+
 def misread_of(engine: Engine) -> Misread | None:
     """What an engine's sums say of it; None where there are none."""
     solution = engine.solution()

@@ -48,6 +48,8 @@ class Sensors:
         attitude_delay: lateness of the recorded attitude, s.
         gyro_scale: (3,) by how much the gyroscope reads too much.
         misread: what the accelerometer reads wrong beside these; None: nothing that is known.
+        tilt: (3,) roll and pitch of the body by which the recorded attitude is turned too far, and
+            heading to north, rad.
     """
 
     scale: Array
@@ -58,6 +60,14 @@ class Sensors:
     attitude_delay: float = 0.0
     gyro_scale: Array = field(default_factory=lambda: np.zeros(3))
     misread: Misread | None = None
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
+
+    def attitude(self, R_nb: Array) -> Array:
+        """Recorded attitudes (n, 3, 3) without what they are off by all flight long."""
+        level = np.array([self.tilt[0], self.tilt[1], 0.0])
+        off = R_nb @ level + np.array([0.0, 0.0, self.tilt[2]])
+        out: Array = rotation_from_vector(-off) @ R_nb
+        return out
 
     def force(self, segment: Segment, before: Segment | None) -> tuple[Array, Segment]:
         """Specific force at a segment's samples, with all undone that is known of them.
@@ -150,7 +160,8 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         if len(t) == 0:
             continue
         R, _ = s.attitude_at(t + sensors.attitude_delay, sensors.attitude_delay)
-        parts.append((t, f_b[own], s.w_b[own] / (1.0 + sensors.gyro_scale), R))
+        w_b = s.w_b[own] / (1.0 + sensors.gyro_scale)
+        parts.append((t, f_b[own], w_b, sensors.attitude(R)))
     if not parts:
         return None
     t, f_b, w_b, R = (np.concatenate(x) for x in zip(*parts, strict=True))

@@ -9,8 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from onboard.core.estimate.misread import Misread
+from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.misread import Misread, attitude_error
 from onboard.core.inputs.segments import Segment
+from onboard.core.maths.frames import rotation_from_euler, rotation_from_vector
+from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.nuisances import GyroTiming, Six
 from onboard.core.model.regressors import Family, Model
 from onboard.core.physics.catalogue import kinds
@@ -157,3 +160,23 @@ def test_what_is_not_read_is_no_error_of_the_reading(family, size):
     """Another gravity, and an attitude that is late, change what the velocity does."""
     raw = F / SCALE + OFFSET
     np.testing.assert_allclose(undone(knowing(family, np.array([size])), raw), F, atol=1e-9)
+
+
+def test_an_attitude_that_is_turned_all_flight_long_is_turned_back():
+    """By angles of the body, and a heading to north, that the sums have found."""
+    tilt, heading, taken = np.array([0.05, -0.04, 0.0]), 0.06, 0.02
+    model = calibration_model(point := Linearisation(heading=taken))
+    theta = np.zeros(model.size)
+    for name, value in zip(
+        ("tilt_roll", "tilt_pitch", "heading"), (*tilt[:2], heading - taken), strict=True
+    ):
+        theta[model.index[name]] = value
+    engine = SimpleNamespace(
+        solution=lambda: SimpleNamespace(theta=theta), model=model, point=point
+    )
+    true = rotation_from_euler(0.3 * np.sin(T), 0.2 * np.cos(T), 0.1 * T)
+    turn = rotation_from_vector(np.array([[0.0, 0.0, heading]]))
+    recorded = turn @ true @ rotation_from_vector(tilt[None])
+    sensors = Sensors(SCALE, OFFSET, np.zeros(3), tilt=attitude_error(engine))
+    np.testing.assert_allclose(sensors.attitude(recorded), true, atol=0.005)
+    assert np.abs(recorded - true).max() > 0.05
