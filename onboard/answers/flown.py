@@ -21,6 +21,9 @@ from onboard.answers.replay import Reading, read
 from onboard.answers.stands import fixes_of, said_to_stand, with_landings
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
+from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.mean_force import mean_force_sigma
+from onboard.core.estimate.misread import attitude_error, misread_of
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S
 from onboard.core.inputs.boot_time import NEXT_S, Boots
@@ -40,8 +43,8 @@ from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
-from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
-from onboard.core.vehicle.touches import joined, touched_spans
+from onboard.core.vehicle.spans import grounded_spans, joined, lasting_height, scatter_near
+from onboard.core.vehicle.touches import touched_spans
 from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
@@ -268,16 +271,16 @@ def flown(
     source = read([path], collected, imu=imu, progress=progress)
     derived = any(r.derived for r in source.recordings)
     there = wanted in collected.imus
-    batches = tuple(collected.recorded.calibrator.engine(wanted).batches) if there else ()
     if there and not derived:
         diagnosis = collected.answer(wanted).diagnosis
     else:
         diagnosis = unanswered(source.vehicle.unanswered(wanted)).diagnosis
+    batches = collected.recorded.sampled(wanted) if there else ()
     return FlownRecording(
         source,
         diagnosis,
         collected.signals(),
-        NO_SENSORS if derived else sensors_of(diagnosis),
+        NO_SENSORS if derived else sensors_of(diagnosis, collected.recorded.engine(wanted)),
         batches,
         tuple(collected.grounded),
         collected.ground,
@@ -285,16 +288,26 @@ def flown(
     )
 
 
-def sensors_of(diagnosis: Diagnosis) -> Sensors:
-    """What the sensor level has found, with what it leaves unknown of the force."""
+def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
+    """What the sensor level has found, with what it leaves unknown of the force.
+
+    Scale and offset are of a model, which has all that was found in it: what is undone is all of
+    that or, where the flight says nothing, nothing.
+
+    Args:
+        diagnosis: of the flight.
+        engine: whose sums gave it; None where there is none.
+    """
     c = diagnosis.calibration
     timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
-    if diagnosis.silent:
+    misread, tilt = None, np.zeros(3)
+    if diagnosis.silent or engine is None:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
     else:
         scale, offset = np.array(c.scale), np.array(c.offset)
-        sigma = _force_sigma(c)
+        sigma = _force_sigma(engine)
+        misread, tilt = misread_of(engine), attitude_error(engine)
     return Sensors(
         scale,
         offset,
@@ -303,20 +316,18 @@ def sensors_of(diagnosis: Diagnosis) -> Sensors:
         max(timing.get("gps_smoothing_window_s", 0.0), 0.0),
         timing.get("imu_delay_s", 0.0),
         np.array([g.value for g in c.gyro_scale]),
+        misread,
+        tilt,
     )
 
 
-def _force_sigma(c: Calibration) -> Array:
-    """(3,) of the calibrated force at the mean load, m/s^2."""
-    P = c.with_its_gyroscope
-    out = np.empty(3)
-    for i in range(3):
-        by = np.array([c.load_mean[i] - c.offset[i], -c.scale[i]])
-        out[i] = by @ P[np.ix_([i, i + 3], [i, i + 3])] @ by
-    out = np.sqrt(np.maximum(out, 0.0))
-    good = np.isfinite(out) & (out > LEAST_FORCE)
-    floor: Array = np.where(np.isfinite(out), np.where(good, out, LEAST_FORCE), UNKNOWN_FORCE)
-    return floor
+def _force_sigma(engine: Engine) -> Array:
+    """(3,) of the mean force that was measured, m/s^2."""
+    sigma = mean_force_sigma(engine)
+    if sigma is None:
+        return np.full(3, UNKNOWN_FORCE)
+    out: Array = np.where(np.isfinite(sigma), np.maximum(sigma, LEAST_FORCE), UNKNOWN_FORCE)
+    return out
 
 
 def _stream(samples: Sequence[S], values: Callable[[S], tuple[float, ...]]) -> Stream:

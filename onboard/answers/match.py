@@ -25,7 +25,7 @@ from onboard.core.vehicle.effects.voltage_sag import HELD
 from onboard.core.vehicle.flight import Flight, flight_of
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.lift_rotors import on_wings, unseen
-from onboard.core.vehicle.limits import APART, FEWEST_STEPS
+from onboard.core.vehicle.limits import APART, FEWEST_STEPS, TOLD_S
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
@@ -215,13 +215,14 @@ def vehicle_level(
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
     sigma = np.stack([r.sensors.force_sigma for r in (recording, *others)])
+    said = (_of_rotors(carried_s), _of_outages(flight, kind), str(doubt))
     flight = joined([flight, *(_further(other, kind, airframe) for other in others)])
     try:
         if kind in COPTERS:
-            return _doubted(match_copter(flight, recording.signals, airframe, sigma), doubt)
+            return _noted(match_copter(flight, recording.signals, airframe, sigma), *said)
         found = match_plane(flight, plane, sigma)
         if found is not None:
-            return _doubted(_told_of_rotors(found, carried_s), doubt)
+            return _noted(found, *said)
         why = "it never flew faster than a plane stalls"
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         why = f"its numbers fit no model ({error})"
@@ -265,20 +266,22 @@ def _doubt(recording: FlownRecording, pieces: Sequence[Motion]) -> Contradiction
     return Contradiction() if recording.derived else contradiction([m.fixed for m in pieces])
 
 
-def _told_of_rotors(found: VehicleMatch, seconds: float) -> VehicleMatch:
-    """With what was left out in the note."""
+def _of_rotors(seconds: float) -> str:
+    """That flight was left out in which upright rotors turned."""
     left_out = f"upright rotors turned for {seconds:.0f} s, of which nothing is told"
-    return (
-        found
-        if not seconds
-        else replace(found, note="; ".join(filter(None, (found.note, left_out))))
-    )
+    return left_out if seconds else ""
 
 
-def _doubted(found: VehicleMatch, doubt: Contradiction) -> VehicleMatch:
-    """With what it says of itself in the note."""
-    note = "; ".join(s for s in (found.note, str(doubt)) if s)
-    return replace(found, note=note)
+def _of_outages(flight: Flight, kind: str) -> str:
+    """That flight was left out of which it is not known what was commanded, or its airspeed."""
+    what = "outputs" if kind in COPTERS else "outputs or airspeed"
+    missing = f"{what} are missing for {flight.unheard_s:.0f} s, of which nothing is told"
+    return missing if flight.unheard_s >= TOLD_S else ""
+
+
+def _noted(found: VehicleMatch, *said: str) -> VehicleMatch:
+    """With what else there is to say of the recording in the note."""
+    return replace(found, note="; ".join(filter(None, (found.note, *said))))
 
 
 def _flight(

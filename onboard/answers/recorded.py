@@ -59,6 +59,7 @@ class Recorded:
         self._one_of_several = one_of_several
         self._answers: dict[int, Answer] = {}
         self._engines: dict[int, Examination] = {}
+        self._sampled: dict[int, tuple[Batch, ...]] = {}
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
         self._recordings = [-math.inf]  # when each of them begins, on the clock of the first
         self._contradictions: dict[int, Contradiction] = {}
@@ -134,6 +135,10 @@ class Recorded:
         """Whose sums gave the answer; None where there is no diagnosis."""
         return self._engines.get(imu)
 
+    def sampled(self, imu: int) -> tuple[Batch, ...]:
+        """The flight of an accelerometer, without what its answer, if it has one, says is false."""
+        return self._sampled.get(imu) or tuple(self.calibrator.engine(imu).batches)
+
     def compared(self, calibrations: Sequence[Calibration]) -> Comparison | None:
         """What the accelerometers say of each other; None if there is nothing to compare.
 
@@ -170,7 +175,7 @@ class Recorded:
             if apart is not None:
                 self._contradictions[imu] = apart
         found.engine.let_epochs_go()  # a report asks for its sums and states
-        self._engines[imu] = found.engine
+        self._engines[imu], self._sampled[imu] = found.engine, found.sampled
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine, found.left_open)
         return given

@@ -16,6 +16,7 @@ from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.answers.match_document import match_document
 from onboard.answers.match_files import frame_text, read_frame, settings_text
+from onboard.answers.match_story import sentence
 from onboard.answers.match_words import (
     COLOURS,
     blown,
@@ -46,6 +47,9 @@ onboard match flight.BIN --param sim.param --frame-out frame.json
 """
 TWO = 2
 TABLE = ".csv"
+AIR = ("wind", "turbulence")
+"""Effects that have a line of their own."""
+AXES = {"x": "ahead (x)", "y": "to the side (y)", "z": "up and down (z)"}
 
 
 @click.command(epilog=EXAMPLES)
@@ -212,6 +216,8 @@ def _facts(result: Match) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
+    for k, d in enumerate(d for d in result.effects if d.name not in AIR):
+        table.add_row("" if k else "In words", sentence(d))
     wind = wind_sentence(result)
     if wind:
         table.add_row("Wind", wind)
@@ -221,11 +227,13 @@ def _facts(result: Match) -> Table:
         name = f"{other.name} (flight {k + 1}, set aside)" if k in aside else other.name
         table.add_row("", f"{blown(its)}: {name}")
     for k, (axis, m) in enumerate(vehicle.mismatch.items()):
-        said = f"{axis}: {m.before:.3f} -> {m.after:.3f} m/s^2 RMS on flight not used in the fit"
+        said = f"{AXES.get(axis, axis)} off by {m.before:.3f} -> {m.after:.3f} m/s^2 RMS"
         table.add_row("" if k else "Force", said)
+    if vehicle.mismatch:
+        table.add_row("", "nominal airframe -> what was found, on flight not used in the fit")
     if math.isfinite(vehicle.alone_before):
         said = f"{vehicle.alone_before:.2f} -> {vehicle.alone_after:.2f} m/s"
-        table.add_row("Alone", f"{said} velocity error after 10 s of the model alone")
+        table.add_row("Alone", f"velocity off by {said} after 10 s of the model alone")
     for k, d in enumerate(d for d in result.effects if proof(d) and d.level == "vehicle"):
         table.add_row("" if k else "Proof", f"{d.name}: {proof(d)} m/s^2 without and with it")
     for k, a in enumerate(vehicle.ambiguous):

@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from onboard.core.inputs import views
 from onboard.core.inputs.samples import (
     AirData,
     AttitudeSample,
@@ -29,6 +28,7 @@ from onboard.core.inputs.samples import (
     VehicleState,
     Vibration,
 )
+from onboard.core.inputs.views import Views
 from onboard.core.maths.frames import euler_from_rotation, rotation_from_quaternion
 from onboard.mavlink.bootclock import BootClock
 from onboard.mavlink.dialect import Message, mavlink
@@ -67,7 +67,7 @@ class Readings:
         self.refused: dict[str, int] = {}
         self._clock = clock
         self._has_battery_status = False
-        self._view_parameters: dict[str, float] = {}
+        self._views = Views()
         self._body_attitude = -math.inf
 
     def of(self, name: str) -> Callable[[Message], Samples]:
@@ -150,7 +150,7 @@ class Readings:
     @property
     def tells_views(self) -> bool:
         """Whether ATTITUDE is of other axes in hover than in forward flight."""
-        return views.tells_views(self._view_parameters, over_mavlink=True)
+        return self._views.told
 
     # Satellite navigation
 
@@ -275,6 +275,5 @@ class Readings:
         value = number_meant(float(m.param_value), m.param_type)
         if not math.isfinite(value):
             return self._refuse("PARAM_VALUE: not finite")
-        if m.param_id in views.ASKED:
-            self._view_parameters[m.param_id] = value
+        self._views.take(m.param_id, value)
         return (ParameterValue(m.param_id, value, self._clock.latest),)

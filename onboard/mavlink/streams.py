@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from onboard.core.inputs import views
+from onboard.core.inputs.views import Views
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import COMPONENT, MESSAGE_IDS, Message, mavlink
 from onboard.mavlink.one_stream import Stream, StreamRequest, StreamState
@@ -90,7 +90,7 @@ class Streams:
             raise ValueError(f"no MAVLink message is called {error.args[0]}") from None
         reported = self._streams.get(MESSAGE_IDS["ATTITUDE"])
         self._body_rate = 0.0 if reported is None else reported.request.rate
-        self._view_parameters: dict[str, float] = {}
+        self._views = Views()
         self.legacy = False
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
@@ -112,7 +112,7 @@ class Streams:
     def start(self, system: int, component: int, now: float) -> None:
         """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
         if self._target != (system, component):
-            self._view_parameters.clear()
+            self._views.forget()
             self._follow_views(now)
         self._target = (system, component)
         self.legacy = False
@@ -139,9 +139,8 @@ class Streams:
             stream.count()
             return ()
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
-            if message.param_id in views.ASKED:
-                value = number_meant(float(message.param_value), message.param_type)
-                self._view_parameters[message.param_id] = value
+            value = number_meant(float(message.param_value), message.param_type)
+            if self._views.take(message.param_id, value):
                 self._follow_views(now)
             return ()
         if (
@@ -190,7 +189,7 @@ class Streams:
 
     def _follow_views(self, now: float) -> None:
         """Ask for the body's attitude where ATTITUDE may be another one."""
-        wanted = self._body_rate and views.tells_views(self._view_parameters, over_mavlink=True)
+        wanted = self._body_rate and self._views.told
         number = MESSAGE_IDS[BODY_ATTITUDE]
         if not wanted:
             dropped = self._streams.pop(number, None)

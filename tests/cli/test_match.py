@@ -9,6 +9,8 @@ import pytest
 from onboard.answers.match_document import match_document
 from onboard.answers.match_files import settings_text
 from onboard.cli.main import run
+from onboard.cli.match import summary
+from onboard.cli.terminal import Terminal
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.records import Aside, Compared, WindEstimate
 from tests.recordings.dataflash_writer import modern_log
@@ -145,3 +147,15 @@ def test_two_recordings_differ_only_in_what_differs(recordings, tmp_path):
     value = found["rotor_drag"]["values"]["mcoef"]
     assert value["simulation"] == pytest.approx(0.559, rel=0.03)
     assert value["real"] == pytest.approx(0.497, rel=0.03)
+
+
+def test_a_person_is_told_in_words_and_within_the_width_of_a_terminal(capsys):
+    console = Terminal(highlight=False, width=80)
+    for part in summary(by_hand(note="not used, too far from the model: 182-200 s")):
+        console.print(part)
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    told = " ".join(out.split())
+    assert "Moving air across the rotors brakes 2.0 times as much as in the simulation" in told
+    assert "ahead (x) off by 1.987 -> 0.012 m/s^2 RMS" in told
+    assert "velocity off by 7.89 -> 0.03 m/s after 10 s" in told

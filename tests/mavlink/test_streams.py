@@ -219,6 +219,15 @@ def test_the_body_s_attitude_is_asked_for_where_another_one_is_told():
     assert "ATTITUDE_QUATERNION" not in w.states()
 
 
+def test_a_parameter_that_is_no_number_changes_no_request():
+    w = world([("ATTITUDE", 50.0)])
+    told = {"Q_ENABLE": 1.0, "PTCH_TRIM_DEG": 2.0, "FLIGHT_OPTIONS": float("nan")}
+    for name, value in told.items():
+        w.exchange(w.streams.feed(parameter(name, value), w.now))
+    w.run(5.0)
+    assert "ATTITUDE_QUATERNION" in w.states()
+
+
 def test_another_vehicle_is_not_asked_for_it():
     w = world([("ATTITUDE", 50.0)])
     for name in ("Q_ENABLE", "Q_TAILSIT_ENABLE"):

@@ -1,12 +1,22 @@
 """A recording as a flight: where it was on the ground, and where the clock began anew."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from onboard.answers import flown as flown_module
 from onboard.answers.flown import Flown
-from onboard.core.inputs.samples import GpsFix, ImuSample, Outputs, ParameterValue, VehicleState
+from onboard.answers.recorded import Recorded, unanswered
+from onboard.core.inputs.samples import (
+    AttitudeSample,
+    GpsFix,
+    ImuSample,
+    Outputs,
+    ParameterValue,
+    VehicleState,
+)
 
 MOTORS = [ParameterValue(f"SERVO{n}_FUNCTION", 32.0 + n) for n in (1, 2, 3, 4)]
 
@@ -28,6 +38,24 @@ def hop(*, cruise=1500.0, motors=True, begin=0.0, end=60.0, height=1.2, turns=0.
             pulse = cruise + 20.0 * rng.standard_normal() if aloft else 1100.0
             out.append(Outputs(t, (pulse,) * 4))
         out.append(GpsFix(t, 1, 3, 0.5, 0.5, 100.0 + up, v, 0.0, 0.0))
+    return out
+
+
+def bounced(*, shaken=4.0, lowest=0.3):
+    """A copter that comes down from 20 m, touches the ground at 60 s and goes up again at once."""
+    out = [VehicleState(0.0, kind="copter"), *MOTORS]
+    rng = np.random.default_rng(5)
+    for t in np.arange(0.0, 120.0, 0.1).tolist():
+        up = float(np.interp(t, [15.0, 35.0, 60.0, 80.0, 105.0], [0.0, 20.0, lowest, 20.0, 0.0]))
+        later = float(
+            np.interp(t + 0.1, [15.0, 35.0, 60.0, 80.0, 105.0], [0.0, 20.0, lowest, 20.0, 0.0])
+        )
+        f_b = 0.1 * rng.standard_normal(3) + (0.0, shaken * (round(10 * t) == 600), -9.81)
+        w_b = tuple(0.05 * (later != up) * rng.standard_normal(3))
+        out.append(ImuSample(t, 1, tuple(f_b), w_b))
+        out.append(AttitudeSample(t, 0.0, 0.0, 0.001 * t))
+        out.append(Outputs(t, (1500.0 if 15.0 <= t < 105.0 else 1100.0,) * 4))
+        out.append(GpsFix(t, 1, 3, 0.5, 0.5, 100.0 + up, 0.0, 0.0, 10.0 * (up - later)))
     return out
 
 
@@ -63,6 +91,40 @@ def test_what_is_still_and_as_low_as_a_stand_is_left_out_with_it():
     made = found(hop())
     assert all(standing(made, t) for t in (3.0, 12.0, 48.0, 57.0))
     assert not any(standing(made, t) for t in np.arange(18.5, 41.5, 0.5))
+
+
+def test_a_bounce_is_no_flight_to_either_level():
+    """What the ground pushed with no sample has, and whoever learns from it makes up for that."""
+    made = found(bounced())
+    assert standing(made, 60.0)
+    assert not any(standing(made, t) for t in np.r_[25.0:56.0, 64.0:95.0])
+    fixes = np.concatenate([b.fixes.t for b in made.recorded.sampled(1)])
+    assert np.any((fixes > 40.0) & (fixes < 55.0))
+    assert not np.any(np.abs(fixes - 60.0) < 1.0)
+
+
+def test_the_vehicle_level_goes_on_without_what_the_sensor_level_calls_false(monkeypatch):
+    """Spikes in the samples and fixes that nobody believes would be gusts and drag."""
+    source = SimpleNamespace(recordings=[SimpleNamespace(derived=False)], vehicle=None)
+
+    def read(paths, reader, **_):
+        for sample in bounced():
+            reader.feed(sample)
+        reader.finish()
+        return source
+
+    def asked(recorded, imu):
+        recorded._sampled[imu] = recorded.sampled(imu)[:1]
+        return unanswered(recorded.calibrator.calibration(imu))
+
+    monkeypatch.setattr(flown_module, "read", read)
+    monkeypatch.setattr(Recorded, "answer", asked)
+    assert len(flown_module.flown("bounced.tlog").batches) == 1
+
+
+@pytest.mark.parametrize("but", [{"shaken": 0.0}, {"lowest": 8.0}])
+def test_a_descent_that_touches_nothing_is_flight(but):
+    assert not standing(found(bounced(**but)), 60.0)
 
 
 def plane_flight():

@@ -49,6 +49,12 @@ class Cleared:
     sampled: Sequence[Batch]
 
     @property
+    def as_sampled(self) -> tuple[Batch, ...]:
+        """The flight without what is false, with its samples and not what to expect of them."""
+        pairs = zip(self.sampled, self.full.batches, strict=True)
+        return tuple(replace(b, trusted=believed.trusted) for b, believed in pairs)
+
+    @property
     def seen(self) -> tuple[Finding | None, ...]:
         """What is seen in the data themselves."""
         return self.rail, self.fault, self.spikes, self.coarse

@@ -43,6 +43,7 @@ from onboard.core.diagnosis.undecided import in_words, left_open, undecided
 from onboard.core.estimate.calibration_status import too_far
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
@@ -57,7 +58,8 @@ class Evidence:
     """The models: everything, what was chosen of it, the one that is reported, what is in doubt.
 
     ``companions`` are all accelerometers of the vehicle; ``believed`` is the number of fixes of the
-    flight that were to be used, ``unused`` flight without any.
+    flight that were to be used, ``unused`` flight without any; ``sampled`` is the flight as it was
+    sampled, but for what is false.
     """
 
     full: Examination
@@ -68,6 +70,7 @@ class Evidence:
     companions: Companions
     believed: int = 0
     unused: tuple[Unused, ...] = ()
+    sampled: tuple[Batch, ...] = ()
 
 
 class Judge:
@@ -84,7 +87,7 @@ class Judge:
     ) -> None:
         """Take the flight, the models, what cannot be asked, and what was left out of the fit."""
         self.calibrator, self.imu, self.evidence = calibrator, imu, evidence
-        self.engine, self.choice = evidence.final, evidence.choice
+        self.engine, self.choice, self.sampled = evidence.final, evidence.choice, evidence.sampled
         self.absent, self.excluded = list(absent), list(excluded)
         self.undecided = undecided(evidence.choice, evidence.families)
         self.left_open = left_open(self.undecided)

@@ -109,6 +109,7 @@ def examine(
             companions,
             believed(flight, calibrator.trust.refusals),
             unused,
+            clear.as_sampled,
         ),
         origin,
         clear.absent,

@@ -13,6 +13,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.engine import Engine
+from onboard.core.estimate.limits import OFFSET_FLOOR, SCALE_FLOOR
 from onboard.core.estimate.merged_record import with_six
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.segments import Batch, Segment
@@ -48,6 +49,30 @@ def mean_columns(engine: Engine, chosen: Chosen | None = None) -> Array | None:
             columns += _added(engine, segment, t).sum(axis=0)
             count += len(t)
     return columns / count if count else None
+
+
+def mean_force_sigma(engine: Engine) -> Array | None:
+    """(3,) of the mean force of a flight, with all undone that is read wrong, body axes, m/s^2.
+
+    The six and what is beside them are known together better than each: where two effects do as
+    well, with another offset each, the mean that they leave is one and the same.  So it has what
+    the sums leave open and what no model knows, and not what the choice of the model does.
+
+    Args:
+        engine: has its flight and its sums; None if it has neither.
+    """
+    model, solution, columns = engine.model, engine.solution(), mean_columns(engine)
+    if solution is None or columns is None:
+        return None
+    for family in model.families:
+        if not family.is_read:
+            columns[:, model.slices[family.name]] = 0.0
+    six, R_bs = solution.theta[model.slices[SIX]], engine.batches[0].segment.R_bs
+    raw = np.diag(columns[:, model.slices[SIX]])
+    floor = (SCALE_FLOOR * raw) ** 2 + (OFFSET_FLOOR * six[:3]) ** 2
+    C = columns @ solution.covariance @ columns.T + np.diag(floor)
+    out: Array = np.sqrt(np.diag(R_bs @ C @ R_bs.T))
+    return out
 
 
 def in_the_mean(made: Calibration, engine: Engine) -> Calibration:

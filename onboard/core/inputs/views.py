@@ -9,6 +9,7 @@ ATTITUDE_QUATERNION are of the body in all modes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -29,6 +30,30 @@ ASKED: Final = frozenset(
 """Parameters that say it."""
 
 
+class Views:
+    """What parameters say of it, as they come over MAVLink."""
+
+    def __init__(self) -> None:
+        """Nobody has said anything."""
+        self._values: dict[str, float] = {}
+
+    @property
+    def told(self) -> bool:
+        """Whether ATTITUDE is of other axes in hover than in forward flight."""
+        return tells_views(self._values, over_mavlink=True)
+
+    def take(self, name: str, value: float) -> bool:
+        """Take a parameter; whether it is one of those that say it, and a number."""
+        says = name in ASKED and math.isfinite(value)
+        if says:
+            self._values[name] = value
+        return says
+
+    def forget(self) -> None:
+        """It is another vehicle."""
+        self._values.clear()
+
+
 def tells_views(values: Mapping[str, float], *, over_mavlink: bool) -> bool:
     """Whether the attitude that is told is of other axes in hover than in forward flight.
 
@@ -42,5 +67,6 @@ def tells_views(values: Mapping[str, float], *, over_mavlink: bool) -> bool:
     old = float(values.get("Q_FRAME_CLASS") == TAILSITTER_FRAME)
     if values.get("Q_TAILSIT_ENABLE", old) > 0.0 or values.get("Q_TRIM_PITCH", 0.0) != 0.0:
         return True
-    kept = int(values.get("FLIGHT_OPTIONS", 0.0)) & NO_PITCH_TRIM
-    return over_mavlink and not kept and values.get("PTCH_TRIM_DEG", 0.0) != 0.0
+    if not over_mavlink or values.get("PTCH_TRIM_DEG", 0.0) == 0.0:
+        return False
+    return not int(values.get("FLIGHT_OPTIONS", 0.0)) & NO_PITCH_TRIM

@@ -173,6 +173,7 @@ class GyroTiming(Family):
     """Remaining delay between gyroscope and accelerometer: their filters need not be alike."""
 
     name = "gyro_timing"
+    is_read = False
 
     def __init__(self, sigma: float = 0.005) -> None:
         """Take the prior sigma, s: streams send both in one message."""

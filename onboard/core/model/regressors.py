@@ -65,6 +65,8 @@ class Family:
         instead_of: name of a nuisance that has the same regressors and gives way to this family.
         is_averaged: whether a receiver averages what its acceleration gains; not where that is in
             the response to the linearisation's force already, or a straight line.
+        is_read: whether its acceleration is of what the accelerometer reads; not where it is that
+            of gravity, or what an attitude that is off makes of the force.
         goes_below: unknowns of every model that are it with the other sign, and may be below
             their range beside it.
     """
@@ -72,6 +74,7 @@ class Family:
     name: str = ""
     instead_of: str = ""
     is_averaged: ClassVar[bool] = True
+    is_read: ClassVar[bool] = True
     goes_below: ClassVar[tuple[str, ...]] = ()
     unknowns: tuple[Unknown, ...] = ()
 

@@ -66,6 +66,7 @@ class Flight:
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
         history: of the commands; None where they are those of the flight alone.
         place: (n,) of each step in the history.
+        unheard_s: how long in the air commands or airspeed were not recorded, which is left out, s.
     """
 
     t: Array
@@ -92,6 +93,7 @@ class Flight:
     ground_seen: bool = True
     history: History | None = None
     place: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    unheard_s: float = 0.0
 
     def __post_init__(self) -> None:
         """One recording, in a wind that nobody measured, where nothing else is said."""
@@ -180,7 +182,8 @@ def flight_of(
         return None
     joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
-    air = ~inside(joined["t"], grounded) & ~hit & (joined["known"] > 0.0)
+    flown = ~inside(joined["t"], grounded) & ~hit
+    air = flown & (joined["known"] > 0.0)
     if not air.any():
         return None
     flight = Flight(
@@ -205,6 +208,7 @@ def flight_of(
         measured_wind=joined["measured_wind"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
+        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air)),
     )
     return flight.cut(air)
 

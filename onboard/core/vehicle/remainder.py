@@ -27,6 +27,7 @@ from onboard.core.vehicle.limits import (
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms, whitened
 from onboard.core.vehicle.places import AXES
+from onboard.core.vehicle.spans import following, joined
 from onboard.core.vehicle.windows import windows_of
 
 FORCES = (0, 1, 2)
@@ -163,13 +164,8 @@ def left_out(flight: Flight, kept: Mask) -> tuple[tuple[float, float], ...]:
 
     Of several recordings, the first is told of.
     """
-    out: list[tuple[float, float]] = []
-    for t in (flight.t[~kept & (flight.part == 0)] - flight.t[0]).tolist():
-        if out and t - out[-1][1] < TOLD_S:
-            out[-1] = (out[-1][0], t)
-        else:
-            out.append((t, t))
-    return tuple((a, b) for a, b in out if b - a >= TOLD_S)
+    lost = (flight.t[~kept & (flight.part == 0)] - flight.t[0]).tolist()
+    return tuple((a, b) for a, b in joined([(t, t) for t in lost], TOLD_S) if b - a >= TOLD_S)
 
 
 def remainder_sentence(found: tuple[Remainder, ...], share: float) -> str:
@@ -203,18 +199,17 @@ def left_out_sentence(spans: tuple[tuple[float, float], ...]) -> str:
     return f"not used, too far from the model: {said}{more}"
 
 
-def _joined(found: list[Remainder]) -> tuple[Remainder, ...]:
+def _joined(found: Sequence[Remainder]) -> tuple[Remainder, ...]:
     """Neighbouring blocks of one axis as one span."""
     out: list[Remainder] = []
-    for r in found:
-        last = out[-1] if out else None
-        near = last and (last.axis, last.part) == (r.axis, r.part)
-        if last and near and r.start_s - last.end_s < TOLD_S:
-            before, now = last.end_s - last.start_s, r.end_s - r.start_s
-            mean = (before * last.force**2 + now * r.force**2) / (before + now)
-            out[-1] = Remainder(last.start_s, r.end_s, r.axis, float(np.sqrt(mean)), r.part)
-        else:
-            out.append(r)
+    for axis, part in dict.fromkeys((r.axis, r.part) for r in found):
+        its = [r for r in found if (r.axis, r.part) == (axis, part)]
+        for run in following([(r.start_s, r.end_s) for r in its], TOLD_S):
+            blocks = [its[k] for k in run]
+            seconds = [r.end_s - r.start_s for r in blocks]
+            square = np.average([r.force**2 for r in blocks], weights=seconds)
+            force = math.sqrt(float(square))
+            out.append(Remainder(blocks[0].start_s, blocks[-1].end_s, axis, force, part))
     return tuple(out)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from onboard.core.inputs.limits import GROUND_M, STILL_M_S
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.limits import APART_FORCE_M_S2, MARGIN_S, OUTLYING, STILL_S
+from onboard.core.vehicle.spans import joined
 
 
 def touched_spans(
@@ -47,14 +48,3 @@ def touched_spans(
         if low and sinks and climbs:
             out.append((at - MARGIN_S, at + MARGIN_S))
     return joined(out)
-
-
-def joined(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The same in order, those that overlap as one."""
-    out: list[tuple[float, float]] = []
-    for start, end in sorted(spans):
-        if out and start <= out[-1][1]:
-            out[-1] = (out[-1][0], max(end, out[-1][1]))
-        else:
-            out.append((start, end))
-    return out

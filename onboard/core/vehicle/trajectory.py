@@ -12,7 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from onboard.core.inputs.segments import Batch
+from onboard.core.estimate.misread import Misread
+from onboard.core.inputs.limits import AHEAD_S, REACH_MARGIN_S, REACH_S
+from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
@@ -45,6 +47,9 @@ class Sensors:
         gps_window: averaging span of it, s.
         attitude_delay: lateness of the recorded attitude, s.
         gyro_scale: (3,) by how much the gyroscope reads too much.
+        misread: what the accelerometer reads wrong beside these; None: nothing that is known.
+        tilt: (3,) roll and pitch of the body by which the recorded attitude is turned too far, and
+            heading to north, rad.
     """
 
     scale: Array
@@ -54,6 +59,31 @@ class Sensors:
     gps_window: float = 0.0
     attitude_delay: float = 0.0
     gyro_scale: Array = field(default_factory=lambda: np.zeros(3))
+    misread: Misread | None = None
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
+
+    def attitude(self, R_nb: Array) -> Array:
+        """Recorded attitudes (n, 3, 3) without what they are off by all flight long."""
+        level = np.array([self.tilt[0], self.tilt[1], 0.0])
+        off = R_nb @ level + np.array([0.0, 0.0, self.tilt[2]])
+        out: Array = rotation_from_vector(-off) @ R_nb
+        return out
+
+    def force(self, segment: Segment, before: Segment | None) -> tuple[Array, Segment]:
+        """Specific force at a segment's samples, with all undone that is known of them.
+
+        Args:
+            segment: samples.
+            before: what was returned for the one before; None after a gap.
+
+        Returns:
+            (n, 3) body axes, m/s^2, and the segment to go on from.
+        """
+        f_b: Array = (self.scale * (segment.raw_s - self.offset)) @ segment.R_bs.T
+        if self.misread is None:
+            return f_b, segment
+        more, segment = self.misread.taken_off(segment, before)
+        return f_b + more, segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +148,20 @@ def motions(batches: Sequence[Batch], sensors: Sensors) -> list[Motion]:
 
 def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     parts = []
+    before: Segment | None = None
     for k, batch in enumerate(run):
-        s = batch.segment
-        start = -np.inf if k == 0 else run[k - 1].fixes.t[-1]
-        end = np.inf if k == len(run) - 1 else batch.fixes.t[-1]
+        s, fix_t = batch.segment, batch.fixes.t
+        # Of a segment that was cut, because it clips, no more than fixes need.
+        start = run[k - 1].fixes.t[-1] if k else fix_t[0] - REACH_S - REACH_MARGIN_S
+        end = fix_t[-1] + (AHEAD_S if k == len(run) - 1 else 0.0)
+        f_b, before = sensors.force(s, before)
         own = (s.t > start) & (s.t <= end)
         t = s.t[own]
         if len(t) == 0:
             continue
         R, _ = s.attitude_at(t + sensors.attitude_delay, sensors.attitude_delay)
-        f_b = (sensors.scale * (s.raw_s[own] - sensors.offset)) @ s.R_bs.T
-        parts.append((t, f_b, s.w_b[own] / (1.0 + sensors.gyro_scale), R))
+        w_b = s.w_b[own] / (1.0 + sensors.gyro_scale)
+        parts.append((t, f_b[own], w_b, sensors.attitude(R)))
     if not parts:
         return None
     t, f_b, w_b, R = (np.concatenate(x) for x in zip(*parts, strict=True))

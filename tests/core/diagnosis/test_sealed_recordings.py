@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
@@ -17,7 +17,12 @@ from sitl.recording import FlightSpec, fly_messages
 PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 
 
-def diagnosed(vehicle, seed, *effects, duration=110.0, imus=None, gps=PROMPT):
+def diagnosed(*flown, **flight):
+    calibrator, found = examined(*flown, **flight)
+    return found.diagnosis(), calibrator.first_sample
+
+
+def examined(vehicle, seed, *effects, duration=110.0, imus=None, gps=PROMPT):
     spec = FlightSpec(
         vehicle=vehicle,
         seed=seed,
@@ -32,9 +37,10 @@ def diagnosed(vehicle, seed, *effects, duration=110.0, imus=None, gps=PROMPT):
             calibrator.feed(sample)
     calibrator.finish()
     before = calibrator.to_bytes()
-    said = diagnose(calibrator, 1)
+    found = examine(calibrator, 1)
+    found.diagnosis()
     assert calibrator.to_bytes() == before, "a diagnosis leaves the calibrator as it is"
-    return said, calibrator.first_sample
+    return calibrator, found
 
 
 @pytest.mark.slow
@@ -47,7 +53,8 @@ def test_nothing_is_found_where_nothing_is_hidden():
 @pytest.mark.slow
 def test_a_false_velocity_is_found_from_beginning_to_end():
     fault = concealed.GpsFault(start=60.0, end=74.0, north=0.0, east=2.5)
-    said, first = diagnosed("plane", 42, fault)
+    calibrator, found = examined("plane", 42, fault)
+    said, first = found.diagnosis(), calibrator.first_sample
     (effect,) = said.effects
     assert effect.name == "gps_fault"
     begin, end = effect.intervals[0][0] + first, effect.intervals[-1][1] + first
@@ -55,6 +62,15 @@ def test_a_false_velocity_is_found_from_beginning_to_end():
     assert abs(end - fault.end) < 2.0
     assert effect.unknowns["offset"].value == pytest.approx(2.5, abs=0.4)
     assert effect.where[0].axis == "earth_east"
+    # Whoever goes on with the flight has its samples, and believes no fix of the fault.
+    whole = calibrator.engine(1).batches
+    assert [b.segment for b in found.sampled] == [b.segment for b in whole]
+    t = np.concatenate([b.fixes.t for b in whole])
+    inside = (t > begin) & (t < end)
+    for batches, believed in ((whole, True), (found.sampled, False)):
+        trusted = np.concatenate([b.trusted for b in batches])
+        assert np.any(trusted[inside]) == believed
+        assert np.all(trusted[(t > begin - 20.0) & (t < begin - 1.0)])
 
 
 @pytest.mark.slow

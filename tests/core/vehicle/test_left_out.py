@@ -12,6 +12,7 @@ from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.remainder import not_used, remainder_sentence, share_of
 from onboard.core.vehicle.signals import Stream
+from onboard.core.vehicle.spans import following, inside, joined
 from onboard.core.vehicle.touches import touched_spans
 from tests.core.vehicle.flights import copter_flight
 
@@ -81,3 +82,14 @@ def test_a_straight_line_over_an_outage_is_no_measurement():
     assert stream.known(at).tolist() == [True, True, False, False, True, True]
     # A stream that is slow all the time has none.
     assert Stream(t[::50], np.ones((len(t[::50]), 1))).known(at).all()
+
+
+def test_spans_that_go_on_from_each_other_are_one():
+    spans = [(5.0, 6.0), (0.0, 2.0), (1.0, 1.5), (2.0, 3.0), (9.0, 9.5)]
+    assert joined(spans) == [(0.0, 3.0), (5.0, 6.0), (9.0, 9.5)]
+    assert joined(spans, 2.0) == [(0.0, 6.0), (9.0, 9.5)]
+    assert following(spans, 2.0) == [[1, 2, 3, 0], [4]]
+    assert joined([]) == []
+    # Whatever is in a span is in one of them, and nothing else.
+    t = np.arange(-1.0, 11.0, 0.01)
+    np.testing.assert_array_equal(inside(t, joined(spans)), inside(t, spans))

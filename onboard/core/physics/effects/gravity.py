@@ -27,6 +27,7 @@ class Gravity(Effect):
     of_flight = True
     keys = ("delta_g",)
     is_averaged = False
+    is_read = False
     # Poles to equator, and 5 km up, it is between 0.03 more and 0.045 less than the standard.
     plausible = (0.045,)
     unknowns = (Unknown("delta_g", "m/s^2", 0.0, 0.06),)
