@@ -85,6 +85,8 @@ class Link:
         self.twins = Twins(clock)
         self.echoed = 0
         """Our own packets that came back."""
+        self.signed = False
+        """Whether the vehicle's last HEARTBEAT was signed, by whatever key."""
         self._routes = Routes()
         self._signing = signing
         self._recorder = recorder
@@ -124,6 +126,11 @@ class Link:
     def state(self) -> AutopilotState:
         """Whether it is heard now."""
         return self.presence.state
+
+    @property
+    def unsigned_beats(self) -> int:
+        """HEARTBEATs of autopilots that were not believed: they were not signed with our key."""
+        return sum(s.unsigned_beats for c in self.connections for s in c.statistics())
 
     # Who gets what
 
@@ -201,6 +208,8 @@ class Link:
             where = "; ".join(
                 f"{c.endpoint} ({c.last_error or c.state.value})" for c in self.connections
             )
+            if self.unsigned_beats:
+                where += "; heartbeats come that are not signed with our key"
             raise LinkError(f"no heartbeat from an autopilot in {timeout:g} s: {where}") from None
         if self.autopilot is None:
             raise LinkError("the link was closed before an autopilot was heard")
@@ -278,6 +287,8 @@ class Link:
         heard = self.presence.hear(source, way, message, boot, now)
         if heard.whose is Whose.VEHICLE:
             self.connections[way[0]].peers.believe(peer, now)
+            if frame.message_id == _HEARTBEAT:
+                self.signed = framing.header(frame.raw, 0).signed
         for event in heard.events:
             self._tell(event, peer, now)
         if heard.whose is Whose.STANDBY or heard.whose is Whose.FOREIGN:
