@@ -79,8 +79,7 @@ class Vigilance:
         rivals = self._link.presence.rivals(now)
         if rivals:
             yield "rivals", f"{rivals} more on the link speak as the vehicle; they are not believed"
-        if text := self._another_speaks(now):
-            yield "another_speaks", text
+        yield from self._others(now)
         if self._observed.contradicted(now):
             yield (
                 "heartbeats_contradict",
@@ -98,15 +97,27 @@ class Vigilance:
             )
         yield from self._clocks()
 
-    def _another_speaks(self, now: float) -> str:
+    def _others(self, now: float) -> Iterator[tuple[str, str]]:
         others, autopilot = self._link.presence.others(now), self._link.autopilot
-        if not others or autopilot is None or self._link.state is not AutopilotState.SILENT:
-            return ""
+        if not others or autopilot is None:
+            return
         whose = ", ".join(map(str, others))
-        return (
-            f"system {autopilot.system} is silent, but system {whose} speaks: another vehicle, or "
-            "this one with another id; a restart of the service takes it up"
-        )
+        if self._link.state is AutopilotState.SILENT:
+            yield (
+                "another_speaks",
+                (
+                    f"system {autopilot.system} is silent, but system {whose} speaks: another "
+                    "vehicle, or this one with another id; a restart of the service takes it up"
+                ),
+            )
+        elif not self._link.presence.chosen:
+            yield (
+                "another_vehicle",
+                (
+                    f"system {whose} is an autopilot on this link, too: the service is for system "
+                    f"{autopilot.system}; [link] system_id chooses"
+                ),
+            )
 
     def _clocks(self) -> Iterator[tuple[str, str]]:
         signing = self._signing
