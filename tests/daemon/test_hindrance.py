@@ -3,6 +3,7 @@
 import random
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.daemon.process import limits
 from onboard.daemon.pushing.parameters import NEEDED, ParameterWatch
@@ -14,7 +15,20 @@ from tests.daemon.test_parameter_watch import told
 virtual_time = pytest.mark.virtual_time
 
 
-class Deaf(Vehicle):
+class Sparing(Vehicle):
+    """Sends RAW_IMU ``rate`` times a second, and of the rest not all."""
+
+    lacks = ""
+
+    def send(self, message):
+        if message.get_type() != self.lacks:
+            super().send(message)
+        if message.get_type() == "RAW_IMU" and self.lacks != "GPS_RAW_INT":
+            fix = (0, 3, 0, 0, 0, 100, 100, 0, 0, 12)
+            super().send(mavlink.MAVLink_gps_raw_int_message(*fix))
+
+
+class Deaf(Sparing):
     """The line to it is cut, or it drops what is not signed."""
 
     deaf = True
@@ -31,8 +45,9 @@ class Deaf(Vehicle):
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch, impatient):
-    """Rates are measured over ticks."""
-    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 1.0)
+    """Rates are measured over ticks; to wait for long is only costly here."""
+    monkeypatch.setattr(limits, "TICK_S", 1.0)
+    monkeypatch.setattr(limits, "SELDOM_S", 8.0)
 
 
 def kinds(service):
@@ -74,15 +89,21 @@ async def test_heartbeats_without_our_signature_are_told_of(
 
 
 @virtual_time
-@pytest.mark.parametrize(("rate", "enough"), [(4.0, False), (10.0, True)])
-async def test_samples_too_seldom_to_learn_from_are_told_of(document, daemon, port, rate, enough):
-    async with daemon(document) as service, Vehicle(port, rate=rate):
+@pytest.mark.parametrize(
+    ("rate", "lacks"),
+    [(4.0, "4 times"), (8.0, ""), (8.0, "RAW_IMU"), (8.0, "ATTITUDE"), (8.0, "GPS_RAW_INT")],
+)
+async def test_messages_too_seldom_to_learn_from_are_told_of(document, daemon, port, rate, lacks):
+    async with daemon(document) as service, Sparing(port, rate=rate) as vehicle:
+        vehicle.lacks = lacks
         await until(lambda: service.link.autopilot is not None)
         began = service.snapshot().uptime_s
         waited = lambda: service.snapshot().uptime_s - began  # noqa: E731
-        await until(lambda: waited() > limits.SELDOM_S + 10.0 or "seldom" in kinds(service))
-        assert ("seldom" in kinds(service)) is not enough
-        assert bool(service.snapshot().link.warnings) is not enough
+        await until(lambda: waited() > limits.SELDOM_S + 6.0 or "seldom" in kinds(service))
+        assert ("seldom" in kinds(service)) is bool(lacks)
+        warnings = service.snapshot().link.warnings
+        assert len(warnings) == bool(lacks)
+        assert all(lacks in text for text in warnings)
 
 
 @pytest.mark.parametrize("seed", range(3))

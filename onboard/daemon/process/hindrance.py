@@ -6,6 +6,10 @@ seldom: nothing fails then, and nothing happens either.  Each is said once it ha
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.daemon.process import limits
 from onboard.daemon.pushing.parameters import ParameterWatch
@@ -13,7 +17,11 @@ from onboard.daemon.view.traffic import Traffic
 from onboard.mavlink.autopilot import AutopilotState
 from onboard.mavlink.link import Link
 
-INERTIAL = ("RAW_IMU", "HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
+INERTIAL: Final = ("RAW_IMU", "HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
+REFERENCES: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {"attitude": ("ATTITUDE", "ATTITUDE_QUATERNION"), "GPS": ("GPS_RAW_INT", "GPS2_RAW")}
+)
+"""What is needed beside them, however seldom it comes, and the messages that bring it."""
 
 
 class Hindrance:
@@ -42,7 +50,7 @@ class Hindrance:
         if refused != self._refused:
             self._refused, self._refused_at = refused, now
         present = self._link.state is AutopilotState.PRESENT
-        if not present or self._enough_at is None or self._fastest() >= SLOWEST_IMU_HZ:
+        if not present or self._enough_at is None or not self._lacking():
             self._enough_at = now
 
     def unsigned(self, now: float) -> str:
@@ -68,14 +76,22 @@ class Hindrance:
         return "the autopilot is heard, but answers nothing: see whether the line leads to it, too"
 
     def seldom(self, now: float) -> str:
-        """Inertial samples come too seldom for anything to be learned."""
+        """What comes too seldom for anything to be learned, inertial samples before all else."""
         if self._enough_at is None or now - self._enough_at <= limits.SELDOM_S:
             return ""
-        rate = self._fastest()
-        least = f"nothing is learned from fewer than {SLOWEST_IMU_HZ:g}"
-        if not rate:
-            return f"no inertial samples come (RAW_IMU, HIGHRES_IMU, SCALED_IMU2): {least} a second"
-        return f"inertial samples come {rate:g} times a second: {least}, 25 are good"
+        return self._lacking()
 
-    def _fastest(self) -> float:
-        return max(map(self._traffic.rate, INERTIAL))
+    def _lacking(self) -> str:
+        rate = self._rate(INERTIAL)
+        if not rate:
+            return f"no inertial samples come ({INERTIAL[0]}): nothing is learned without"
+        if rate < SLOWEST_IMU_HZ:
+            least = f"nothing is learned from fewer than {SLOWEST_IMU_HZ:g}"
+            return f"inertial samples come {rate:g} times a second: {least}, 25 are good"
+        for what, names in REFERENCES.items():
+            if not self._rate(names):
+                return f"no {what} comes ({names[0]}): nothing is learned without"
+        return ""
+
+    def _rate(self, names: Sequence[str]) -> float:
+        return max(map(self._traffic.rate, names))

@@ -41,5 +41,5 @@ UNANSWERED_S: Final = 20.0
 """s without one answer, however often it was asked: the slowest links take some seconds for one
 [data]."""
 SELDOM_S: Final = 20.0
-"""s for which inertial samples come too seldom before it is said: rates are settled in a second or
+"""s for which samples come too seldom before it is said: rates are settled in a second or
 two, on a poor link in ten, and asked for again when somebody else has changed them [data]."""
