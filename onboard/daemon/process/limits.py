@@ -40,6 +40,6 @@ HEARD_OF_LATE_S: Final = 5.0
 UNANSWERED_S: Final = 20.0
 """s without one answer, however often it was asked: the slowest links take some seconds for one
 [data]."""
-SELDOM_S: Final = 20.0
+SELDOM_S: Final = 30.0
 """s for which samples come too seldom before it is said: rates are settled in a second or
 two, on a poor link in ten, and asked for again when somebody else has changed them [data]."""
