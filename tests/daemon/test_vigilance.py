@@ -102,6 +102,19 @@ async def test_of_two_vehicles_on_one_link_it_is_said_whose_it_is(document, daem
             assert all("system 1 is" in text and "for system 2" in text for text in texts)
 
 
+@virtual_time
+async def test_a_silence_is_as_long_as_it_was(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.link.presence.proven)
+        vehicle.stop_talking()
+        await asyncio.sleep(21.0)
+        vehicle.talk_again()
+        texts = lambda: [n.text for n in service.snapshot().notices if "are back" in n.text]  # noqa: E731
+        await until(texts)
+        seconds = float(texts()[0].split("after ")[1].split(" s")[0])
+        assert 20.0 <= seconds <= 23.0
+
+
 @pytest.mark.parametrize("seconds", [0.0, 0.5, 1.99])
 def test_disarmed_covers_two_heartbeats(seconds):
     with pytest.raises(ConfigurationError, match=r"\[push\] disarmed_s"):
