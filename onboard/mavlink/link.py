@@ -36,7 +36,7 @@ from onboard.mavlink.presence import Presence, Whose
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.routes import Routes
 from onboard.mavlink.signing import Signing
-from onboard.mavlink.twins import Twins
+from onboard.mavlink.twins import Twins, our_heartbeat
 from onboard.outage import Over
 
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
@@ -357,7 +357,7 @@ class Link:
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
             self.send(
-                _our_heartbeat(self.twins.signature(now))
+                our_heartbeat(self.twins.signature(now))
             )  # over UDP it also tells the peer where we are
         for connection in self.connections:
             connection.check(now)
@@ -389,14 +389,3 @@ class Link:
             self._audience.hear_of(now, ConnectionRestored(endpoint, news))
         else:
             self._audience.hear_of(now, ConnectionTrouble(endpoint, news))
-
-
-def _our_heartbeat(signature: int) -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-        mavlink.MAV_AUTOPILOT_INVALID,
-        0,
-        signature,
-        mavlink.MAV_STATE_ACTIVE,
-        3,
-    )
